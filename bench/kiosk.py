@@ -48,8 +48,9 @@ id = "{id}"
 kind = "readout"
 label = "{id}"
 topic = "{topic}"
-type = "std_msgs/msg/String"
+type = "{type}"
 """
+TEXT: Final = "std_msgs/msg/String"
 ROBOT: Final = """
 [[robot]]
 id = "{id}"
@@ -81,9 +82,9 @@ def panel(
         for n in range(1, buttons + 1):
             yield BUTTON.format(n=n, topic=COMMAND)
         for topic in topics:
-            yield READOUT.format(id=topic[1:], topic=topic)
+            yield READOUT.format(id=topic[1:], topic=topic, type=TEXT)
         for n in range(1, widgets):
-            yield READOUT.format(id=f"more{n}", topic=topics[0])
+            yield READOUT.format(id=f"more{n}", topic=topics[0], type=TEXT)
 
     return "".join(parts())
 

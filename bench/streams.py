@@ -20,6 +20,7 @@ from playwright.sync_api import Page, sync_playwright
 from websockets.sync.client import connect
 
 from bench.parts import family, rss_mib
+from tests.support.panel_text import OPERATION
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, Bridge, RosNode, Server, live, until
 
 DOMAIN: Final = 98
@@ -29,11 +30,7 @@ FRAMES_HZ: Final = 15.0
 LINES_HZ: Final = 1000.0
 BEAT_S: Final = 0.08
 LOWER: Final = 10  # steps of niceness
-PANEL: Final = """
-title = "Streams"
-[[interlock]]
-id = "operation"
-topic = "/operation_enabled"
+PAGES: Final = """
 [[page]]
 id = "one"
 title = "One"
@@ -61,6 +58,7 @@ interlock = "operation"
 id = "two"
 title = "Two"
 """
+PANEL: Final = f'title = "Streams"\n{OPERATION}{PAGES}'
 
 
 def main() -> None:

@@ -21,7 +21,8 @@ from typing import Any, Final
 
 from playwright.sync_api import Page, sync_playwright
 
-from bench.parts import Meter, family, pss_mib, rss_mib
+from bench.kiosk import BUTTON, HEAD, PAGE, READOUT
+from bench.parts import COMMAND, ENABLED, Meter, family, pss_mib, rss_mib
 from tests.support.parts import Bridge, RosNode, free_port, live, until
 from tests.support.screen import KioskScreen
 
@@ -31,45 +32,16 @@ FOR_S: Final = 3.0 if QUICK else 20.0
 LOOPS: Final = 3 if QUICK else 40
 HZ: Final = 10.0
 TAP_AGAIN_S: Final = 0.8  # a button takes no second press before
-ENABLED, COMMAND, COUNT = "/operation_enabled", "/operation1", "/count"
-PANEL: Final = f"""
-title = "Kiosk"
-[[interlock]]
-id = "operation"
-topic = "{ENABLED}"
-[[page]]
-id = "operation"
-title = "Operation"
-[[page.widget]]
-id = "text"
-kind = "text"
-label = "Message"
-default = "hello"
-[[page.widget]]
-id = "first"
-kind = "publish"
-label = "Publish1"
-topic = "{COMMAND}"
-type = "std_msgs/msg/String"
-message = {{ data = "{{text}}" }}
-interlock = "operation"
-[[page.widget]]
-id = "second"
-kind = "publish"
-label = "Publish2"
-topic = "/operation2"
-type = "std_msgs/msg/String"
-message = {{ data = "{{text}}" }}
-interlock = "operation"
-[[page.widget]]
-id = "count"
-kind = "readout"
-label = "Count"
-topic = "{COUNT}"
-type = "std_msgs/msg/Float64"
-"""
-BUTTON: Final = '[data-widget="first"] button[type="submit"]'
-IS_OPEN: Final = f"document.querySelector({BUTTON!r})?.disabled === false"
+COUNT: Final = "/count"
+PANEL: Final = (
+    HEAD
+    + PAGE
+    + BUTTON.format(n=1, topic=COMMAND)
+    + BUTTON.format(n=2, topic="/operation2")
+    + READOUT.format(id=COUNT[1:], topic=COUNT, type="std_msgs/msg/Float64")
+)
+FIRST: Final = '[data-widget="operation1"] button[type="submit"]'
+IS_OPEN: Final = f"document.querySelector({FIRST!r})?.disabled === false"
 PRESS: Final = """(button) => {
   const press = () => button.disabled || button.click();
   new MutationObserver(press).observe(button, { attributes: true, attributeFilter: ["disabled"] });
@@ -91,7 +63,6 @@ class WholeKiosk:
         self.robot.publish(ENABLED, {"data": True})
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-whole-")))
         (folder / "panel.toml").write_text(PANEL)
-        (folder / "profile").mkdir()
         self._playwright = stack.enter_context(sync_playwright())
         panel, port = folder / "panel.toml", free_port()
         began = time.monotonic()
@@ -145,7 +116,7 @@ class WholeKiosk:
     def closed_loop(self) -> dict[str, float]:
         """Milliseconds from the node's permission to the command that it has."""
         with self.attached() as page:
-            page.locator(BUTTON).evaluate(PRESS)
+            page.locator(FIRST).evaluate(PRESS)
             page.locator("h1, h2").first.dispatch_event("pointerdown")  # as the first touch of a page
         spent: list[float] = []
         for _ in range(LOOPS):

@@ -9,50 +9,14 @@ import pytest
 from app.cli.command import main
 from tests.support import cyclone
 from tests.support.cyclone import Client, CycloneRobot
+from tests.support.panel_text import ADD, CELL, COUNT, LOCKED_START, SPEED
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
 robots = cyclone.robots
 
-PANEL = """
-title = "Cell"
-namespace = "/cell9"
-[[interlock]]
-id = "operation"
-topic = "/operation_enabled"
-[[page]]
-id = "main"
-title = "Main"
-[[page.widget]]
-id = "start"
-kind = "publish"
-label = "Start"
-topic = "/start"
-type = "std_msgs/msg/Bool"
-message = { data = true }
-interlock = "operation"
-[[page.widget]]
-id = "add"
-kind = "call"
-label = "Add"
-service = "/add_two_ints"
-type = "example_interfaces/srv/AddTwoInts"
-request = { a = 40, b = 2 }
-answer = "the sum is {sum}"
-[[page.widget]]
-id = "count"
-kind = "action"
-label = "Count"
-action = "/fibonacci"
-type = "example_interfaces/action/Fibonacci"
-goal = { order = 3 }
-[[page.widget]]
-id = "speed"
-kind = "parameter"
-label = "Speed"
-node = "/cyclone_robot"
-parameter = "speed"
-type = "double"
-"""
+FIBONACCI = COUNT.replace("/count", "/fibonacci")
+SPEED_OF_ROBOT = SPEED.replace("/arm", "/cyclone_robot")
+PANEL = f"{CELL}{LOCKED_START}{ADD}{FIBONACCI}{SPEED_OF_ROBOT}"
 
 
 @pytest.fixture

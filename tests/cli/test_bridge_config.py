@@ -7,26 +7,10 @@ import pytest
 import zenoh
 
 from app.cli.command import main
+from tests.support.panel_text import CELL, COUNT, LOCKED_START, SPEED
 from tests.support.parts import ROOT
 
-PANEL = """
-title = "Cell"
-namespace = "/cell9"
-[[interlock]]
-id = "operation"
-topic = "/operation_enabled"
-[[page]]
-id = "main"
-title = "Main"
-[[page.widget]]
-id = "start"
-kind = "publish"
-label = "Start"
-topic = "/start"
-type = "std_msgs/msg/Bool"
-message = { data = true }
-interlock = "operation"
-confirm = { topic = "/started", type = "std_msgs/msg/Bool", equals = true }
+PRESSURE_AND_RESET = """
 [[page.widget]]
 id = "pressure"
 kind = "readout"
@@ -41,22 +25,9 @@ label = "Reset"
 service = "/reset"
 type = "std_srvs/srv/Trigger"
 timeout_s = 12.5
-[[page.widget]]
-id = "count"
-kind = "action"
-label = "Count"
-action = "/count"
-type = "example_interfaces/action/Fibonacci"
-goal = { order = 3 }
-timeout_s = 8.0
-[[page.widget]]
-id = "speed"
-kind = "parameter"
-label = "Speed"
-node = "/arm"
-parameter = "speed"
-type = "double"
 """
+CONFIRM = 'confirm = { topic = "/started", type = "std_msgs/msg/Bool", equals = true }'
+PANEL = f"{CELL}{LOCKED_START}{CONFIRM}{PRESSURE_AND_RESET}{COUNT}timeout_s = 8.0\n{SPEED}"
 SEVERAL = PANEL.replace(
     'namespace = "/cell9"',
     'robot = [{ id = "left", name = "Left", namespace = "/l", connect = ["tcp/192.0.2.1:7447"] },'

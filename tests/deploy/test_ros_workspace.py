@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from tests.support.panel_text import MAIN, START
 from tests.support.parts import (
     BRIDGE,
     CYCLONE_ON_LOOPBACK,
@@ -28,18 +29,7 @@ from tests.support.parts import (
 )
 
 PACKAGE: Final = "operator_panel"
-PANEL: Final = """title = "Robot cell 1"
-[[page]]
-id = "main"
-title = "Main"
-[[page.widget]]
-id = "start"
-kind = "publish"
-label = "Start"
-topic = "/start"
-type = "std_msgs/msg/Bool"
-message = { data = true }
-"""
+PANEL: Final = f'title = "Robot cell 1"\n{MAIN}{START}'
 # The bridge's own program takes `-c FILE` and ROS_DOMAIN_ID; that of the tests FILE and places in it.
 BRIDGE_COMMAND: Final = f"""#!/bin/sh
 [ "$1" = -c ] && [ $# = 2 ] || exit 2
@@ -196,7 +186,7 @@ def launch(workspace: Workspace, folder: Path, *arguments: str) -> str:
 
 def test_a_launch_ends_with_a_panel_that_has_a_fault(workspace: Workspace, tmp_path: Path) -> None:
     said = launch(workspace, tmp_path, "panel:=cell1.toml", f"port:={free_port()}", "bridge:=false")
-    assert 'line 9: "start" is not an absolute ROS 2 topic name' in said
+    assert 'line 11: "start" is not an absolute ROS 2 topic name' in said
     assert "launch: the panel's server has ended" in said
 
 

@@ -4,14 +4,11 @@ import re
 from pathlib import Path
 from typing import Final
 
+from tests.support.panel_text import OPERATION
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 
-PANEL: Final = """
-title = "Jog"
-[[interlock]]
-id = "operation"
-topic = "/operation_enabled"
+PAGES: Final = """
 [[page]]
 id = "one"
 title = "One"
@@ -34,6 +31,7 @@ release = { x = 0, y = 0, z = 0 }
 rate_hz = 50
 interlock = "operation"
 """
+PANEL: Final = f'title = "Jog"\n{OPERATION}{PAGES}'
 TOPIC: Final = "/jog"
 PATIENT: Final = "tests.support.apps.patient:app"  # its leases are those that a busy machine keeps
 TRIES: Final = 5  # on a machine that stands still a hold ends, as it should, before its test does
