@@ -17,6 +17,7 @@ from app.robot.history import Column, History
 from app.robot.state import RobotState
 
 SIZE: Final = 1000
+NAME_ROOM: Final = 12  # percent of the height that the name of a limit takes
 COLUMNS: Final = 240
 VALUE_TICKS: Final = 4
 TIME_TICKS: Final = 5
@@ -45,6 +46,11 @@ class Limit(NamedTuple):
     place: float
     text: TextLike
     letter: str
+
+    @property
+    def named_above(self) -> bool:
+        """Whether its name is above its line: outside of what the limits enclose, if that is drawn."""
+        return self.place >= NAME_ROOM if self.letter == "H" else self.place > 100 - NAME_ROOM
 
 
 class Band(NamedTuple):

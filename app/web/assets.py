@@ -1,8 +1,8 @@
 """The static files, in memory and packed, under a name that changes with their content.
 
 The stylesheet is the layers of `static/css` in their order, with what families of the panel's widgets
-need and its millimetres: one request instead of five; what only the log's page, or a keypad that opens,
-needs is a file of its own.
+need and its millimetres: one request instead of five; what only the log's page, the gallery or a keypad
+that opens needs is a file of its own.
 Scripts keep their names, so that modules find each other, and their lines. A kind of widgets may have
 `css/kinds/<kind>.css` and `js/kinds/<kind>.js`, which pages with the kind load. Comments, what lines
 are indented by and what only sets styles apart stay here.
@@ -21,7 +21,7 @@ OF_KINDS: Final = {
     "entries": frozenset({"text", "number", "slider", "select", "toggle", "parameter"}),
     "marks": frozenset({"gauge", "joints"}),
 }
-OWN_PAGE: Final = "log"
+OWN_PAGES: Final = ("gallery", "log")
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
     ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
@@ -101,7 +101,7 @@ def load_assets(
     sheet = asset(b"".join([*layers, millimetre]), ".css")
     files = {"kiosk.css": _with_styles(sheet, styles)}
     of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}
-    apart = {name: static / "css" / f"{name}.css" for name in (OWN_PAGE, LATER)}
+    apart = {name: static / "css" / f"{name}.css" for name in (*OWN_PAGES, LATER)}
     for name, file in (apart | of_kinds).items():
         files[f"{name}.css"] = asset(file.read_bytes(), ".css")
     scripts = static / "js"

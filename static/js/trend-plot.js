@@ -2,9 +2,12 @@
 // app/view/trend_plot.py.
 const SIZE = 1000;
 const VALUE_TICK_PX = 45;
+const NAME_ROOM = 12; // percent of the height that the name of a limit takes
 const TIME_TICK_PX = 90;
 const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800];
 
+// The name of a limit stands outside of what the limits enclose, if that is drawn.
+const isNamedAbove = (letter, place) => (letter === "H" ? place >= NAME_ROOM : place > 100 - NAME_ROOM);
 const numberOr = (text, other) => (text === undefined ? other : Number(text));
 
 export class Plot {
@@ -46,7 +49,8 @@ export class Plot {
     part(".times").innerHTML = times.map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`).join("");
     const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
-    part(".limit-names").innerHTML = limits.map(({ letter, at }) => `<text x="6" y="${y(at) / 10}%" dy="${letter === "H" ? -5 : 15}">${letter} ${written(String(at))}</text>`).join("");
+    const named = limits.map((limit) => ({ ...limit, place: y(limit.at) / 10 })).filter(({ place }) => place >= 0 && place <= 100);
+    part(".limit-names").innerHTML = named.map(({ letter, at, place }) => `<text x="6" y="${place}%" dy="${isNamedAbove(letter, place) ? -5 : 15}">${letter} ${written(String(at))}</text>`).join("");
     part(".bands").innerHTML = this.pens.filter((pen) => pen.normal).map(({ normal: [from, to] }) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`).join("");
     for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
   }

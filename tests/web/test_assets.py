@@ -7,7 +7,7 @@ import pytest
 
 from app.panel.widgets.kinds import KINDS
 from app.settings import shipped_path
-from app.web.assets import LATER, LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
+from app.web.assets import LATER, LAYERS, OF_KINDS, OWN_PAGES, Assets, load_assets
 from tests.support.parts import ROOT
 
 
@@ -16,7 +16,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, *OF_KINDS, OWN_PAGE, LATER):
+    for layer in (*LAYERS, *OF_KINDS, *OWN_PAGES, LATER):
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")

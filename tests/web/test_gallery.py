@@ -6,6 +6,7 @@ from typing import get_args
 
 import pytest
 
+from app.i18n import render, say, time_of_day
 from app.panel.widgets.displays import Indicator
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.roles import KeyRole
@@ -48,6 +49,23 @@ def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     large = server.http.get("/gallery?theme=dark&text_size=large&hand=none").text
     assert 'data-theme="dark" data-text-size="large" data-hand="right"' in large
     assert 'href="?theme=contrast&amp;text_size=large&amp;hand=right&amp;sounds=off"' in large
+
+
+def test_it_reads_in_the_language_of_the_cookie(server: Server) -> None:
+    """What an operator would read does; the names of the states are a developer's."""
+    lock = {
+        "en": "Close guard door 1",
+        "ja": "安全扉 1 を閉じてください",
+        "de": "Schutztür 1 schließen",
+    }
+    for language, reason in lock.items():
+        page = server.http.get("/gallery", headers={"cookie": f"kiosk_language={language}"}).text
+        assert f'<html lang="{language}"' in page
+        assert reason in page
+        for sentence in ("bridge", "parameter_read", "hold_since", "table_empty", "camera_encoding"):
+            at = time_of_day("14:31:52" if sentence == "parameter_read" else "14:31:58")
+            assert render(say(sentence, encoding="mono16", time=at), language) in page, sentence
+        assert '<p class="text-small" lang="en">locked by several</p>' in page
 
 
 def test_there_is_none_without_development() -> None:

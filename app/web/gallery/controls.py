@@ -2,8 +2,12 @@
 
 from typing import Final
 
+from app.i18n import TextLike, say
+from app.robot.command_status import OutcomeCode
+from app.web.gallery import texts
 from app.web.gallery.examples import (
     ACTION,
+    AT,
     CALL,
     CALLED,
     ENABLED,
@@ -17,6 +21,7 @@ from app.web.gallery.examples import (
     NOT_LIVE,
     PRESSED,
     PUBLISH,
+    REFUSED,
     REQUESTED,
     REST,
     RUNS,
@@ -26,41 +31,62 @@ from app.web.gallery.examples import (
 )
 
 ROLES: Final = (
-    Example("start", "publish", PUBLISH | {"label": "Start", "role": "start"}, FREE),
-    Example("stop", "publish", PUBLISH | {"label": "Stop", "role": "stop"}, FREE),
-    Example("reset", "publish", PUBLISH | {"label": "Reset", "role": "reset"}, FREE),
+    Example("start", "publish", PUBLISH | {"label": texts.START.table, "role": "start"}, FREE),
+    Example("stop", "publish", PUBLISH | {"label": texts.STOP.table, "role": "stop"}, FREE),
+    Example("reset", "publish", PUBLISH | {"label": texts.RESET.table, "role": "reset"}, FREE),
     Example(
-        "toggle", "publish", PUBLISH | {"label": "Light", "role": "toggle", "icon": "lightbulb"}, FREE
+        "toggle",
+        "publish",
+        PUBLISH | {"label": texts.LIGHT.table, "role": "toggle", "icon": "lightbulb"},
+        FREE,
     ),
     Example("neutral", "publish", PUBLISH, FREE),
     Example("hold", "hold", HOLD, FREE | LET_GO, marks=ENABLED),
 )
+SENT: Final[tuple[OutcomeCode, TextLike]] = ("published", say("published", topic="/operation", time=AT))
 KEYS: Final = (
     Example("pressed", "publish", PUBLISH, FREE, marks=PRESSED),
-    Example("answered", "publish", PUBLISH, FREE, receipt=("published", "Sent at 14:31:58")),
-    Example("refused", "publish", PUBLISH, FREE, receipt=("refused", "Refused: no ribbon")),
+    Example("answered", "publish", PUBLISH, FREE, receipt=SENT),
+    Example("refused", "publish", PUBLISH, FREE, receipt=REFUSED),
     Example("locked", "publish", PUBLISH, LOCKED),
     Example("locked by several", "publish", PUBLISH | {"interlock": ["door", "auto"]}, LOCKED_BY_TWO),
-    Example("locked, black", "publish", PUBLISH | {"label": "Stop", "role": "stop"}, LOCKED),
-    Example("called", "call", CALL, CALLED | {"busy": True, "result": "Calling /reset"}, marks=PRESSED),
-    Example("succeeded", "call", CALL, CALLED | {"outcome": "succeeded", "result": "Done 14:31:58"}),
+    Example("locked, black", "publish", PUBLISH | {"label": texts.STOP.table, "role": "stop"}, LOCKED),
+    Example(
+        "called",
+        "call",
+        CALL,
+        CALLED | {"busy": True, "result": say("waiting_for_answer")},
+        marks=PRESSED,
+    ),
+    Example(
+        "succeeded", "call", CALL, CALLED | {"outcome": "succeeded", "result": say("answered", time=AT)}
+    ),
     Example("rejected, long", "call", CALL, CALLED | {"outcome": "rejected", "result": LONG}),
     Example("hold asked", "hold", HOLD, FREE | LET_GO, marks=REQUESTED),
-    Example("held", "hold", HOLD, FREE | {"held": True, "holding": "held 0.8 s"}, marks=HELD),
+    Example(
+        "held", "hold", HOLD, FREE | {"held": True, "holding": say("hold_since", time=AT)}, marks=HELD
+    ),
     Example("hold locked", "hold", HOLD, LOCKED | LET_GO),
 )
+HALFWAY: Final[Table] = {
+    "progress": 0.62,
+    "doing": say("goal_state_percent", state=say("goal_state_executing"), percent=62),
+}
 ACTIONS: Final = (
     Example("free", "action", ACTION, CALLED),
-    Example("runs", "action", ACTION, LOCKED | REST | RUNS | {"progress": 0.62}),
+    Example("runs", "action", ACTION, LOCKED | REST | RUNS | HALFWAY),
     Example("runs, not known how far", "action", ACTION, LOCKED | REST | RUNS),
     Example(
-        "canceled", "action", ACTION, CALLED | {"outcome": "canceled", "result": "Canceled 14:31:58"}
+        "canceled",
+        "action",
+        ACTION,
+        CALLED | {"outcome": "canceled", "result": say("goal_canceled", time=AT)},
     ),
     Example("locked", "action", ACTION, LOCKED | REST),
-    Example("refused", "action", ACTION, CALLED, receipt=("refused", "Refused: no pallet")),
+    Example("refused", "action", ACTION, CALLED, receipt=REFUSED),
 )
 STEP: Final[Table] = PUBLISH | {
-    "label": "Belt speed",
+    "label": texts.BELT_SPEED.table,
     "message": {"data": "{value}"},
     "value": {"topic": "/speed", "type": "std_msgs/msg/Float32"},
     "min": 0,
@@ -75,6 +101,10 @@ STEPPED: Final[Table] = CALLED | {
     "step_up": "130",
     "step_down": "110",
 }
+MOVED: Final[tuple[OutcomeCode, TextLike]] = (
+    "refused",
+    say("refused", time=AT, why=say("step_moved", label=texts.BELT_SPEED.shown, value="130")),
+)
 STEPS: Final = (
     Example("free", "step", STEP, STEPPED),
     Example("at its limit", "step", STEP, STEPPED | {"text": "250", "step_up": ""}),
@@ -83,10 +113,15 @@ STEPS: Final = (
         "sent, waiting",
         "step",
         STEP,
-        STEPPED | {"enabled": False, "reason": "In progress: waiting for the robot."},
+        STEPPED | {"enabled": False, "reason": say("busy")},
     ),
-    Example("done", "step", STEP, STEPPED | {"outcome": "confirmed", "result": "Done 14:31:58"}),
-    Example("refused", "step", STEP, STEPPED, receipt=("refused", "Refused: it is 130 by now")),
+    Example(
+        "done",
+        "step",
+        STEP,
+        STEPPED | {"outcome": "confirmed", "result": say("confirmed", topic="/speed", time=AT)},
+    ),
+    Example("refused", "step", STEP, STEPPED, receipt=MOVED),
     *(
         Example(
             state,
@@ -101,7 +136,7 @@ STEPS: Final = (
     ),
 )
 JOYSTICK: Final[Table] = {
-    "label": "Drive",
+    "label": texts.DRIVE.table,
     "topic": "/cmd_vel",
     "type": "geometry_msgs/msg/Twist",
     "interlock": "automatic",

@@ -2,30 +2,34 @@
 
 from typing import Final
 
+from app.i18n import TextLike, number, say
 from app.panel.widgets.log_view import LEVELS as LOG_LEVELS
-from app.web.gallery.examples import NOT_LIVE, TOPIC, Example, Table, Texts
+from app.web.gallery import texts
+from app.web.gallery.examples import AT, NOT_LIVE, TOPIC, Example, Table
 
-VALUE: Final[Table] = TOPIC | {"label": "Vacuum", "unit": "kPa"}
+VALUE: Final[Table] = TOPIC | {"label": texts.VACUUM.table, "unit": "kPa"}
+MEASURED: Final = number("-71", "kPa")
+LONG_NUMBER: Final = number("-1234567890.123456", "kPa")
 READOUTS: Final = (
-    Example("live", "readout", VALUE, {"state": "live", "text": "−71 kPa", "note": ""}),
-    Example("long", "readout", VALUE, {"state": "live", "text": "−1234567890.123456 kPa", "note": ""}),
+    Example("live", "readout", VALUE, {"state": "live", "text": MEASURED, "note": ""}),
+    Example("long", "readout", VALUE, {"state": "live", "text": LONG_NUMBER, "note": ""}),
     *(
         Example(
             state,
             "readout",
             VALUE,
-            {"state": state, "text": "−71 kPa" if state == "old" else "—", "note": note},
+            {"state": state, "text": MEASURED if state == "old" else "—", "note": note},
         )
         for state, note in NOT_LIVE.items()
     ),
 )
 LAMP: Final[Table] = {
-    "label": "Guard door 1",
+    "label": texts.GUARD_DOOR.table,
     "topic": "/door",
     "type": "std_msgs/msg/Bool",
-    "states": [{"value": True, "text": "Open", "shape": "circle"}],
+    "states": [{"value": True, "text": texts.OPEN.table, "shape": "circle"}],
 }
-LIVE: Final[Table] = {"state": "live", "text": "Locked", "note": "", "colour": "none"}
+LIVE: Final[Table] = {"state": "live", "text": texts.LOCKED.shown, "note": "", "colour": "none"}
 LAMPS: Final = (
     *(
         Example(shape, "indicator", LAMP, LIVE | {"shape": shape})
@@ -42,26 +46,37 @@ LAMPS: Final = (
             LAMP,
             {
                 "state": state,
-                "text": "Unknown",
-                "note": note,
+                "text": say(f"lamp_{state}"),
+                "note": say("lamp_was", text=texts.LOCKED.shown, note=note) if state == "old" else note,
                 "colour": "none",
                 "shape": "waiting" if state == "missing" else state,
             },
         )
         for state, note in NOT_LIVE.items()
     ),
-    Example("a value of no state", "indicator", LAMP, LIVE | {"text": "Value 3", "shape": "unknown"}),
+    Example(
+        "a value of no state",
+        "indicator",
+        LAMP,
+        LIVE | {"text": say("lamp_unknown", value="3"), "shape": "unknown"},
+    ),
 )
-CAMERA: Final[Table] = {"label": "Camera 1", "topic": "/camera"}
+CAMERA: Final[Table] = {"label": texts.CAMERA.table, "topic": "/camera"}
+AGED: Final = say("camera_old", age=say("age_seconds", number=12), time=AT)
 CAMERAS: Final = (
-    Example("waiting", "camera", CAMERA, {"state": "waiting", "note": "waiting for /camera"}),
+    Example(
+        "waiting",
+        "camera",
+        CAMERA,
+        {"state": "waiting", "note": say("camera_waiting", topic="/camera")},
+    ),
     Example("live", "camera", CAMERA, {"state": "live", "note": ""}),
-    Example("old", "camera", CAMERA, {"state": "old", "note": "12 s old, received 14:31:52"}),
+    Example("old", "camera", CAMERA, {"state": "old", "note": AGED}),
     Example(
         "unreadable",
         "camera",
         CAMERA,
-        {"state": "unreadable", "note": "The encoding mono16 cannot be shown: it must have 8 bits"},
+        {"state": "unreadable", "note": say("camera_encoding", encoding="mono16")},
     ),
     Example(
         "none reaches this screen",
@@ -71,22 +86,27 @@ CAMERAS: Final = (
         marks={'data-kind="camera"': 'data-kind="camera" data-late'},
     ),
 )
-LOG: Final[Table] = {"label": "Log of the robot", "lines": 10}
+LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}
 LOGS: Final = (
     Example("lines", "log", LOG, {"state": "live", "note": "", "count": "5"}),
-    Example("waiting", "log", LOG, {"state": "waiting", "note": "waiting for /rosout", "count": "0"}),
-    Example("cut off", "log", LOG, {"state": "old", "note": "The connection was lost", "count": "5"}),
+    Example(
+        "waiting",
+        "log",
+        LOG,
+        {"state": "waiting", "note": say("readout_waiting", topic="/rosout"), "count": "0"},
+    ),
+    Example("cut off", "log", LOG, {"state": "old", "note": say("rosout_cut"), "count": "5"}),
 )
 
 
-class Everyones(dict[str, list[Texts]]):
+class Everyones(dict[str, list[dict[str, TextLike]]]):
     """The same lines for every question."""
 
-    def __missing__(self, _: str) -> list[Texts]:
-        texts = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
+    def __missing__(self, _: str) -> list[dict[str, TextLike]]:
+        said = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
         return [
-            {"time": "14:31:58", "level": level, "word": level.title(), "node": "cell", "text": text}
-            for level, text in zip(LOG_LEVELS, texts, strict=True)
+            {"time": AT, "level": level, "word": say(f"rosout_{level}"), "node": "cell", "text": text}
+            for level, text in zip(LOG_LEVELS, said, strict=True)
         ]
 
 

@@ -1,12 +1,14 @@
 """One widget of the gallery in one state, and the tables and states that several kinds share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from app.commands.receipts import Receipt
+from app.i18n import TextLike, joined, say, time_of_day
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 from app.robot.command_status import OutcomeCode
+from app.web.gallery import texts
 
 Table = dict[str, Any]
 Texts = dict[str, str]
@@ -24,12 +26,12 @@ class Example(NamedTuple):
     table: Table
     shown: Table = NOTHING
     entered: Any = None
-    receipt: tuple[OutcomeCode, str] | None = None
+    receipt: tuple[OutcomeCode, TextLike] | None = None
     marks: Texts = NO_MARKS
 
     def widget(self, number: int) -> BaseWidget:
         """Its description; `number` makes its id."""
-        table = {"label": "Print label", **self.table, "kind": self.kind, "id": f"example_{number}"}
+        table = {"label": texts.PRINT.table, **self.table, "kind": self.kind, "id": f"example_{number}"}
         return KINDS[self.kind].model_validate(table)
 
     def receipt_of(self, widget: BaseWidget) -> Receipt | None:
@@ -40,26 +42,28 @@ class Example(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A group of the gallery."""
+    """A group of the gallery. Its title and those of its examples are a developer's: in English."""
 
     title: str
     columns: int
     examples: Sequence[Example]
 
 
+AT: Final = time_of_day("14:31:58")
+BEFORE: Final = time_of_day("14:31:52")
 TOPIC: Final[Table] = {"topic": "/operation", "type": "std_msgs/msg/String"}
 PUBLISH: Final[Table] = TOPIC | {"message": {"data": "print"}}
 CALL: Final[Table] = {"service": "/reset", "type": "std_srvs/srv/Trigger"}
 HOLD: Final[Table] = TOPIC | {
     "label": "X+",
     "icon": "arrow-up",
-    "note": "forward",
+    "note": texts.FORWARD.table,
     "message": {"data": "forward"},
     "release": {"data": "stop"},
     "interlock": "automatic",
 }
 ACTION: Final[Table] = {
-    "label": "Pallet out",
+    "label": texts.PALLET_OUT.table,
     "icon": "forklift",
     "action": "/count",
     "type": "example_interfaces/action/Fibonacci",
@@ -67,10 +71,10 @@ ACTION: Final[Table] = {
     "progress": "sequence[0]",
 }
 FREE: Final[Table] = {"enabled": True, "reason": None}
-LOCKED: Final[Table] = {"enabled": False, "reason": "Close guard door 1"}
+LOCKED: Final[Table] = {"enabled": False, "reason": texts.CLOSE_DOOR.shown}
 LOCKED_BY_TWO: Final[Table] = LOCKED | {
-    "reasons": "Close guard door 1\nSwitch to automatic operation",
-    "more": "+ 1 more",
+    "reasons": joined([texts.CLOSE_DOOR.shown, texts.TO_AUTOMATIC.shown], "between_lines"),
+    "more": say("more_reasons", number=1),
 }
 REST: Final[Table] = {
     "busy": False,
@@ -86,19 +90,24 @@ CALLED: Final[Table] = FREE | REST
 RUNS: Final[Table] = {
     "busy": True,
     "goal": "EXECUTING",
-    "doing": "Running, 60 %",
+    "doing": say("goal_state_executing"),
     "stoppable": True,
-    "result": "Conveyor C3",
+    "result": texts.CONVEYOR.shown,
 }
-LONG: Final = "Rejected by the robot at 14:31:58: the gripper still holds a box of the last layer"
+LONG: Final = say("with_reply", said=say("said_no", time=AT), reply=texts.STILL_GRIPS.shown)
+REFUSED: Final[tuple[OutcomeCode, TextLike]] = (
+    "refused",
+    say("refused", time=AT, why=say("too_often")),
+)
 PRESSED: Final[Texts] = {'type="submit"': 'type="submit" aria-busy="true"'}
 ENABLED: Final[Texts] = {" disabled>": ">"}
 REQUESTED: Final[Texts] = ENABLED | {'data-kind="hold"': 'data-kind="hold" data-hold="asked"'}
 HELD: Final[Texts] = ENABLED | {'data-kind="hold"': 'data-kind="hold" data-hold="held"'}
 LET_GO: Final[Table] = {"held": False, "holding": ""}
-NOT_LIVE: Final[Texts] = {
-    "waiting": "Nothing received on /door",
-    "old": "2 min old",
-    "unreadable": "/door is not std_msgs/msg/Bool",
-    "missing": "No field data at 14:31:52",
+OLD: Final = say("readout_old", age=say("age_minutes", number=2))
+NOT_LIVE: Final[Mapping[str, TextLike]] = {
+    "waiting": say("readout_waiting", topic="/door"),
+    "old": OLD,
+    "unreadable": say("readout_unreadable", topic="/door", wanted="std_msgs/msg/Bool"),
+    "missing": say("readout_missing", field="data", time=BEFORE),
 }

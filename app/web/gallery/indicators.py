@@ -2,10 +2,12 @@
 
 from typing import Final
 
-from app.web.gallery.examples import NOT_LIVE, TOPIC, Example, Table
+from app.i18n import Text, TextLike, number, say
+from app.web.gallery import texts
+from app.web.gallery.examples import NOT_LIVE, OLD, TOPIC, Example, Table
 
 GAUGE: Final[Table] = TOPIC | {
-    "label": "Air inlet",
+    "label": texts.AIR_INLET.table,
     "unit": "bar",
     "min": 3,
     "max": 8,
@@ -22,24 +24,30 @@ AT_REST: Final[Table] = {
     "pointer": None,
     "setpoint": 60.0,
     "said": "",
-    "target": "set 6",
+    "target": say("gauge_setpoint", value=number("6.0")),
 }
 IN_RANGE: Final[Table] = AT_REST | {
     "state": "live",
     "level": "normal",
-    "text": "5.9",
+    "text": number("5.9"),
     "pointer": 58.0,
 }
+
+
+def _beyond(code: str, limit: str) -> Text:
+    return say(f"gauge_{code}", limit=number(limit))
+
+
 BEYOND: Final[Table] = {
-    "abnormal": {"text": "6.8", "pointer": 76.0, "said": "above normal 6.5"},
-    "low": {"text": "4.4", "pointer": 28.0, "said": "below low 4.5"},
-    "high": {"text": "7.2", "pointer": 84.0, "said": "above high 7"},
-    "low_low": {"text": "3.1", "pointer": 2.0, "said": "below low-low 4"},
+    "abnormal": {"text": number("6.8"), "pointer": 76.0, "said": _beyond("above_normal", "6.5")},
+    "low": {"text": number("4.4"), "pointer": 28.0, "said": _beyond("low", "4.5")},
+    "high": {"text": number("7.2"), "pointer": 84.0, "said": _beyond("high", "7.0")},
+    "low_low": {"text": number("3.1"), "pointer": 2.0, "said": _beyond("low_low", "4.0")},
     "high_high": {
-        "text": "11.25",
+        "text": number("11.25"),
         "pointer": 100.0,
         "beyond": "above",
-        "said": "above high-high 7.5",
+        "said": _beyond("high_high", "7.5"),
     },
 }
 DOUBTFUL: Final[Table] = AT_REST | {"level": "", "text": "—"}
@@ -60,7 +68,7 @@ GAUGES: Final = tuple(
     )
 )
 JOINTS: Final[Table] = {
-    "label": "Joints",
+    "label": texts.JOINTS.table,
     "joint": [
         {"name": name, "label": label, "min": -low, "max": high, "low": 10 - low, "high": high - 10}
         for name, label, low, high in (
@@ -75,7 +83,7 @@ JOINTS_LIVE: Final[Table] = {
     "state": "live",
     "note": "",
     "said": "",
-    "joint_values": ["+27.1", "+41.6", "−38.2", "−4.8"],
+    "joint_values": [number(one) for one in ("+27.1", "+41.6", "-38.2", "-4.8")],
     "joint_bars": [58.0, 50.8, 31.4, 48.7],
     "joint_levels": ["normal"] * 4,
 }
@@ -84,6 +92,7 @@ JOINTS_UNKNOWN: Final[Table] = JOINTS_LIVE | {
     "joint_bars": [None] * 4,
     "joint_levels": [""] * 4,
 }
+BEYOND_RANGE: Final = say("joint_high_high", joint="joint_4", limit="190")
 JOINT_ROWS: Final = (
     Example("normal", "joints", JOINTS, JOINTS_LIVE),
     Example(
@@ -92,8 +101,8 @@ JOINT_ROWS: Final = (
         JOINTS,
         JOINTS_LIVE
         | {
-            "said": "joint_4 beyond its range, which ends at 190 and 2 more",
-            "joint_values": ["+158.1", "+140.2", "−38.2", "+195.0"],
+            "said": say("joint_more", first=BEYOND_RANGE, number=2),
+            "joint_values": [number(one) for one in ("+158.1", "+140.2", "-38.2", "+195.0")],
             "joint_bars": [96.5, 97.7, 31.4, 100.0],
             "joint_levels": ["near", "high", "normal", "high_high"],
         },
@@ -104,8 +113,8 @@ JOINT_ROWS: Final = (
         JOINTS,
         JOINTS_LIVE
         | {
-            "said": "J2 is missing in the message",
-            "joint_values": ["+27.1", "missing", "−38.2", "−4.8"],
+            "said": say("joint_is_missing", joint="J2"),
+            "joint_values": [number("+27.1"), say("joint_missing"), number("-38.2"), number("-4.8")],
             "joint_bars": [58.0, None, 31.4, 48.7],
             "joint_levels": ["normal", "missing", "normal", "normal"],
         },
@@ -122,28 +131,32 @@ JOINT_ROWS: Final = (
     ),
 )
 LEVELS: Final = (
-    {"value": 0, "text": "OK", "shape": "circle"},
-    {"value": 1, "text": "Warning", "shape": "triangle", "colour": "yellow"},
-    {"value": 2, "text": "Error", "shape": "cross", "colour": "red"},
+    (texts.OK, "circle", "grey"),
+    (texts.WARNING, "triangle", "yellow"),
+    (texts.ERROR, "cross", "red"),
 )
+STATES: Final = [
+    {"value": value, "text": text.table, "shape": shape, "colour": colour}
+    for value, (text, shape, colour) in enumerate(LEVELS)
+]
 TABLE: Final[Table] = {
-    "label": "Diagnostics",
+    "label": texts.DIAGNOSTICS.table,
     "topic": "/diagnostics",
     "type": "diagnostic_msgs/msg/DiagnosticArray",
     "field": "status",
     "key": "name",
     "rows_shown": 3,
     "column": [
-        {"label": "Level", "field": "level", "states": list(LEVELS)},
-        {"label": "Part", "field": "name"},
-        {"label": "What", "field": "message", "width": 2},
+        {"label": texts.LEVEL.table, "field": "level", "states": STATES},
+        {"label": texts.PART.table, "field": "name"},
+        {"label": texts.WHAT.table, "field": "message", "width": 2},
     ],
 }
 
 
-def _row(level: int, name: str, message: str, age: str = "") -> Table:
-    state = LEVELS[level]
-    first = {"text": state["text"], "shape": state["shape"], "colour": state.get("colour", "grey")}
+def _row(level: int, name: str, message: str, age: TextLike = "") -> Table:
+    text, shape, colour = LEVELS[level]
+    first = {"text": text.shown, "shape": shape, "colour": colour}
     others = ({"text": text, "shape": "", "colour": ""} for text in (name, message))
     return {"age": age, "cells": [first, *others]}
 
@@ -151,13 +164,18 @@ def _row(level: int, name: str, message: str, age: str = "") -> Table:
 ROWS: Final = [
     _row(2, "gripper", "vacuum is lost"),
     _row(1, "drive: axis 2", "temperature is high, and this text is longer than its column"),
-    _row(0, "safety controller", "ok", "2 min old"),
+    _row(0, "safety controller", "ok", OLD),
 ]
-FILLED: Final[Table] = {"state": "live", "note": "", "said": "and 12 more", "table_rows": ROWS}
+FILLED: Final[Table] = {
+    "state": "live",
+    "note": "",
+    "said": say("table_more", number=12),
+    "table_rows": ROWS,
+}
 TABLES: Final = (
     Example("filled", "table", TABLE, FILLED),
     Example("one entry", "table", TABLE, FILLED | {"said": "", "table_rows": ROWS[:1]}),
-    Example("empty", "table", TABLE, FILLED | {"said": "No entries", "table_rows": []}),
+    Example("empty", "table", TABLE, FILLED | {"said": say("table_empty"), "table_rows": []}),
     *(
         Example(
             state,

@@ -3,33 +3,48 @@
 import math
 from typing import Final
 
+from app.i18n import number, say
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.trend import Trend
 from app.robot.history import Column
 from app.view.trend_plot import COLUMNS, Plot, draw
-from app.web.gallery.examples import Example, Table
+from app.web.gallery import texts
+from app.web.gallery.examples import OLD, Example, Table
 
 PENS: Final[Table] = {
-    "label": "Air pressure, bar",
+    "label": texts.PRESSURE.table,
     "windows": ["1m", "10m", "1h"],
     "pen": [
-        {"topic": "/inlet", "type": "std_msgs/msg/Float64", "label": "Inlet", "normal": [5.0, 6.5]}
+        {
+            "topic": "/inlet",
+            "type": "std_msgs/msg/Float64",
+            "label": texts.INLET.table,
+            "normal": [5.0, 6.5],
+        }
         | {"low": 5.0, "high": 6.5},
-        {"topic": "/gripper", "type": "std_msgs/msg/Float64", "label": "Gripper"},
+        {"topic": "/gripper", "type": "std_msgs/msg/Float64", "label": texts.GRIPPER.table},
     ],
 }
 PEN_VALUES: Final[Table] = {"note": "", "fault": "", "state0": "live", "state1": "live"}
-DRAWN: Final[Table] = PEN_VALUES | {"state": "live", "text0": "5.9", "text1": "5.6"}
+DRAWN: Final[Table] = PEN_VALUES | {"state": "live", "text0": number("5.9"), "text1": number("5.6")}
 TRENDS: Final = (
     Example("live", "trend", PENS, DRAWN),
     Example(
-        "below its limit", "trend", PENS | {"keys": False}, DRAWN | {"state0": "low", "text0": "4.9"}
+        "below its limit",
+        "trend",
+        PENS | {"keys": False},
+        DRAWN | {"state0": "low", "text0": number("4.9")},
     ),
     Example(
         "one is old",
         "trend",
         PENS | {"keys": False},
-        DRAWN | {"state": "old", "state1": "old", "note": "Gripper: 2 min old"},
+        DRAWN
+        | {
+            "state": "old",
+            "state1": "old",
+            "note": say("trend_pen", label=texts.GRIPPER.shown, note=OLD),
+        },
     ),
     Example(
         "waiting",
@@ -37,22 +52,26 @@ TRENDS: Final = (
         PENS | {"keys": False},
         PEN_VALUES
         | {"state": "waiting", "state0": "waiting", "state1": "waiting", "text0": "—", "text1": "—"}
-        | {"note": "Inlet: waiting for /inlet"},
+        | {
+            "note": say(
+                "trend_pen", label=texts.INLET.shown, note=say("readout_waiting", topic="/inlet")
+            )
+        },
     ),
     Example(
         "not kept",
         "trend",
         PENS | {"keys": False},
-        DRAWN | {"fault": "Not kept on disk: no space left on device"},
+        DRAWN | {"fault": say("trend_not_kept", why="no space left on device")},
     ),
     Example(
         "eight pens",
         "trend",
-        {"label": "Temperatures", "keys": False, "max_age_s": 60}
-        | {"pen": [PENS["pen"][1] | {"label": f"Zone {number}"} for number in range(1, 9)]},
+        {"label": texts.TEMPERATURES.table, "keys": False, "max_age_s": 60}
+        | {"pen": [PENS["pen"][1] | {"label": texts.zone(of).table} for of in range(1, 9)]},
         {"state": "live", "note": "", "fault": ""}
-        | {f"text{number}": f"{5.6 - number / 5:.1f}" for number in range(8)}
-        | {f"state{number}": "live" for number in range(8)},
+        | {f"text{pen}": number(f"{5.6 - pen / 5:.1f}") for pen in range(8)}
+        | {f"state{pen}": "live" for pen in range(8)},
     ),
 )
 
