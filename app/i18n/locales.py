@@ -29,7 +29,9 @@ class Symbols(NamedTuple):
     date: str
 
 
-PLAIN: Final = Symbols({}, ".", ":", ISO_DATE)
+# The minus sign of every language: a hyphen is too short to be seen from afar, and not read aloud.
+MINUS: Final = "\N{MINUS SIGN}"
+PLAIN: Final = Symbols({ord("-"): MINUS}, ".", ":", ISO_DATE)
 
 
 @cache
@@ -51,7 +53,7 @@ def symbols(language: str) -> Symbols:
     if locale is None:
         return PLAIN
     signs = locale.number_symbols.get(DIGITS) or locale.number_symbols
-    own = {".": signs["decimal"], ",": signs["group"], "-": signs["minusSign"]}
+    own = {".": signs["decimal"], ",": signs["group"], "-": MINUS}
     numbers = {ord(plain): sign for plain, sign in own.items() if plain != sign}
     time = "." if "H.mm" in locale.time_formats["medium"].pattern else ":"
     day = locale.date_formats["short"].pattern
@@ -60,14 +62,14 @@ def symbols(language: str) -> Symbols:
 
 def number_in(text: str, language: str) -> str:
     """A number as Python writes it ("-1,234.5", "1e-07"), as this language does."""
-    numbers = symbols(language).numbers
-    return text.translate(numbers) if numbers else text
+    return text.translate(symbols(language).numbers)
 
 
 def number_from(text: str, language: str) -> str:
-    """What was typed as a number in this language, as Python reads it: with a decimal point. A text
-    with both signs, or with several, stays as it is: one of them may separate thousands."""
-    decimal = symbols(language).decimal
+    """What was typed as a number in this language, as Python reads it: with a decimal point, and a
+    hyphen for a minus sign. A text with both decimal signs, or with several, keeps them: one of them
+    may separate thousands."""
+    decimal, text = symbols(language).decimal, text.replace(MINUS, "-")
     if decimal == "." or "." in text or text.count(decimal) != 1:
         return text
     return text.replace(decimal, ".")

@@ -94,6 +94,42 @@ def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, themed: Page, t
         assert violations(themed) == [], (path, language)
 
 
+# Parts of a key's face that reach out of the key, and labels that the sign of a longer text lies on.
+CROWDED: Final = """() => [...document.querySelectorAll(".gallery .key .face")].flatMap((face) => {
+  const key = face.closest(".key").getBoundingClientRect();
+  const beyond = [...face.children].filter((part) => !part.matches(".more") && part.checkVisibility())
+    .filter((part) => {
+      const { top, bottom, height } = part.getBoundingClientRect();
+      return height && (top < key.top - 0.5 || bottom > key.bottom + 0.5);
+    });
+  const sign = face.querySelector(".more:not([hidden]) path, .more:not([hidden]) .icon");
+  const text = document.createRange();
+  text.selectNodeContents(face.querySelector(".label"));
+  const of = sign?.getBoundingClientRect();
+  const dots = of && { left: of.left, right: of.right, middle: (of.top + of.bottom) / 2 };
+  const covered = dots && [...text.getClientRects()].filter(
+    ({ left, right, top }) => left < dots.right && right > dots.left && top < dots.middle);
+  return [...beyond, ...(covered?.length ? [sign] : [])].map((part) =>
+    `${face.closest(".example").innerText}: ${part.outerHTML.slice(0, 60)}`);
+})"""
+
+
+def test_nothing_is_crowded_in_the_gallery(shipped: Server, chromium: Browser) -> None:
+    """Each kind in each state, with the sentences of each language at each size."""
+    with chromium.new_context() as context:
+        page = context.new_page()
+        for language in sorted(files_of_languages()):
+            context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
+            for width, height in ((1280, 800), (1024, 600), (800, 480)):
+                page.set_viewport_size({"width": width, "height": height})
+                page.goto(f"{shipped.url}/gallery")
+                expect(page.locator(".key .more:visible").first).to_be_visible()
+                assert page.evaluate(CROWDED) == [], (language, width)
+                assert page.evaluate("document.documentElement.scrollWidth") == width
+        old = page.locator('[data-kind="readout"][data-state="old"] .number > span')
+        expect(old).to_have_css("text-decoration-line", "underline")
+
+
 def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, themed: Page) -> None:
     themed.goto(plan.url)
     assert violations(themed) == []
@@ -198,6 +234,7 @@ SHIFTS: Final = """new PerformanceObserver((list) => {
 }).observe({ type: "layout-shift", buffered: true });"""
 
 
+SLOWEST_MS: Final = 90_000  # of a page that comes slowly, to a busy machine
 SLOW: Final = {"offline": False, "latency": 0, "downloadThroughput": 30_000, "uploadThroughput": 30_000}
 
 
@@ -208,6 +245,7 @@ def test_nothing_moves_after_the_page_is_there(example: Server, chromium: Browse
     width, height = size
     context = chromium.new_context(viewport={"width": width, "height": height})
     context.add_init_script(SHIFTS)
+    context.set_default_navigation_timeout(SLOWEST_MS)
     page = context.new_page()
     network = context.new_cdp_session(page)
     network.send("Network.enable")

@@ -193,7 +193,7 @@ def test_a_number_out_of_limits_is_refused_but_locks_nothing_else(
     assert marked is (entry != "")
     press(page, "Drive")
     receipt = page.locator("#receipt-drive")
-    expect(receipt).to_contain_text(f": {said}: it must be -90 to 90 °/s, in steps of 5.")
+    expect(receipt).to_contain_text(f": {said}: it must be −90 to 90 °/s, in steps of 5.")
     press(page, "Choose")
     assert heard(robot, "/test_mode", before) == [{"data": 1}]
 

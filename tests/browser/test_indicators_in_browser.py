@@ -196,7 +196,7 @@ def test_joints_are_found_by_name_in_messages_of_any_order(
     values = joints.locator("li .now")
     for names, positions, texts in (
         (["joint_1", "joint_2", "lift"], [math.pi / 4, 0.0, 0.25], ["+45.0", "+0.0", "+250.0"]),
-        (["lift", "joint_2", "joint_1"], [0.5, math.pi, -math.pi], ["-180.0", "+180.0", "+500.0"]),
+        (["lift", "joint_2", "joint_1"], [0.5, math.pi, -math.pi], ["−180.0", "+180.0", "+500.0"]),
         (["lift"], [0.75], ["missing", "missing", "+750.0"]),
     ):
         node.publish("/joint_states", {"name": names, "position": positions})

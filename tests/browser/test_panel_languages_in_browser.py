@@ -28,10 +28,10 @@ def test_a_browser_changes_its_language_and_no_other_ones(
     other = chromium.new_page()
     for one in (page, other):
         one.goto(kiosk.url)
-        expect(one.locator('[data-widget="speed"] .value')).to_have_text("-1,234.5 mm/s")
+        expect(one.locator('[data-widget="speed"] .value')).to_have_text("−1,234.5 mm/s")
     choose(page, "Deutsch")
     expect(page.locator("html")).to_have_attribute("lang", "de")
-    expect(page.locator('[data-widget="speed"] .value')).to_have_text("-1.234,5 mm/s")
+    expect(page.locator('[data-widget="speed"] .value')).to_have_text("−1.234,5 mm/s")
     expect(page.locator('[data-widget="locked"] .why')).to_contain_text("erlaubt die Tür nicht")
     page.locator('[data-widget="set_limit"] button[type=submit]').click()
     expect(page.locator("#receipt-set_limit")).to_contain_text("Gesendet auf /limit um")

@@ -25,12 +25,12 @@ def _catalogues(tmp_path: Path) -> Iterator[None]:
 @pytest.mark.parametrize(
     ("text", "language", "shown"),
     [
-        ("-1,234.5", "en", "-1,234.5"),
-        ("-1,234.5", "ja", "-1,234.5"),
-        ("-1,234.5", "de", "-1.234,5"),
-        ("-1,234.5", "fr", "-1\u202f234,5"),
+        ("-1,234.5", "en", "−1,234.5"),
+        ("-1,234.5", "ja", "−1,234.5"),
+        ("-1,234.5", "de", "−1.234,5"),
+        ("-1,234.5", "fr", "−1\u202f234,5"),
         ("-0.5", "fi", "\u22120,5"),
-        ("1e-07", "de", "1e-07"),
+        ("1e-07", "de", "1e−07"),
         ("NaN", "de", "NaN"),
         ("0.5", "qps", "0.5"),
     ],
@@ -78,6 +78,7 @@ def test_the_clock_gives_values_that_are_rendered_later() -> None:
         ("1,5,5", "de", "1,5,5"),
         ("1,500", "en", "1,500"),
         ("1,5", "ja", "1,5"),
+        ("−1.5", "en", "-1.5"),
     ],
 )
 def test_a_typed_number_may_have_the_sign_of_its_language(typed: str, language: str, read: str) -> None:

@@ -68,7 +68,7 @@ def said(robot: RobotState, interlock: Interlock, fields: Table) -> str | None:
         ("Float64", "max = 0.5", 0.5, 0.75, "is 0.75: it must be 0.5 or less."),
         ("Float64", "min = 1\nmax = 2", 1.5, 2.5, "is 2.5: it must be 1 to 2."),
         ("Float64", "min = 5", 6.0, 4.99999999, "is 4.99999999: it must be 5 or more."),
-        ("Float64", "min = 5", math.inf, -math.inf, "is -Infinity: it must be 5 or more."),
+        ("Float64", "min = 5", math.inf, -math.inf, "is −Infinity: it must be 5 or more."),
         ("Float64", "min = 5", 5.0, math.nan, "is NaN: it must be 5 or more."),
         ("Float64", "not_equals = 0", 1.0, math.nan, "is NaN: it must be not 0."),
         ("Float64", "not_equals = 0", math.inf, 0.0, "is 0: it must be not 0."),

@@ -76,18 +76,18 @@ def test_a_value_is_taken_with_the_type_of_its_input(
     assert exactly(one(table).check_value(given), value)
 
 
-SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
+SPEED_LIMITS = "−0.5 to 1.5 m/s, in steps of 0.1"
 
 
 @pytest.mark.parametrize(
     ("table", "given", "sentence"),
     [
         (SPEED, 1.6, f"Speed is 1.6: it must be {SPEED_LIMITS}"),
-        (SPEED, -0.6, f"Speed is -0.6: it must be {SPEED_LIMITS}"),
+        (SPEED, -0.6, f"Speed is −0.6: it must be {SPEED_LIMITS}"),
         (SPEED, 0.25, f"Speed is 0.25: it must be {SPEED_LIMITS}"),
         (SPEED, math.nan, f"Speed is nan: it must be {SPEED_LIMITS}"),
         (SPEED, math.inf, f"Speed is inf: it must be {SPEED_LIMITS}"),
-        (SPEED, -math.inf, f"Speed is -inf: it must be {SPEED_LIMITS}"),
+        (SPEED, -math.inf, f"Speed is −inf: it must be {SPEED_LIMITS}"),
         (SPEED, 10**400, "Speed is 1000"),
         (SPEED, 1e308, f"Speed is 1e+308: it must be {SPEED_LIMITS}"),
         (SPEED, "", f"Speed has no number: it must be {SPEED_LIMITS}"),
@@ -96,9 +96,9 @@ SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
         (SPEED, "1", "Speed must be a number"),
         (SPEED, True, f"Speed must be a number, {SPEED_LIMITS}, not true"),
         (SPEED, [1], "Speed must be a number"),
-        (FREE, 1.0001, "Free is 1.0001: it must be -1 to 1 rad"),
-        (FREE, math.nan, "Free is nan: it must be -1 to 1 rad"),
-        (FREE, "", "Free has no number: it must be -1 to 1 rad"),
+        (FREE, 1.0001, "Free is 1.0001: it must be −1 to 1 rad"),
+        (FREE, math.nan, "Free is nan: it must be −1 to 1 rad"),
+        (FREE, "", "Free has no number: it must be −1 to 1 rad"),
         (COUNT, 1.5, "Count is 1.5: it must be 1 to 99, in steps of 1"),
         (COUNT, 100, "Count is 100: it must be 1 to 99, in steps of 1"),
         (MODE, 1, "Mode must be one of Zero, True, Float, Slow, Table, Large, not 1"),
@@ -154,7 +154,7 @@ def test_digits_that_end_in_a_mistake_take_no_time(text: str) -> None:
 
 
 def test_limits_read_as_an_operator_says_them() -> None:
-    for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "-1 to 1 rad")):
+    for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "−1 to 1 rad")):
         widget: Any = one(table)
         assert english(widget.limits_text) == text
 

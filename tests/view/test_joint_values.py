@@ -50,11 +50,11 @@ def test_a_joint_is_found_by_its_name_wherever_it_stands(order: tuple[str, ...])
     [
         (84.9, "normal", ""),
         (85.1, "near", "J1 near its soft limit 90"),
-        (-86.0, "near", "J1 near its soft limit -90"),
+        (-86.0, "near", "J1 near its soft limit −90"),
         (90.1, "high", "J1 above its soft limit 90"),
-        (-91.0, "low", "J1 below its soft limit -90"),
+        (-91.0, "low", "J1 below its soft limit −90"),
         (181.0, "high_high", "J1 beyond its range, which ends at 180"),
-        (-181.0, "low_low", "J1 beyond its range, which begins at -180"),
+        (-181.0, "low_low", "J1 beyond its range, which begins at −180"),
     ],
 )
 def test_a_limit_that_a_joint_is_beyond_is_named(degrees: float, level: str, said: str) -> None:

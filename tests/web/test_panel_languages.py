@@ -18,7 +18,7 @@ LABELS = {"en": "Speed", "ja": "速度", "de": "Geschwindigkeit"}
 def kiosk() -> Iterator[Server]:
     mine = Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))
     until(mine.ready, "ready")
-    until(lambda: text_of(mine, "speed", "en") == "-1,234.5 mm/s", "a value is shown")
+    until(lambda: text_of(mine, "speed", "en") == "−1,234.5 mm/s", "a value is shown")
     until(lambda: widget(mine, "set_limit", "en")["enabled"], "a press is permitted")
     yield mine
     mine.end()
@@ -64,15 +64,15 @@ def test_a_page_has_the_texts_of_its_readers_language(kiosk: Server, language: s
 
 def test_values_units_and_states_are_in_the_language_of_their_reader(kiosk: Server) -> None:
     read = {language: text_of(kiosk, "speed", language) for language in LABELS}
-    assert read == {"en": "-1,234.5 mm/s", "ja": "-1,234.5 mm/s", "de": "-1.234,5 mm/s"}
+    assert read == {"en": "−1,234.5 mm/s", "ja": "−1,234.5 mm/s", "de": "−1.234,5 mm/s"}
     read = {language: text_of(kiosk, "count", language) for language in LABELS}
-    assert read == {"en": "-1234 pcs", "ja": "-1234 個", "de": "-1234 Stück"}
+    assert read == {"en": "−1234 pcs", "ja": "−1234 個", "de": "−1234 Stück"}
     read = {language: text_of(kiosk, "door_lamp", language) for language in LABELS}
     assert read == {"en": "Open", "ja": "開", "de": "Offen"}
     read = {language: widget(kiosk, "limit", language)["limits"] for language in LABELS}
     assert read == {"en": "0 to 2.5 m/s", "ja": "0～2.5 m/s", "de": "0 bis 2,5 m/s"}
     html = kiosk.http.get("/", headers=read_by("de")).text
-    assert "<b>-1234</b><small> Stück</small>" in html
+    assert "<b>−1234</b><small> Stück</small>" in html
     assert 'data-decimal=","' in html
 
 
