@@ -130,6 +130,21 @@ def test_nothing_is_crowded_in_the_gallery(shipped: Server, chromium: Browser) -
         expect(old).to_have_css("text-decoration-line", "underline")
 
 
+def test_the_shipped_pages_are_level(shipped: Server, page: Page) -> None:
+    """A scale ends where the keys of its row do, and a trend's keys are one row."""
+    for width, height in ((1280, 800), (1024, 600), (800, 480)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(f"{shipped.url}/pages/robot")
+        gauge, step = (place(page.locator(f"[data-kind={kind}]")) for kind in ("gauge", "step"))
+        ends = [box["y"] + box["height"] for box in (gauge, step)]
+        assert ends[0] == pytest.approx(ends[1], abs=1), width
+        page.goto(f"{shipped.url}/pages/watch")
+        expect(page.locator(".trend-keys")).to_be_visible()
+        keys = [place(key) for key in page.locator(".trend-keys > button:visible").all()]
+        assert len({box["y"] for box in keys}) == 1, width
+        assert min(box["width"] for box in keys) >= 14 / MM_PER_PX - 0.5
+
+
 def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, themed: Page) -> None:
     themed.goto(plan.url)
     assert violations(themed) == []
