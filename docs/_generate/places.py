@@ -23,16 +23,17 @@ SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
 METHODS: Final = ("get", "post", "head", "put", "delete", "websocket")
 CATALOGUE: Final = Path(inspect.getfile(i18n)).parent
+GALLERY: Final = PROJECT / "app/web/gallery"
 
 
 @cache
 def modules() -> dict[Path, ast.Module]:
-    """Every module of `app/` but the catalogue of sentences."""
+    """Every module of `app/` but the catalogue of sentences, and the gallery, which shows examples."""
     found = sorted((PROJECT / "app").rglob("*.py"))
     return {
         path: ast.parse(path.read_text(encoding="utf-8"))
         for path in found
-        if CATALOGUE not in path.parents
+        if not {CATALOGUE, GALLERY} & {*path.parents}
     }
 
 
