@@ -46,7 +46,7 @@ function step(input, times) {
 function equip(input) {
   const root = input.closest("[data-widget]");
   const output = root.querySelector("output");
-  const show = () => output && (output.value = input.value.replace(".", decimal));
+  const show = () => output && (output.value = input.value.replace("-", "−").replace(".", decimal));
   if (output) {
     input.type = "range";
     setWidth(output, input);

@@ -120,7 +120,7 @@ def test_a_slider_without_a_step_goes_in_fine_ones(cell: Server, robot: RosNode,
     expect(speed).to_have_attribute("type", "range")
     expect(speed).to_have_attribute("step", "any")
     expect(output).to_have_text("0.333")  # what no one touched stays as it is
-    expect(page.locator("#limits-speed")).to_have_text("-1 to 1")
+    expect(page.locator("#limits-speed")).to_have_text("−1 to 1")
     page.get_by_label("Speed: more").click()
     expect(output).to_have_text("0.36")
     page.get_by_label("Speed: less").click()
@@ -133,14 +133,14 @@ def test_a_slider_without_a_step_goes_in_fine_ones(cell: Server, robot: RosNode,
         page.mouse.move(box["x"] + box["width"] * at, middle)
         value = float(speed.input_value())
         assert round(value / 0.02, 6).is_integer(), value
-        expect(output).to_have_text(speed.input_value())
+        expect(output).to_have_text(speed.input_value().replace("-", "−"))
     page.mouse.move(box["x"] + box["width"] + 50, middle)
     page.mouse.up()
     expect(output).to_have_text("1")
     speed.press("ArrowLeft")
     expect(output).to_have_text("0.98")
     speed.press("Home")
-    expect(output).to_have_text("-1")
+    expect(output).to_have_text("−1")
     assert speed.bounding_box() == box  # its value is wider and narrower, and moves nothing
 
 

@@ -502,7 +502,7 @@ def test_a_number_out_of_its_limits_is_refused_with_them(given: Any) -> None:
     cause, reason = refused(bench, bench.press(inputs={"speed": given}))
     assert cause == "input"
     assert reason.startswith("Not sent: Speed ")
-    assert "-1 to 1 m/s, in steps of 0.5" in reason
+    assert "−1 to 1 m/s, in steps of 0.5" in reason
 
 
 def test_a_forms_texts_are_typed_by_their_inputs() -> None:
