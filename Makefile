@@ -22,7 +22,7 @@ export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 .PHONY: run test check dev docs wheel release faults screenshots soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
-run: .venv/run
+run: .venv/run .venv/bin/operator-panel
 	.venv/bin/python -m app.cli run
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
@@ -79,8 +79,8 @@ screenshots: system .venv/test
 soak: test-parts
 	.venv/bin/python -m tests.faults.soak
 
-wheel: .venv/test
-	.venv/bin/python -m build --wheel --no-isolation --outdir dist
+wheel: .venv/build .venv/bin/operator-panel
+	.venv/bin/python -m hatchling build --target wheel --directory dist
 
 # Of a tag: `make release TAG=v0.2.0` also checks that version and changelog are those of the tag.
 release: docs .venv-release/ready
@@ -108,6 +108,16 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@
 
+.venv/build: deploy/build.lock | .venv/bin/python
+	.venv/bin/python $(PIP_INSTALL) $<
+	touch $@
+
+# The command of this checkout, wherever it is called from. -P: not of an `app` in the current folder.
+.venv/bin/operator-panel: Makefile | .venv/bin/python
+	@printf '%s\n' '#!/bin/sh' 'here=$$(dirname "$$(readlink -f "$$0")")' \
+		'PYTHONPATH="$$here/../.." exec "$$here/python" -P -m app.cli "$$@"' >$@
+	@chmod +x $@
+
 .venv-docs/ready: docs/requirements.lock
 	@$(NEW_ENOUGH)
 	$(PYTHON) -m venv --clear .venv-docs
@@ -122,7 +132,7 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 
 .venv/test: tests/requirements.lock | .venv/bin/python
 	.venv/bin/python $(PIP_INSTALL) $<
-	touch $@ .venv/run
+	touch $@ .venv/run .venv/build
 
 FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
 

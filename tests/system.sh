@@ -68,10 +68,11 @@ if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     { apt-get update -qq &&
         DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing; } >"$said" 2>&1 || {
         cat "$said" >&2
-        echo "apt-get could not install$missing: install them, then run this again" >&2
+        echo "apt-get could not install$missing: install that, then run this again" >&2
         exit 1
     }
 else
-    echo "missing:$missing (Debian's names): install them, then run this again" >&2
+    echo "missing, by Debian's names:$missing. Install that, then run this again:" >&2
+    echo "sudo apt-get install --no-install-recommends$missing" >&2
     exit 1
 fi

@@ -44,11 +44,14 @@ def test_what_can_not_be_installed_is_said_with_the_reason(tmp_path: Path, step:
     assert done.returncode == 1
     assert done.stderr.splitlines() == [
         "E: no network",
-        "apt-get could not install python3-venv: install them, then run this again",
+        "apt-get could not install python3-venv: install that, then run this again",
     ]
 
 
 def test_without_the_right_to_install_it_names_what_is_missing(tmp_path: Path) -> None:
     done = installed(tmp_path, "exit 9", user=1000)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("missing: python3-venv (Debian's names): install them")
+    assert done.stderr.splitlines() == [
+        "missing, by Debian's names: python3-venv. Install that, then run this again:",
+        "sudo apt-get install --no-install-recommends python3-venv",
+    ]

@@ -13,7 +13,7 @@ from app.cli.parser import USAGE_ERROR, Parser
 from app.errors import SettingsError
 from app.install.assets import checked_wheel
 from app.install.host import Host
-from app.install.plan import Options, steps
+from app.install.plan import SCREEN, SERVER, Options, steps
 from app.install.step import apply, describe
 
 PROG = "python -m app.cli install"
@@ -51,6 +51,9 @@ def _install(given: Namespace) -> int:
     if not confirmed(given):
         return USAGE_ERROR
     print("installed" if apply(plan, host, print_progress) else "everything was done before")
+    if host.runs_systemd:
+        units = [SERVER, SCREEN] if options.screen else [SERVER]
+        print(f"see whether it runs: systemctl status {' '.join(units)}")
     return 0
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from app.diagnose.findings import Report
-from app.diagnose.fonts import HasFont, check_fonts, has_font
+from app.diagnose.fonts import HasBrowser, HasFont, check_fonts, has_browser, has_font
 from app.diagnose.machine import FreeBytes, check_data, check_port, free_bytes
 from app.diagnose.names import PanelRobot
 from app.diagnose.robot import LISTEN_S, check_robot, check_way
@@ -28,6 +28,7 @@ class Machine:
     """What is asked of this machine; tests give another one."""
 
     has_font: HasFont = has_font
+    has_browser: HasBrowser = has_browser
     screens: Path = DRM
     free_bytes: FreeBytes = free_bytes
 
@@ -60,7 +61,8 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
     served = check_port(report, options.host, options.port)
     machine = options.machine
     check_data(report, settings.data_folder(mode), panel, served, machine.free_bytes)
-    check_fonts(report, panel.readers_languages if panel else (ENGLISH,), machine.has_font)
+    languages = panel.readers_languages if panel else (ENGLISH,)
+    check_fonts(report, languages, machine.has_font, machine.has_browser)
     if panel is not None:
         check_screens(report, panel, machine.screens)
     if mode == "demo":

@@ -1,4 +1,7 @@
-"""Which of a panel's languages this machine has fonts for, by fontconfig, which browsers ask too."""
+"""Which of a panel's languages this machine has fonts for, by fontconfig, which browsers ask too.
+
+Without a browser it needs none: the panel is shown elsewhere, or `operator-panel install` brings both.
+"""
 
 import shutil
 import subprocess
@@ -21,9 +24,15 @@ PACKAGES: Final[Mapping[str, str]] = {
     "ko": "fonts-noto-cjk",
 }
 LATIN: Final = "fonts-dejavu-core"
+BROWSERS: Final = ("chromium", "google-chrome", "google-chrome-stable", "firefox", "firefox-esr")
 CJK_NAMES: Final = ("cjk", "ipag", "ipaex", "takao", "vlgothic", "wqy", "nanum", "sourcehan")
 
 HasFont = Callable[[str], bool]
+HasBrowser = Callable[[], bool]
+
+
+def has_browser() -> bool:
+    return any(map(shutil.which, BROWSERS))
 
 
 def has_font(language: str) -> bool:
@@ -47,7 +56,15 @@ def _font_files(folder: Path) -> list[Path]:
     return [file for file in folder.rglob("*") if file.suffix.lower() in (".ttf", ".otf", ".ttc")]
 
 
-def check_fonts(report: Report, languages: tuple[str, ...], has: HasFont = has_font) -> None:
+def check_fonts(
+    report: Report,
+    languages: tuple[str, ...],
+    has: HasFont = has_font,
+    browser: HasBrowser = has_browser,
+) -> None:
+    if not browser():
+        report.fact("no browser is installed here: no fonts are needed")
+        return
     missing = [tag for tag in languages if not has(tag.partition("-")[0])]
     for tag in missing:
         package = PACKAGES.get(tag.partition("-")[0], LATIN)

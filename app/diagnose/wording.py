@@ -61,7 +61,8 @@ ERRORS: Final[Rows] = {
     ),
     "no_router": (
         "Nothing listens at {about}: the connection is refused.",
-        "Start the bridge; compare `listen` in its file with `connect` in the Zenoh configuration.",
+        "Start the bridge; compare `listen` in its file with `connect` in the Zenoh configuration. As "
+        "shipped, the bridge listens for its own machine only.",
     ),
     "no_route": (
         "No response from {about}: {detail}.",

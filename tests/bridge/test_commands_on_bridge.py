@@ -162,8 +162,20 @@ def test_what_is_not_there_is_a_sentence(
     assert sentence in done.stderr
 
 
-def test_no_router_is_a_sentence_that_says_what_to_do() -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+@pytest.mark.parametrize(
+    ("host", "more"),
+    [
+        ("127.0.0.1", ""),
+        # An address of this machine too, but not one that says so.
+        (
+            "127.0.0.2",
+            ". As shipped, the bridge accepts connections from its own machine only: put this address"
+            " into `listen` of its file",
+        ),
+    ],
+)
+def test_no_router_is_a_sentence_that_says_what_to_do(host: str, more: str) -> None:
+    endpoint = f"tcp/{host}:{free_port()}"
     done = subprocess.run(
         [*COMMAND, "topics", "--connect", endpoint, "--wait", "0.3"],
         cwd=ROOT,
@@ -175,7 +187,7 @@ def test_no_router_is_a_sentence_that_says_what_to_do() -> None:
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
         f"no Zenoh router or bridge answers at {endpoint} within 0.3 s: start zenoh-bridge-ros2dds on"
-        " the robot, or name its place with --connect tcp/HOST:7447\n"
+        f" the robot, or name its place with --connect tcp/HOST:7447{more}\n"
     )
 
 

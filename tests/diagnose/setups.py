@@ -75,7 +75,11 @@ class Setup:
         self.screens.mkdir()
         self.data = folder / "data"
         self.port = free_port()
-        self.machine: dict[str, Any] = {"has_font": lambda language: True, "screens": self.screens}
+        self.machine: dict[str, Any] = {
+            "has_font": lambda language: True,
+            "has_browser": lambda: True,
+            "screens": self.screens,
+        }
 
     def diagnose(self, text: str, endpoint: str, listen_s: float = LONGEST_S) -> Diagnosis:
         self.panel.write_text(text)

@@ -130,9 +130,22 @@ def test_japanese_needs_its_fonts(
 ) -> None:
     monkeypatch.setenv("FONTCONFIG_FILE", str(fonts_file(fonts, tmp_path)))
     report = Report()
-    check_fonts(report, ("en", "ja"), has_font)
+    check_fonts(report, ("en", "ja"), has_font, lambda: True)
     assert named(report.findings) == [("fonts_missing", tag) for tag in missing]
     assert all("fonts-noto-cjk" in one.do for one in report.findings)
+
+
+def test_a_machine_without_a_browser_needs_no_fonts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    report = Report()
+    check_fonts(report, ("en", "ja"), lambda language: False)
+    assert report.is_well
+    assert report.facts == ["no browser is installed here: no fonts are needed"]
+    (tmp_path / "chromium").touch(mode=0o755)
+    check_fonts(report, ("en", "ja"), lambda language: False)
+    assert named(report.findings) == [("fonts_missing", "en"), ("fonts_missing", "ja")]
 
 
 def test_without_fontconfig_the_files_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from app.cli.install import main as install
 from app.errors import SettingsError
 from app.install.assets import Assets, checked_wheel
 from app.install.files import Masked, OwnFile, UsersFile
@@ -330,6 +331,22 @@ def test_a_command_of_the_machine_does_not_read_this_programs_modules(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", "/elsewhere")
     assert Host().run(["sh", "-c", 'printf %s "$PYTHONPATH"']) == ""
+
+
+@pytest.mark.parametrize(("options", "units"), [([], [SERVER, SCREEN]), (["--no-screen"], [SERVER])])
+def test_the_end_says_how_to_see_whether_it_runs(
+    options: list[str],
+    units: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(Host, "runs_systemd", True)
+    monkeypatch.setattr("app.cli.install.steps", lambda *_: [])
+    assert install([str(make_wheel(tmp_path)), "--yes", *options]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        f"see whether it runs: systemctl status {' '.join(units)}"
+    ]
 
 
 def test_the_command_runs_from_the_wheels_file_with_nothing_installed(

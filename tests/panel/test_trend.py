@@ -104,6 +104,8 @@ def test_the_check_says_what_a_trend_takes() -> None:
     panel = panel_of({**TREND, "pen": pens, "disk": True})
     notes = [note.message for note in find_notes(panel, INTERFACES) if ".widget" in note.place]
     assert notes == ["keeps 24h of 4 pens: 3.9 MB of memory, and as much on disk"]
+    one = find_notes(panel_of({**TREND, "pen": pens[:1]}), INTERFACES)
+    assert [note.message for note in one][-1:] == ["keeps 24h of 1 pen: 1.0 MB of memory"]
 
 
 def test_the_simulated_robot_has_each_pen() -> None:

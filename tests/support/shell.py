@@ -57,10 +57,13 @@ class Shell:
         for path in ROOT.iterdir():
             if path.name not in NOT_LINKED:
                 (self.checkout / path.name).symlink_to(path)
-        for path in Path(sys.prefix).iterdir():
-            if path.name in ("bin", "lib", "include", "pyvenv.cfg"):
-                (environment / path.name).symlink_to(path)
-        for done in ("run", "test"):
+        for name in ("lib", "include", "pyvenv.cfg"):
+            (environment / name).symlink_to(Path(sys.prefix) / name)
+        (environment / "bin").mkdir()  # `make run` adds a command to it
+        for path in Path(sys.prefix, "bin").iterdir():
+            if path.name != "operator-panel":
+                (environment / "bin" / path.name).symlink_to(path)
+        for done in ("run", "build", "test"):
             (environment / done).touch()
 
     def _command(self, command: str) -> list[str]:

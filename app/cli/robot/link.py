@@ -20,7 +20,7 @@ from app.graph.model import RobotGraph, RosGraph, Topic, near
 from app.interfaces import DISTROS
 from app.interfaces.names import NAMESPACE
 from app.panel import load_panel
-from app.settings import Settings
+from app.settings import LOOPBACK_HOSTS, Settings
 from app.transport.bridge_observer import CONNECT_S, BridgeObserver
 from app.transport.zenoh_config import config_from
 
@@ -28,6 +28,10 @@ GONE, USAGE = 1, 2
 DEFAULT_DISTRO: Final = "jazzy"
 BRIDGE_HINT: Final = (
     "start zenoh-bridge-ros2dds on the robot, or name its place with --connect tcp/HOST:7447"
+)
+ELSEWHERE_HINT: Final = (
+    ". As shipped, the bridge accepts connections from its own machine only: put this address into"
+    " `listen` of its file"
 )
 
 
@@ -112,6 +116,11 @@ def place_of(given: Any) -> Place:
     )
 
 
+def _is_elsewhere(endpoint: str) -> bool:
+    """Whether an endpoint, such as "tcp/robot1:7447", is on another machine."""
+    return endpoint.partition("/")[2].rpartition(":")[0] not in LOOPBACK_HOSTS
+
+
 @asynccontextmanager
 async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, RosGraph]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
@@ -120,7 +129,8 @@ async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, RosGraph]]
         try:
             await observer.connect(place.within_s)
         except LinkError as error:
-            raise LinkError(f"{error}: {BRIDGE_HINT}") from error
+            elsewhere = ELSEWHERE_HINT if any(map(_is_elsewhere, observer.endpoints)) else ""
+            raise LinkError(f"{error}: {BRIDGE_HINT}{elsewhere}") from error
         graph = await observer.graph()
         where = ", ".join(observer.endpoints)
         if not graph.bridges:

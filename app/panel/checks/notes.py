@@ -63,5 +63,6 @@ def _trend_notes(panel: Panel) -> Iterator[Note]:
             if isinstance(widget, Trend):
                 size = robots * len(widget.pens) * history_bytes(widget.keep_s) / 1e6
                 where = "memory, and as much on disk" if widget.disk else "memory"
-                what = f"keeps {widget.keep} of {len(widget.pens)} pens: {size:.1f} MB of {where}"
+                pens = f"{len(widget.pens)} pen{'s' * (len(widget.pens) > 1)}"
+                what = f"keeps {widget.keep} of {pens}: {size:.1f} MB of {where}"
                 yield Note(f"page[{p}].{place}", what)

@@ -1,0 +1,61 @@
+"""`operator-panel` of a checkout, as `make run` and `make wheel` set it up."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.support.parts import ROOT
+from tests.support.shell import Shell
+from tests.support.shown_commands import commands_for
+
+INSTALLS = "tests/test_checkout_command.py::test_the_command_of_a_checkout_installs_its_wheel"
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkout of its own after `make wheel`."""
+    shell = Shell(tmp_path_factory.mktemp("machine"))
+    done = shell.run("make wheel")
+    shell.close()
+    assert done.returncode == 0, done.stdout
+    return shell.checkout
+
+
+def run(command: str, folder: Path, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env={**os.environ, **env},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_it_runs_in_any_folder_with_any_modules_around(checkout: Path, tmp_path: Path) -> None:
+    for folder in ("here", "path"):
+        (tmp_path / folder / "app").mkdir(parents=True)
+        (tmp_path / folder / "app/__init__.py").write_text("raise SystemExit('another app')\n")
+    (tmp_path / "link").symlink_to(checkout / ".venv/bin/operator-panel")
+    for command in (checkout / ".venv/bin/operator-panel", tmp_path / "link"):
+        done = run(f"{command} --version", tmp_path / "here", PYTHONPATH=str(tmp_path / "path"))
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("operator-panel ")
+
+
+def test_the_command_of_a_checkout_installs_its_wheel(checkout: Path) -> None:
+    (checkout / "cell1.toml").write_text("")
+    (command,) = commands_for(INSTALLS)
+    done = run(f"{command} --any-system", checkout)
+    assert done.returncode == 0, done.stderr
+    assert "install operator_panel-" in done.stdout
+    assert "(zenoh.json5)" in done.stdout
+
+
+def test_a_wheel_is_built_with_the_locked_packages_of_a_build_alone(tmp_path: Path) -> None:
+    told = ["make", "--dry-run", "--assume-new=deploy/build.lock", "wheel"]
+    done = subprocess.run(told, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "--require-hashes -r deploy/build.lock" in done.stdout
+    assert "tests/requirements.lock" not in done.stdout
