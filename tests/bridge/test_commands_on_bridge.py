@@ -287,6 +287,38 @@ def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
     assert path.read_text() == text
 
 
+def test_a_scaffold_beside_a_bridge_that_starts_has_what_is_on_the_robot(
+    domain: int, tmp_path: Path
+) -> None:
+    bridge = Bridge(domain + 1)
+    node = RosNode(bridge.domain)
+    path = tmp_path / "cell.toml"
+    try:
+        node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local")
+        bridge.start()
+        said = output_of(bridge, "scaffold", "-o", str(path), "--listen", "0.1")
+        assert said.startswith(f"{path}: ")
+        assert 'topic = "/operation_enabled"' in path.read_text()
+        assert "holds it back" not in path.read_text()
+    finally:
+        node.end()
+        bridge.end()
+
+
+def test_a_scaffold_of_a_domain_without_nodes_says_so_and_writes_no_file(
+    domain: int, tmp_path: Path
+) -> None:
+    bridge = Bridge(domain + 1)
+    bridge.start()
+    path = tmp_path / "cell.toml"
+    try:
+        done = run(bridge, "scaffold", "-o", str(path))
+    finally:
+        bridge.end()
+    assert (done.returncode, done.stdout, path.exists()) == (1, "", False)
+    assert f"the bridge sees no topic in domain {bridge.domain}: start the robot's nodes" in done.stderr
+
+
 def client_tokens(bridge: Bridge) -> list[str]:
     made = cyclone.Client(bridge.endpoint)
     try:

@@ -12,9 +12,10 @@ from app.cli.arguments import seconds
 from app.cli.output import add_force, check_absent, draft_of
 from app.cli.parser import Parser
 from app.cli.robot.link import Place, add_options, check_namespace, ended, opened, place_of
+from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey
 from app.errors import KioskError, PanelError
-from app.graph.model import RosGraph
+from app.graph.model import RobotGraph, RosGraph
 from app.interfaces import load_interfaces
 from app.panel import check_panel
 from app.scaffold.draft import make_draft
@@ -44,9 +45,12 @@ async def _scaffold(given: Any) -> int:
     place = place_of(given)
     interfaces = load_interfaces(place.distro, place.interfaces)
     async with opened(place) as (observer, graph):
+        graph = await settled_graph(observer, graph)
         check_namespace(graph, place.namespace)
         robot, below = robot_at(graph, place.namespace)
         known = await survey(observer, robot, below, interfaces, given.listen)
+    if not any((known.topics, known.services, known.actions, known.parameters)):
+        raise ScaffoldError(_nothing_there(robot, f"{robot.namespace}{below}"))
     draft = make_draft(known, interfaces, _base(place, graph, f"{robot.namespace}{below}", target))
     if given.controls and not draft.interlocks:
         raise ScaffoldError(
@@ -60,6 +64,15 @@ async def _scaffold(given: Any) -> int:
     _write(target, text, given.force)
     print(*_summary(target, draft, given.controls), sep="\n", flush=True)
     return 0
+
+
+def _nothing_there(robot: RobotGraph, namespace: str) -> str:
+    where = f" below {namespace}" if namespace else ""
+    domains = ", ".join(sorted({str(bridge.domain) for bridge in robot.bridges}))
+    return (
+        f"the bridge sees no topic{where} in domain {domains}: start the robot's nodes, and set"
+        " `domain` in the bridge's file to their ROS_DOMAIN_ID"
+    )
 
 
 def _base(place: Place, graph: RosGraph, namespace: str, target: Path | None) -> Draft:

@@ -10,7 +10,7 @@ from tests.support.parts import ROOT
 from tests.support.shell import Shell
 from tests.support.shown_commands import commands_for
 
-INSTALLS = "tests/test_checkout_command.py::test_the_command_of_a_checkout_installs_its_wheel"
+INSTALLS = "tests/docs/test_checkout_command.py::test_the_command_of_a_checkout_installs_its_wheel"
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,72 @@
+"""A graph that is read once all of it is there."""
+
+import asyncio
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from app.cli.robot.settled_graph import settled_graph
+from app.graph.model import Bridge, EndpointQos, RobotGraph, RosGraph, Topic, TopicEndpoint
+
+LONG_S = 60.0
+
+
+class Reader:
+    """Gives one graph after the other, then the last one again and again."""
+
+    def __init__(self, graphs: Sequence[RosGraph]) -> None:
+        self._graphs = list(graphs)
+        self.read = 0
+
+    async def graph(self) -> RosGraph:
+        self.read += 1
+        return self._graphs.pop(0) if len(self._graphs) > 1 else self._graphs[0]
+
+
+def topic(name: str, announced: bool = True) -> Topic:
+    end = TopicEndpoint(type="std_msgs/msg/Bool", qos=EndpointQos(), bridge="b")
+    return Topic(name=name, key=name.strip("/"), publishers=(end,), announced=announced)
+
+
+def graph_of(*topics: Topic, **config: Any) -> RosGraph:
+    bridge = Bridge(zid="b", version="1.10.2", config=config)
+    return RosGraph(robots=(RobotGraph(bridges=(bridge,), topics=topics),))
+
+
+def settled(*graphs: RosGraph, within_s: float = LONG_S) -> tuple[RosGraph, int]:
+    """The graph, and how often it was read."""
+    reader = Reader(graphs[1:] or graphs)
+    found = asyncio.run(settled_graph(reader, graphs[0], within_s, every_s=0.001))
+    return found, reader.read
+
+
+WHOLE = graph_of(topic("/a"), topic("/b"))
+
+
+def test_a_graph_that_is_whole_is_read_once_more() -> None:
+    assert settled(WHOLE) == (WHOLE, 1)
+
+
+@pytest.mark.parametrize(
+    "early",
+    [
+        graph_of(),
+        graph_of(topic("/a")),
+        graph_of(topic("/a", announced=False), topic("/b", announced=False)),
+        graph_of(topic("/a"), topic("/b", announced=False)),
+    ],
+    ids=["no topic", "another topic comes", "none is passed on yet", "one is not passed on yet"],
+)
+def test_what_is_still_to_come_is_waited_for(early: RosGraph) -> None:
+    assert settled(early, WHOLE)[0] == WHOLE
+
+
+def test_what_the_bridges_file_holds_back_is_not_waited_for() -> None:
+    graph = graph_of(topic("/a"), topic("/b", announced=False), deny={"publishers": "/b"})
+    assert settled(graph) == (graph, 1)
+
+
+def test_what_never_comes_is_waited_for_no_longer_than_told() -> None:
+    graph = graph_of(topic("/a", announced=False))
+    assert settled(graph, within_s=0.02)[0] == graph
