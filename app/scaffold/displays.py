@@ -16,12 +16,17 @@ LOG: Final = "rcl_interfaces/msg/Log"
 PICTURES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 MAX_JOINTS: Final = 24
 NODES_PAGE: Final = "nodes"
+LEAST_AGE_S: Final = 2
+MISSED: Final = 5  # messages, until a value looks old
 
 
-def displays(topic: Topic, interfaces: Interfaces, sample: Any = None) -> Iterator[Entry]:
-    """The widgets of a topic that the robot publishes. `sample` is one of its messages, or None."""
+def displays(
+    topic: Topic, interfaces: Interfaces, sample: Any = None, period_s: float | None = None
+) -> Iterator[Entry]:
+    """The widgets of a topic that the robot publishes. `sample` is one of its messages, or None;
+    `period_s` are the seconds between two, None if it is not published regularly."""
     nodes = {node for one in topic.publishers for node in one.nodes}
-    about = {"topic": topic.name, "type": topic.type, **_qos(topic)}
+    about = {"topic": topic.name, "type": topic.type, **_qos(topic), **_max_age(topic, period_s)}
     page = page_of(topic.name, nodes)
     label = label_of(topic.name)
     match topic.type:
@@ -43,6 +48,13 @@ def displays(topic: Topic, interfaces: Interfaces, sample: Any = None) -> Iterat
 def _qos(topic: Topic) -> dict[str, Any]:
     """Reliable is the panel's default; a best-effort publisher does not match it."""
     return {} if topic.reliable else {"qos": {"reliability": "best_effort"}}
+
+
+def _max_age(topic: Topic, period_s: float | None) -> dict[str, Any]:
+    """A value that is not refreshed any more looks old. A latched one stays valid."""
+    if period_s is None or topic.latched:
+        return {}
+    return {"max_age_s": max(LEAST_AGE_S, ceil(MISSED * period_s))}
 
 
 def _value(sample: Any, path: str) -> Any:

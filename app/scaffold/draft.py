@@ -20,19 +20,22 @@ LEFT_OUT: Final = frozenset(
 )
 MOST_PENS: Final = 4
 MOST_PAGES: Final = 8
+TREND_GAP_S: Final = 5  # the max_age_s of a trend that has none
 TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "format")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Known:
     """What was read of a robot: names without the panel's namespace. `samples` is a message of a topic,
-    by its name, where one arrived. `unreadable` are nodes whose parameters can't be read."""
+    by its name, where one arrived; `periods` are seconds between messages of one that is published
+    regularly. `unreadable` are nodes whose parameters can't be read."""
 
     topics: Sequence[Topic] = ()
     services: Sequence[Server] = ()
     actions: Sequence[Server] = ()
     parameters: Sequence[NodeParameter] = ()
     samples: Mapping[str, Any] = field(default_factory=dict)
+    periods: Mapping[str, float] = field(default_factory=dict)
     unreadable: Sequence[str] = ()
 
 
@@ -53,7 +56,7 @@ def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
     for topic in shown(known.topics):
         try:
             _check(topic, interfaces)
-            found = _of_topic(topic, interfaces, known.samples.get(topic.name))
+            found = _of_topic(topic, interfaces, known)
         except InterfaceError as error:
             remarks.append(f"{topic.name}: {error}")
             continue
@@ -88,9 +91,10 @@ def _check(topic: Topic, interfaces: Interfaces) -> None:
         )
 
 
-def _of_topic(topic: Topic, interfaces: Interfaces, sample: Any) -> list[Entry]:
+def _of_topic(topic: Topic, interfaces: Interfaces, known: Known) -> list[Entry]:
     if topic.publishers:
-        return list(displays(topic, interfaces, sample))
+        sample, period_s = known.samples.get(topic.name), known.periods.get(topic.name)
+        return list(displays(topic, interfaces, sample, period_s))
     return list(controls.publishers(topic, interfaces))
 
 
@@ -169,5 +173,7 @@ def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
     pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
     if pens:
         keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
+        longest = max(one.keys.get("max_age_s", 0) for one in same[:MOST_PENS])
+        keys |= {"max_age_s": longest} if longest > TREND_GAP_S else {}
         comment = "Its history is kept in memory; disk = true keeps it over a restart."
         yield Entry(kind="trend", name=f"{page}/trend", page=page, keys=keys, comment=comment)

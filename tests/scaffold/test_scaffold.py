@@ -239,6 +239,19 @@ def test_what_is_not_for_a_panel_is_left_out(change: Callable[[Topic], Topic]) -
     assert widgets(text_of(topics=[change(published("/y", "std_msgs/msg/Int32"))])) == {}
 
 
+def test_a_value_looks_old_where_its_topic_is_published_regularly(tmp_path: Path) -> None:
+    slow, fast = published("/slow", "std_msgs/msg/Float64"), published("/fast", "std_msgs/msg/Bool")
+    kept = published("/kept", "std_msgs/msg/Bool", transient_local=True)
+    seldom = published("/seldom", "std_msgs/msg/String")
+    periods = {"/slow": 1.3, "/fast": 0.02, "/kept": 1.0}
+    text = text_of(topics=[slow, fast, kept, seldom], periods=periods)
+    ages = {name: one.get("max_age_s") for name, one in widgets(text).items()}
+    assert ages == {"slow": 7, "fast": 2, "kept": None, "seldom": None, "cell_io_trend": 7}
+    path = tmp_path / "cell.toml"
+    path.write_text(text)
+    check_panel(path)
+
+
 def test_a_topic_that_the_bridge_holds_back_is_a_remark() -> None:
     text = text_of(topics=[Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)])
     assert "# - /x: `allow` or `deny` in the bridge's configuration holds it back" in text

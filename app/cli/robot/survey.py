@@ -3,8 +3,9 @@
 import asyncio
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any, Final
 
 from app.cli.robot.topic_reader import endpoint_for
 from app.errors import DecodeError
@@ -15,6 +16,10 @@ from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, shown
 from app.scaffold.fields import shown_fields
 from app.transport.bridge_observer import BridgeObserver
+
+ARRIVALS: Final = 3  # of a topic, by which it is known how often it is published
+IRREGULAR: Final = 3.0  # the longest period of a regular topic, in its shortest one
+JITTER_S: Final = 0.2
 
 
 def robot_at(graph: RosGraph, namespace: str) -> tuple[RobotGraph, str]:
@@ -31,12 +36,14 @@ async def survey(
     """What is on the robot, with names below the panel's namespace."""
     parameters, unreadable = await _parameters(NodeServices(robot, interfaces, observer), robot, below)
     topics = [_topic(one, below) for one in robot.topics if _is_below(one.name, below)]
+    heard = await _listen(observer, topics, interfaces, listen_s)
     return Known(
         topics=topics,
         services=[_server(one, below) for one in robot.services if _is_below(one.name, below)],
         actions=[_server(one, below) for one in robot.actions if _is_below(one.name, below)],
         parameters=parameters,
-        samples=await _samples(observer, topics, interfaces, listen_s),
+        samples={name: one.message for name, one in heard.items() if one.message is not None},
+        periods={name: period for name, one in heard.items() if (period := one.period_s) is not None},
         unreadable=unreadable,
     )
 
@@ -76,16 +83,36 @@ def _has_use(topic: Topic, interfaces: Interfaces) -> bool:
     return topic.type == JOINTS or any(shown_fields(topic.type, interfaces))
 
 
-async def _samples(
+@dataclass(slots=True)
+class Heard:
+    """What arrived on a topic: the first message that can be decoded, and when live ones arrived."""
+
+    message: Any = None
+    arrivals: list[float] = field(default_factory=list)
+
+    def is_enough(self, latched: bool) -> bool:
+        return self.message is not None and (latched or len(self.arrivals) >= ARRIVALS)
+
+    @property
+    def period_s(self) -> float | None:
+        """The longest time between two messages; None of a topic that is not published regularly."""
+        gaps = [after - before for before, after in pairwise(self.arrivals)]
+        if len(gaps) < ARRIVALS - 1 or max(gaps) > IRREGULAR * min(gaps) + JITTER_S:
+            return None
+        return max(gaps)
+
+
+async def _listen(
     observer: BridgeObserver, topics: Sequence[Topic], interfaces: Interfaces, listen_s: float
-) -> dict[str, Any]:
-    """A message of each topic that has a use, by the topic's name: until all arrived or time is up."""
+) -> dict[str, Heard]:
+    """What arrived on each topic that has a use, by the topic's name: until it is enough of all, or
+    time is up."""
     wanted = {
         one.key: one
         for one in shown(topics)
         if one.publishers and one.type in interfaces.structures and _has_use(one, interfaces)
     }
-    found: dict[str, Any] = {}
+    found = {one.name: Heard() for one in wanted.values()}
     if not wanted:
         return found
     own = [endpoint_for(topic, topic.type) for topic in wanted.values()]
@@ -93,8 +120,12 @@ async def _samples(
         async with asyncio.timeout(listen_s):
             async for key, sample in observer.listen(own):
                 topic = wanted[key]
-                with suppress(DecodeError):  # of another definition than the one known here
-                    found[topic.name] = interfaces.decode(topic.type, bytes(sample.payload))
-                if len(found) == len(wanted):
+                heard = found[topic.name]
+                if not sample.cached:
+                    heard.arrivals.append(sample.at)
+                if heard.message is None:
+                    with suppress(DecodeError):  # of another definition than the one known here
+                        heard.message = interfaces.decode(topic.type, bytes(sample.payload))
+                if all(found[one.name].is_enough(one.latched) for one in wanted.values()):
                     break
     return found
