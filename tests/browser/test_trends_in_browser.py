@@ -258,6 +258,21 @@ def test_a_reload_and_another_browser_show_what_was(
         context.close()
 
 
+def test_a_note_moves_nothing(cell: Server, page: Page) -> None:
+    opened(page, cell)
+    places = f"""[...document.querySelectorAll('{TREND}, {TREND} > *:not(p)')].map((one) => {{
+      const at = one.getBoundingClientRect();
+      return [at.top, at.height];
+    }})"""
+    before = page.evaluate(places)
+    for name in ("note", "fault-note"):
+        page.locator(f"{TREND} > .{name}").evaluate(
+            "(note) => { note.textContent = 'Inlet: 20 s old' }"
+        )
+        expect(page.locator(f"{TREND} > .{name}")).to_be_visible()
+    assert page.evaluate(places) == before
+
+
 def test_a_hidden_trend_is_not_requested(cell: Server, page: Page) -> None:
     urls: list[str] = []
     page.on("request", lambda request: urls.append(request.url))
