@@ -265,12 +265,14 @@ def test_a_note_moves_nothing(cell: Server, page: Page) -> None:
       return [at.top, at.height];
     }})"""
     before = page.evaluate(places)
-    for name in ("note", "fault-note"):
-        page.locator(f"{TREND} > .{name}").evaluate(
-            "(note) => { note.textContent = 'Inlet: 20 s old' }"
-        )
-        expect(page.locator(f"{TREND} > .{name}")).to_be_visible()
-    assert page.evaluate(places) == before
+    shown = f"""(() => {{
+      const trend = document.querySelector('{TREND}');
+      trend.dataset.state = "old";
+      const notes = [...trend.querySelectorAll(".note, .fault-note")];
+      for (const note of notes) note.textContent = "Inlet: 20 s old";
+      return [notes.every((note) => note.checkVisibility()), {places}];
+    }})()"""
+    assert page.evaluate(shown) == [True, before]
 
 
 def test_a_hidden_trend_is_not_requested(cell: Server, page: Page) -> None:
