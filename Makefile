@@ -71,6 +71,7 @@ faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
 	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 $(FAULTS_TESTS) $(ARGS)
+	FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/python -m tests.faults.power
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
 
 screenshots: system .venv/test
