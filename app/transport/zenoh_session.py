@@ -229,8 +229,7 @@ class ZenohSession:
         return found
 
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
-        """Every liveliness token of the ROS graph that is held now; LinkError when they do not all come
-        within `timeout_s`."""
+        """The liveliness tokens of the ROS graph; LinkError if they do not all come in time."""
         with translated("can't ask for the ROS graph"):
             liveliness = self._session.liveliness()
             found, whole = await collected(
