@@ -125,9 +125,13 @@ def test_it_goes_on_when_the_page_is_loaded_again(screen: Page) -> None:
 
 
 def test_a_hold_ends_when_it_starts(screen: Page) -> None:
-    screen.locator(".hold").focus()
-    screen.keyboard.down(" ")
-    expect(screen.locator("[data-widget=jog][data-hold]")).to_be_attached()
+    def holds() -> bool:  # as soon as its script is there
+        screen.keyboard.up(" ")
+        screen.locator(".hold").focus()
+        screen.keyboard.down(" ")
+        return screen.locator("[data-widget=jog][data-hold]").count() == 1
+
+    until(holds, "it is held", every_s=0.2)
     # Without a second touch, which would end the hold too.
     screen.locator(".clean").evaluate("(key) => key.click()")
     expect(screen.locator("#cleaning")).to_be_visible()
