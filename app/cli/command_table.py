@@ -1,5 +1,6 @@
 """The commands of `operator-panel`: what each does, and its module."""
 
+import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -26,7 +27,13 @@ class Command:
 
     def load(self) -> CommandModule:
         """Its module, imported where it is used: to check a panel takes no HTTP server."""
-        return cast(CommandModule, import_module(f"{__package__}.{self.module}"))
+        gc.disable()  # to look at all modules several times would take a third of a command's start
+        try:
+            module = import_module(f"{__package__}.{self.module}")
+        finally:
+            gc.enable()
+        gc.freeze()  # nor are they looked at when it ends
+        return cast(CommandModule, module)
 
 
 COMMANDS: Final[Mapping[str, Command]] = {

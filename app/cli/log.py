@@ -10,7 +10,6 @@ from pathlib import Path
 from app.audit.verify import verify
 from app.cli.parser import Parser
 from app.errors import KioskError
-from app.panel import load_panel
 from app.settings import Settings
 
 PROG = "python -m app.log"
@@ -35,6 +34,8 @@ def _usual_folder() -> Path:
     settings = Settings.from_environment()
     if settings.data is not None:  # a panel file with a fault does not matter then
         return settings.data
+    from app.panel import load_panel  # takes half of the command's time, and is seldom needed
+
     return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
 
 
