@@ -6,7 +6,7 @@ docs/reference/sentences.md follow every move.
 
 import ast
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -37,6 +37,12 @@ def modules() -> dict[Path, ast.Module]:
     }
 
 
+@cache
+def nodes() -> dict[Path, tuple[ast.AST, ...]]:
+    """Of each module, all nodes of its syntax tree."""
+    return {path: tuple(ast.walk(tree)) for path, tree in modules().items()}
+
+
 def place(path: Path) -> str:
     return f"`{path.relative_to(PROJECT)}`"
 
@@ -44,8 +50,8 @@ def place(path: Path) -> str:
 def paths_table() -> str:
     """Each path of HTTP, with the function that answers."""
     rows = [("Path", "Function", "File"), ("---",) * 3]
-    for path, tree in modules().items():
-        for node in ast.walk(tree):
+    for path, found in nodes().items():
+        for node in found:
             if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef):
                 rows += [(f"`{route}`", f"`{node.name}`", place(path)) for route in _routes(node)]
     return _markdown(sorted(rows[2:]), rows[:2])
@@ -118,25 +124,25 @@ def _texts() -> dict[Path, frozenset[str]]:
     return {
         path: frozenset(
             node.value
-            for node in ast.walk(tree)
+            for node in found
             if isinstance(node, ast.Constant) and isinstance(node.value, str)
         )
-        for path, tree in modules().items()
+        for path, found in nodes().items()
     }
 
 
 @cache
 def _said() -> dict[Path, frozenset[str]]:
     """The codes that each module names; "lamp_*" for those that it puts together."""
-    return {path: frozenset(_codes(tree)) for path, tree in modules().items()}
+    return {path: frozenset(_codes(found)) for path, found in nodes().items()}
 
 
 def _says(names: frozenset[str], code: str) -> bool:
     return code in names or any(name[-1] == "*" and code.startswith(name[:-1]) for name in names)
 
 
-def _codes(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+def _codes(found: Iterable[ast.AST]) -> Iterator[str]:
+    for node in found:
         match node:
             case ast.Constant(value=str(code)) if "_" in code and code in SENTENCES:
                 yield code
