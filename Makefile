@@ -65,7 +65,9 @@ FORM ?= long
 FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
 	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py \
 	tests/runtime/test_nothing_grows.py tests/commands/test_holds.py tests/permission/test_control_authority.py \
-	tests/interfaces/test_fields.py tests/panel/test_toml_lines.py tests/panel/test_mistakes.py tests/web/test_openapi.py
+	tests/interfaces/test_fields.py tests/interfaces/test_values.py tests/interfaces/test_cdr_on_ros.py \
+	tests/commands/test_final_check.py tests/robot/test_topics.py tests/panel/test_toml_lines.py \
+	tests/panel/test_mistakes.py tests/web/test_openapi.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)

@@ -1,6 +1,6 @@
 """Fixtures: real parts, started once where they can be shared and ended whatever happens."""
 
-import os
+import gc
 import shutil
 import tempfile
 import time
@@ -11,16 +11,15 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
 from tests.support import domains, holds
-from tests.support.fonts import fonts_file
+from tests.support.browsers import BROWSERS, FAILED, Browsers, ReusedPage
 from tests.support.parts import (
     BRIDGE,
     CHROMIUM,
-    CHROMIUM_FLAGS,
     ENOUGH_S,
     HEADLESS,
     ROOT,
@@ -42,9 +41,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--real-time", choices=("only", "without"), help="tests that measure real time")
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Nothing of what is collected is garbage: it is never looked at for it, in each worker."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests of real time are tried once more where they fail, and no others. Files with the most tests
-    on real parts begin: none of them is left at the end, and what only computes fills the rest."""
+    """Tests of real time are tried once more where they fail, and no others. Files that begin with a
+    browser are first, since they share it, then those with the most tests on real parts: none of them
+    is left at the end, and what only computes fills the rest."""
     wanted = config.getoption("--real-time")
     for item in items:
         assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
@@ -57,7 +68,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left_out)
         items[:] = [one for one in items if one not in set(left_out)]
     on_parts = Counter(one.path for one in items if needs_part(one))
-    items.sort(key=lambda one: -on_parts[one.path])
+    first = {one.path: one for one in reversed(items)}
+    items.sort(key=lambda one: (not takes_browser(first[one.path]), -on_parts[one.path]))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -69,11 +81,13 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
+    item: pytest.Item,
     call: pytest.CallInfo[None],
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A failure shows what the processes said last that run, or began about with the test."""
     report = yield
     if report.failed:
+        item.stash[FAILED] = True
         began = time.monotonic() - call.duration - 10
         shown = [one for one in Process.latest if one.running or one.began > began]
         report.sections += [("a process", process.describe()) for process in shown]
@@ -205,34 +219,64 @@ def fonts() -> str:
     return "noto"
 
 
-# Of one module: while Playwright runs, so does an event loop of its own in this thread.
+@pytest.fixture(scope="session")
+def browsers() -> Iterator[Browsers]:
+    yield BROWSERS
+    BROWSERS.close()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
+    """Browsers run on if the next module begins with one, and else end: while Playwright runs, so does
+    an event loop of its own in this thread, and other tests run theirs."""
+    yield
+    if nextitem is not None and item.path != nextitem.path and not takes_browser(nextitem):
+        BROWSERS.close()
+
+
+def takes_browser(item: pytest.Item) -> bool:
+    return "chromium" in getattr(item, "fixturenames", ())
+
+
 @pytest.fixture(scope="module")
-def chromium(fonts: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    env: dict[str, str | float | bool] = {
-        **os.environ,
-        "FONTCONFIG_FILE": str(fonts_file(fonts, tmp_path_factory.mktemp("fonts"))),
-    }
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS, env=env)
-        yield browser
-        browser.close()
+def chromium(fonts: str, browsers: Browsers, tmp_path_factory: pytest.TempPathFactory) -> Browser:
+    return browsers.browser(fonts, tmp_path_factory)
+
+
+@pytest.fixture(scope="module")
+def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
+    mine = ReusedPage(chromium)
+    yield mine
+    mine.close()
 
 
 @pytest.fixture
-def without_scripts(chromium: Browser) -> Iterator[Page]:
-    """A page in a browser that runs no scripts."""
-    with chromium.new_context(java_script_enabled=False) as context:
-        yield context.new_page()
+def page(reused_page: ReusedPage, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page like a new one, which the tests of a module share; an error on its console fails one."""
+    with reused_page.taken(request.node) as page:
+        yield page
 
 
 @pytest.fixture
-def page(chromium: Browser) -> Iterator[Page]:
-    """A page in a browser context of its own; an error on its console fails the test."""
-    context = chromium.new_context(viewport={"width": 1280, "height": 800})
-    context.set_default_timeout(1000 * ENOUGH_S)
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    context.close()
-    assert errors == []
+def own_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page of the test's own, for what cannot be taken back, such as an init script."""
+    mine = ReusedPage(chromium)
+    with mine.taken(request.node) as page:
+        yield page
+    mine.close()
+
+
+@pytest.fixture(scope="module")
+def reused_page_without_scripts(chromium: Browser) -> Iterator[ReusedPage]:
+    mine = ReusedPage(chromium, java_script_enabled=False)
+    yield mine
+    mine.close()
+
+
+@pytest.fixture
+def without_scripts(
+    reused_page_without_scripts: ReusedPage, request: pytest.FixtureRequest
+) -> Iterator[Page]:
+    """A page in a browser that runs no scripts, which the tests of a module share."""
+    with reused_page_without_scripts.taken(request.node) as page:
+        yield page

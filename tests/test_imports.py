@@ -2,10 +2,12 @@
 
 import ast
 import graphlib
+import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -92,13 +94,12 @@ def name_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-# Parsed before any test has threads: with threads Python 3.11.7 may fail to (gh-106905).
-MODULES = {name_of(path): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
-def imported(module: str) -> Iterator[str]:
+def read_imports(module: str) -> Iterator[str]:
     """Every module that a module names in an `import`, wherever it stands."""
-    for node in ast.walk(MODULES[module]):
+    for node in ast.walk(ast.parse(MODULES[module].read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -108,12 +109,26 @@ def imported(module: str) -> Iterator[str]:
                 yield inner if inner in MODULES else str(node.module)
 
 
+@cache
+def imported() -> Mapping[str, list[str]]:
+    """What each module imports. Parsed in another process: with threads Python 3.11.7 may fail to
+    (gh-106905)."""
+    code = (
+        "import json; from tests.test_imports import MODULES, read_imports;"
+        " print(json.dumps({module: [*read_imports(module)] for module in MODULES}))"
+    )
+    found: dict[str, list[str]] = json.loads(
+        subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, text=True)
+    )
+    return found
+
+
 def of_project(module: str) -> set[str]:
-    return {name for name in imported(module) if name.partition(".")[0] == "app"}
+    return {name for name in imported()[module] if name.partition(".")[0] == "app"}
 
 
 def of_zenoh(module: str) -> bool:
-    return any(name.partition(".")[0] == "zenoh" for name in imported(module))
+    return any(name.partition(".")[0] == "zenoh" for name in imported()[module])
 
 
 def room_of(module: str) -> str:
@@ -202,4 +217,4 @@ def test_the_interfaces_know_nothing_but_errors() -> None:
 )
 def test_what_decides_knows_no_http(module: str) -> None:
     frameworks = {"starlette", "uvicorn", "jinja2", "app.web.routes"}
-    assert {name for name in imported(module) if name.startswith(tuple(frameworks))} == set()
+    assert {name for name in imported()[module] if name.startswith(tuple(frameworks))} == set()

@@ -6,7 +6,6 @@ import re
 import shlex
 import signal
 import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -18,24 +17,17 @@ from app.interfaces.definitions import Definitions
 from app.interfaces.parsing import parse_definition
 from app.interfaces.type_hash import _describe_structure, type_hash
 from app.panel import check_panel
-from tests.support import cyclone
+from tests.support import command, cyclone
+from tests.support.command import COMMAND
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, until
 
-COMMAND = [sys.executable, "-m", "app.cli"]
 BOOL = "std_msgs/msg/Bool"
 GRIPPER = "gripper_msgs/msg/Gripper"
 
 
 def run(bridge: Bridge, *words: str) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [*COMMAND, *words, "--connect", bridge.endpoint, "--wait", str(ENOUGH_S)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=ENOUGH_S * 2,
-        check=False,
-    )
+    done = command.run(COMMAND, *words, "--connect", bridge.endpoint, "--wait", str(ENOUGH_S))
     assert "Traceback" not in done.stderr, done.stderr
     return done
 
@@ -176,14 +168,7 @@ def test_what_is_not_there_is_a_sentence(
 )
 def test_no_router_is_a_sentence_that_says_what_to_do(host: str, more: str) -> None:
     endpoint = f"tcp/{host}:{free_port()}"
-    done = subprocess.run(
-        [*COMMAND, "topics", "--connect", endpoint, "--wait", "0.3"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=ENOUGH_S,
-        check=False,
-    )
+    done = command.run(COMMAND, "topics", "--connect", endpoint, "--wait", "0.3")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
         f"no Zenoh router or bridge answers at {endpoint} within 0.3 s: start zenoh-bridge-ros2dds on"
@@ -193,33 +178,18 @@ def test_no_router_is_a_sentence_that_says_what_to_do(host: str, more: str) -> N
 
 def test_a_router_without_a_bridge_is_a_finding_of_its_own(peer: tuple[str, Any]) -> None:
     endpoint, _ = peer
-    done = subprocess.run(
-        [*COMMAND, "topics", "--connect", endpoint],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=ENOUGH_S,
-        check=False,
-    )
+    done = command.run(COMMAND, "topics", "--connect", endpoint)
     assert (done.returncode, done.stdout) == (1, "")
     assert f"Zenoh answers at {endpoint}, but no bridge to ROS 2 is there" in done.stderr
 
 
 def test_ctrl_c_ends_it_without_words(cyclone_bridge: Bridge, io: RosNode) -> None:
-    echo = subprocess.Popen(
-        [*COMMAND, "echo", "/arm/joint_states", "--connect", cyclone_bridge.endpoint],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Where the tests run in the background, it would ignore Ctrl-C as they do.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    echo = command.start(COMMAND, "echo", "/arm/joint_states", "--connect", cyclone_bridge.endpoint)
     assert echo.stdout is not None
     assert echo.stdout.readline() == "header:\n"
     echo.send_signal(signal.SIGINT)
-    _, errors = echo.communicate(timeout=ENOUGH_S)
-    assert (echo.returncode, errors) == (0, "")
+    done = command.finished(echo)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_type_is_decoded_by_the_definition_that_its_node_gives(
@@ -351,14 +321,7 @@ def test_each_command_of_the_page_works(domain: int, tmp_path: Path) -> None:
         ]
         place = {"tcp/robot1:7447": bridge.endpoint, "cell1.toml": str(tmp_path / "cell1.toml")}
         for words in commands:
-            done = subprocess.run(
-                [*COMMAND, *(place.get(word, word) for word in words)],
-                cwd=ROOT,
-                capture_output=True,
-                text=True,
-                timeout=ENOUGH_S * 2,
-                check=False,
-            )
+            done = command.run(COMMAND, *(place.get(word, word) for word in words))
             assert (done.returncode, done.stderr) == (0, ""), words
     finally:
         node.end()

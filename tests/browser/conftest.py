@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
+from tests.support.browsers import ReusedPage
 from tests.support.finger import Finger
 from tests.support.parts import Server
 from tests.support.touch import permit, touched, touched_server
@@ -17,12 +18,25 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
+@pytest.fixture(scope="module")
+def reused_screen(chromium: Browser) -> Iterator[ReusedPage]:
+    mine = ReusedPage(chromium, has_touch=True)
+    yield mine
+    mine.close()
+
+
 @pytest.fixture
-def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
-    """A page of it on a touched screen, whose interlock permits."""
-    permit(kiosk)
-    with touched(chromium, kiosk) as page:
+def touchscreen(reused_screen: ReusedPage, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page on a screen that is touched, like a new one, which the tests of a module share."""
+    with reused_screen.taken(request.node) as page:
         yield page
+
+
+@pytest.fixture
+def screen(kiosk: Server, touchscreen: Page) -> Page:
+    """A page of the kiosk on a touched screen, whose interlock permits."""
+    permit(kiosk)
+    return touched(touchscreen, kiosk)
 
 
 @pytest.fixture

@@ -13,18 +13,21 @@ from app.panel import load_panel
 from app.settings import PACKAGE
 from app.web.display_choice import CHOICES, COOKIE
 from app.web.language import COOKIE as LANGUAGE
-from tests.support.pages import place
+from tests.support.browsers import ReusedPage
+from tests.support.pages import DRAWN, place
 from tests.support.parts import ROOT, Server, until
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
-# Rules of WCAG 2.2 A and AA, and axe's best practices.
-RUN: Final = """async () => {
-  const runOnly = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"];
-  const found = await axe.run(document, { runOnly });
+# Rules of WCAG 2.2 A and AA, and axe's best practices; and those of them that depend on a theme.
+ALL: Final = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+OF_COLOURS: Final = ["color-contrast", "link-in-text-block"]
+RUN: Final = """async (runOnly) => {
+  const found = await axe.run(document, { runOnly, resultTypes: ["violations"] });
   return found.violations.map(({ id, help, nodes }) => [
     id, help, nodes.slice(0, 4).map((n) => [n.target.join(" "), ...n.any.map((a) => a.message)]),
   ]);
 }"""
+SHOW: Final = "(theme) => (document.documentElement.dataset.theme = theme)"
 EXAMPLE: Final = "docs/examples/palletizer.toml"
 MM_PER_PX: Final = 0.22
 TOUCH: Final = 44.0
@@ -52,46 +55,68 @@ def demo(panel: str) -> Iterator[Server]:
     mine.end()
 
 
-@pytest.fixture(params=CHOICES["theme"])
-def theme(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
-@pytest.fixture
-def themed(theme: str, chromium: Browser) -> Iterator[Page]:
-    """A page of a browser that has chosen a theme; axe may be added to it."""
-    context = chromium.new_context(bypass_csp=True, viewport={"width": 1280, "height": 800})
-    name = COOKIE.format("theme")
-    context.add_cookies([{"name": name, "value": theme, "domain": "127.0.0.1", "path": "/"}])
-    yield context.new_page()
-    context.close()
+@pytest.fixture(scope="module")
+def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
+    """Axe may be added to its pages."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    yield mine
+    mine.close()
 
 
 def violations(page: Page) -> list[Any]:
-    page.evaluate(AXE)
-    found: list[Any] = page.evaluate(RUN)
+    """What axe finds on a page, in each theme: (theme, rule, help, elements). A theme changes colours
+    only, so the rules about anything else are looked at once."""
+    if not page.evaluate("'axe' in globalThis"):
+        page.evaluate(AXE)
+    found: list[Any] = []
+    for theme in CHOICES["theme"]:
+        page.evaluate(SHOW, theme)
+        rules = ALL if theme == CHOICES["theme"][0] else OF_COLOURS
+        found += [(theme, *one) for one in page.evaluate(RUN, rules)]
+    page.evaluate(SHOW, CHOICES["theme"][0])
     return found
 
 
-def test_axe_finds_nothing_on_the_example(example: Server, themed: Page) -> None:
+# (selector, property, value) in each rule of a theme.
+OF_THEMES: Final = """() => {
+  const inside = (rule) => [...(rule.cssRules ?? [])].flatMap(inside).concat(
+    rule.selectorText?.includes("[data-theme") ? [...rule.style].map((name) =>
+      [rule.selectorText, name, rule.style.getPropertyValue(name).trim()]) : []);
+  return [...document.styleSheets].flatMap(inside);
+}"""
+
+
+def test_a_theme_changes_colours_only(shipped: Server, page: Page) -> None:
+    page.goto(f"{shipped.url}/gallery")
+    found = page.evaluate(OF_THEMES)
+    assert len(found) > 50
+    assert [name for _, name, _ in found if name != "color-scheme" and not name.startswith("--")] == []
+    is_colour = "(values) => values.filter((one) => !CSS.supports('color', one))"
+    assert page.evaluate(is_colour, [v for _, name, v in found if name != "color-scheme"]) == []
+    for theme in CHOICES["theme"]:
+        page.context.add_cookies([{"name": COOKIE.format("theme"), "value": theme, "url": shipped.url}])
+        page.goto(f"{shipped.url}/log")
+        expect(page.locator("html")).to_have_attribute("data-theme", theme)
+
+
+def test_axe_finds_nothing_on_the_example(example: Server, page: Page) -> None:
     for path in ("/pages/cell", "/pages/setup", "/log", "/nowhere"):
-        themed.goto(example.url + path)
-        assert violations(themed) == [], path
+        page.goto(example.url + path)
+        assert violations(page) == [], path
 
 
-def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, themed: Page, theme: str) -> None:
-    """Each page, the gallery and the log, in each theme and in each language: the languages take turns,
-    since contrast is a matter of themes and structure is not."""
+def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, page: Page) -> None:
+    """Each page, the gallery and the log; the languages take turns."""
     languages = sorted(files_of_languages())
     pages = [f"/pages/{described.id}" for described in load_panel(PACKAGE / "panel.toml").pages]
-    for number, path in enumerate([*pages, "/gallery", "/log"], CHOICES["theme"].index(theme)):
+    for number, path in enumerate([*pages, "/gallery", "/log"]):
         language = languages[number % len(languages)]
-        themed.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
-        themed.goto(shipped.url + path)
-        expect(themed.locator("html")).to_have_attribute("lang", language)
+        page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
+        page.goto(shipped.url + path)
+        expect(page.locator("html")).to_have_attribute("lang", language)
         if path in pages:
-            expect(themed.locator("#state")).not_to_have_attribute("data-state", "unknown")
-        assert violations(themed) == [], (path, language)
+            expect(page.locator("#state")).not_to_have_attribute("data-state", "unknown")
+        assert violations(page) == [], (path, language)
 
 
 # Parts of a key's face that reach out of the key, and labels that the sign of a longer text lies on.
@@ -114,74 +139,77 @@ CROWDED: Final = """() => [...document.querySelectorAll(".gallery .key .face")].
 })"""
 
 
-def test_nothing_is_crowded_in_the_gallery(shipped: Server, chromium: Browser) -> None:
+SCREENS: Final = ((1280, 800), (1024, 600), (800, 480))
+
+
+def test_nothing_is_crowded_in_the_gallery(shipped: Server, page: Page) -> None:
     """Each kind in each state, with the sentences of each language at each size."""
-    with chromium.new_context() as context:
-        page = context.new_page()
-        for language in sorted(files_of_languages()):
-            context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
-            for width, height in ((1280, 800), (1024, 600), (800, 480)):
-                page.set_viewport_size({"width": width, "height": height})
-                page.goto(f"{shipped.url}/gallery")
-                expect(page.locator(".key .more:visible").first).to_be_visible()
-                assert page.evaluate(CROWDED) == [], (language, width)
-                assert page.evaluate("document.documentElement.scrollWidth") == width
-        old = page.locator('[data-kind="readout"][data-state="old"] .number > span')
-        expect(old).to_have_css("text-decoration-line", "underline")
+    for language in sorted(files_of_languages()):
+        page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
+        page.goto(f"{shipped.url}/gallery")
+        expect(page.locator("html")).to_have_attribute("lang", language)
+        for width, height in SCREENS:
+            page.set_viewport_size({"width": width, "height": height})
+            expect(page.locator(".key .more:visible").first).to_be_visible()
+            page.evaluate(DRAWN)
+            assert page.evaluate(CROWDED) == [], (language, width)
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+    old = page.locator('[data-kind="readout"][data-state="old"] .number > span')
+    expect(old).to_have_css("text-decoration-line", "underline")
 
 
 def test_the_shipped_pages_are_level(shipped: Server, page: Page) -> None:
     """A scale ends where the keys of its row do, and a trend's keys are one row."""
-    for width, height in ((1280, 800), (1024, 600), (800, 480)):
+    page.goto(f"{shipped.url}/pages/robot")
+    for width, height in SCREENS:
         page.set_viewport_size({"width": width, "height": height})
-        page.goto(f"{shipped.url}/pages/robot")
         gauge, step = (place(page.locator(f"[data-kind={kind}]")) for kind in ("gauge", "step"))
         ends = [box["y"] + box["height"] for box in (gauge, step)]
         assert ends[0] == pytest.approx(ends[1], abs=1), width
-        page.goto(f"{shipped.url}/pages/watch")
+    page.goto(f"{shipped.url}/pages/watch")
+    for width, height in SCREENS:
+        page.set_viewport_size({"width": width, "height": height})
         expect(page.locator(".trend-keys")).to_be_visible()
         keys = [place(key) for key in page.locator(".trend-keys > button:visible").all()]
         assert len({box["y"] for box in keys}) == 1, width
         assert min(box["width"] for box in keys) >= 14 / MM_PER_PX - 0.5
 
 
-def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, themed: Page) -> None:
-    themed.goto(plan.url)
-    assert violations(themed) == []
+def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, page: Page) -> None:
+    page.goto(plan.url)
+    assert violations(page) == []
 
 
-def test_axe_finds_nothing_in_what_opens(example: Server, themed: Page) -> None:
+def test_axe_finds_nothing_in_what_opens(example: Server, page: Page) -> None:
     """Menu, links, and the question before a press."""
-    themed.goto(example.url)
+    page.goto(example.url)
     for opener in (".menu-key", ".lamps"):
-        themed.locator(opener).click()
-        assert violations(themed) == [], opener
-        themed.keyboard.press("Escape")
-    themed.locator("[data-widget=reset] > button").click()
-    expect(themed.locator("dialog[open]")).to_be_visible()
-    assert violations(themed) == []
+        page.locator(opener).click()
+        assert violations(page) == [], opener
+        page.keyboard.press("Escape")
+    page.locator("[data-widget=reset] > button").click()
+    expect(page.locator("dialog[open]")).to_be_visible()
+    assert violations(page) == []
 
 
-def test_axe_finds_nothing_on_the_page_that_asks(example: Server, themed: Page) -> None:
+def test_axe_finds_nothing_on_the_page_that_asks(example: Server, page: Page) -> None:
     """The question on a page of its own, as it is without scripts: posted by the browser itself."""
-    themed.goto(example.url)
-    themed.evaluate("""() => {
+    page.goto(example.url)
+    page.evaluate("""() => {
       const form = document.querySelector("form.page");
       form.action = "/widgets/reset";
       form.submit();
     }""")
-    expect(themed.locator("form.ask")).to_be_visible()
-    assert violations(themed) == []
-
-
-@pytest.mark.parametrize("size", [(390, 844), (800, 480), (1024, 600)])
-def test_axe_finds_nothing_on_small_screens(example: Server, chromium: Browser, size: Any) -> None:
-    width, height = size
-    context = chromium.new_context(bypass_csp=True, viewport={"width": width, "height": height})
-    page = context.new_page()
-    page.goto(example.url)
+    expect(page.locator("form.ask")).to_be_visible()
     assert violations(page) == []
-    context.close()
+
+
+def test_axe_finds_nothing_on_small_screens(example: Server, page: Page) -> None:
+    page.goto(example.url)
+    for width, height in ((390, 844), (800, 480), (1024, 600)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.evaluate(DRAWN)
+        assert violations(page) == [], (width, height)
 
 
 # What can be reached, in the order of the document, and what Tab reaches.
@@ -196,7 +224,6 @@ CONTROLS: Final = """() => {
 def test_every_control_is_reached_by_the_keyboard_in_order(
     example: Server, page: Page, path: str
 ) -> None:
-    page.set_viewport_size({"width": 1280, "height": 800})
     page.goto(example.url + path)
     key = "start" if path.endswith("cell") else "load"
     expect(page.locator(f"[data-widget={key}] > button")).to_be_enabled()
@@ -220,23 +247,22 @@ BOXES: Final = """() => [...document.querySelectorAll(
 MAIN_KEYS: Final = ".cell > .key > button, .action button"
 
 
-@pytest.mark.parametrize("size", [(1280, 800), (1024, 600), (800, 480), (800, 1280)])
-def test_what_is_touched_is_large_enough(example: Server, page: Page, size: Any) -> None:
-    width, height = size
-    page.set_viewport_size({"width": width, "height": height})
+def test_what_is_touched_is_large_enough(example: Server, page: Page) -> None:
     for path in ("/pages/cell", "/pages/setup"):
         page.goto(example.url + path)
-        page.locator(".menu-key").click()
-        small = [box for box in page.evaluate(BOXES) if min(box[1], box[2]) < TOUCH - 0.5]
-        assert small == [], (path, size)
-        page.keyboard.press("Escape")
-        least = (14 if height <= 560 else 20) / MM_PER_PX
-        for key in page.locator(MAIN_KEYS).locator("visible=true").all():
-            box = place(key)
-            assert box["height"] >= least - 0.5
-            assert box["width"] >= 20 / MM_PER_PX - 0.5
-    stop = place(page.locator(".frame-keys .key > button"))
-    assert min(stop["height"] / 12, stop["width"] / 18) * MM_PER_PX >= 1 - 0.01
+        for width, height in (*SCREENS, (800, 1280)):
+            page.set_viewport_size({"width": width, "height": height})
+            page.locator(".menu-key").click()
+            small = [box for box in page.evaluate(BOXES) if min(box[1], box[2]) < TOUCH - 0.5]
+            assert small == [], (path, width)
+            page.keyboard.press("Escape")
+            least = (14 if height <= 560 else 20) / MM_PER_PX
+            for key in page.locator(MAIN_KEYS).locator("visible=true").all():
+                box = place(key)
+                assert box["height"] >= least - 0.5
+                assert box["width"] >= 20 / MM_PER_PX - 0.5
+            stop = place(page.locator(".frame-keys .key > button"))
+            assert min(stop["height"] / 12, stop["width"] / 18) * MM_PER_PX >= 1 - 0.01
 
 
 SHIFTS: Final = """new PerformanceObserver((list) => {

@@ -5,12 +5,14 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Error, Page, expect
 
+from tests.support.browsers import ReusedPage
 from tests.support.pages import place
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
 from tests.web.test_control_over_http import PROXY, control_panel
@@ -32,30 +34,38 @@ def kiosk(tmp_path: Path) -> Iterator[Server]:
     mine.end()
 
 
-@pytest.fixture
-def opens(kiosk: Server, chromium: Browser) -> Iterator[Opens]:
-    """Opens the panel in a browser context of its own; an error on a console fails the test."""
-    contexts = []
-    errors: list[str] = []
+ReusedPages = Callable[[str, bool], ReusedPage]
 
-    def opened(address: str = "", within: Browser = chromium, scripts: bool = True) -> Page:
+
+@pytest.fixture(scope="module")
+def reused_pages(chromium: Browser) -> Iterator[ReusedPages]:
+    """Pages that come from an address, "" for the cell, with or without scripts."""
+    made: dict[tuple[str, bool], ReusedPage] = {}
+
+    def reused(address: str, scripts: bool) -> ReusedPage:
         headers = {"x-forwarded-for": address} if address else {}
-        context = within.new_context(
-            viewport={"width": 1280, "height": 800},
-            extra_http_headers=headers,
-            java_script_enabled=scripts,
-        )
-        contexts.append(context)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.goto(kiosk.url)
-        return page
+        if (address, scripts) not in made:
+            made[address, scripts] = ReusedPage(
+                chromium, extra_http_headers=headers, java_script_enabled=scripts
+            )
+        return made[address, scripts]
 
-    yield opened
-    for context in contexts:
-        if context.browser and context.browser.is_connected():
-            context.close()
-    assert errors == []
+    yield reused
+    for one in made.values():
+        one.close()
+
+
+@pytest.fixture
+def opens(kiosk: Server, reused_pages: ReusedPages, request: pytest.FixtureRequest) -> Iterator[Opens]:
+    """Opens the panel as in a browser of its own; an error on a console fails the test."""
+    with ExitStack() as stack:
+
+        def opened(address: str = "", scripts: bool = True) -> Page:
+            page = stack.enter_context(reused_pages(address, scripts).taken(request.node))
+            page.goto(kiosk.url)
+            return page
+
+        yield opened
 
 
 @pytest.fixture
@@ -203,7 +213,9 @@ def processes_of(browser: Browser) -> list[int]:
 def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     kiosk: Server, opens: Opens, other_chromium: Browser, fault: signal.Signals
 ) -> None:
-    first, second = opens(FIRST, within=other_chromium), opens(SECOND)
+    first = other_chromium.new_page(extra_http_headers={"x-forwarded-for": FIRST})
+    first.goto(kiosk.url)
+    second = opens(SECOND)
     take(first)
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
     pids = processes_of(other_chromium)

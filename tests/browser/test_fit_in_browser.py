@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
 from app.panel.checks.tile_sizes import LOW_SCREEN, Screen
-from tests.support.pages import ROWS, place
+from tests.support.pages import DRAWN, ROWS, place
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 
@@ -45,36 +45,40 @@ def demo() -> Iterator[Server]:
         yield mine
 
 
-@pytest.mark.parametrize("size", SCREENS)
-@pytest.mark.parametrize("of", [0, 2], ids=["three groups", "one group"])
-def test_sizes_are_those_of_the_browser(
-    demo: Server, panel: Panel, page: Page, size: str, of: int
-) -> None:
+def sized(page: Page, panel: Panel, size: str) -> Screen:
+    """The screen of a size, once the page is drawn on it."""
     screen = Screen.of(size, panel.mm_per_px)
     page.set_viewport_size({"width": screen.width, "height": screen.height})
+    page.evaluate(DRAWN)
+    return screen
+
+
+@pytest.mark.parametrize("of", [0, 2], ids=["three groups", "one group"])
+def test_sizes_are_those_of_the_browser(demo: Server, panel: Panel, page: Page, of: int) -> None:
     cell = panel.pages[of]
     page.goto(f"{demo.url}/pages/{cell.id}")
     expect(page.locator(".group").first).to_be_visible()
-    assert reason(panel, cell, screen) == ""
-    found: Any = page.evaluate(MEASURE)
-    assert found["outside"] == []
-    assert found["main"]["height"] == pytest.approx(page_height(panel, cell, screen), abs=1)
-    width = page_width(panel, screen)
-    assert found["main"]["width"] == pytest.approx(width, abs=1)
-    for group in found["groups"]:
-        described = cell.parts[group["number"]]
-        assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
-        rows = page.evaluate(ROWS, group["number"])
-        assert rows == pytest.approx(row_heights(described, screen), abs=1)
+    for size in SCREENS:
+        screen = sized(page, panel, size)
+        assert reason(panel, cell, screen) == ""
+        found: Any = page.evaluate(MEASURE)
+        assert found["outside"] == [], size
+        assert found["main"]["height"] == pytest.approx(page_height(panel, cell, screen), abs=1)
+        width = page_width(panel, screen)
+        assert found["main"]["width"] == pytest.approx(width, abs=1)
+        for group in found["groups"]:
+            described = cell.parts[group["number"]]
+            assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
+            rows = page.evaluate(ROWS, group["number"])
+            assert rows == pytest.approx(row_heights(described, screen), abs=1)
 
 
 def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
     demo: Server, panel: Panel, page: Page
 ) -> None:
+    page.goto(demo.url)
     for size in SCREENS:
-        screen = Screen.of(size, panel.mm_per_px)
-        page.set_viewport_size({"width": screen.width, "height": screen.height})
-        page.goto(demo.url)
+        screen = sized(page, panel, size)
         boxes = [
             place(key)
             for key in page.locator(".cell > .key > button:visible, .action button:visible").all()

@@ -12,6 +12,7 @@ from tests.support.touch import (
     HALT,
     HEARD,
     SIZES,
+    loaded,
     opened,
     permit,
     settled,
@@ -37,10 +38,9 @@ def dimming(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 @pytest.fixture
-def sleepy(chromium: Browser, dimming: Server) -> Iterator[Page]:
+def sleepy(touchscreen: Page, dimming: Server) -> Page:
     permit(dimming)
-    with touched(chromium, dimming) as page:
-        yield page
+    return touched(touchscreen, dimming)
 
 
 def presses(server: Server) -> int:
@@ -80,34 +80,32 @@ def test_it_takes_thirty_seconds(screen: Page) -> None:
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
-    chromium: Browser, kiosk: Server, size: tuple[int, int]
+    touchscreen: Page, kiosk: Server, size: tuple[int, int]
 ) -> None:
-    with touched(chromium, kiosk, size) as page:
-        points = [
-            middle(page.locator(one)) for one in ("[data-widget=load] > [type=submit]", ".menu-key")
-        ]
-        points.append(middle(page.locator(".frame-keys [type=submit]")))
-        before = presses(kiosk)
-        clean(page, 30)
-        page.evaluate(COUNTS)
-        for x, y in points:
-            page.touchscreen.tap(x, y)
-            page.mouse.click(x, y)
-        for key in ("Tab", "Enter", " ", "Escape", "F5"):
-            page.keyboard.press(key)
-        expect(page.locator("#cleaning")).to_be_visible()
-        assert float(page.locator("#cleaning b").evaluate("(b) => b.offsetHeight")) >= 120
-        expect(page.locator("#state")).to_be_in_viewport(ratio=1)
-        x, y = middle(page.locator("#state"))
-        inside = "([x, y]) => document.elementFromPoint(x, y).closest('#cleaning') === null"
-        assert page.evaluate(inside, [x, y])
-        expect(page.locator(".sheet")).to_have_count(0)
-        expect(page.locator("#menu")).to_be_hidden()
-        assert page.evaluate("arrived") == []
-        permit(kiosk, HALT)
-        expect(page.locator("#state b")).to_have_text("LOCKED")
-        permit(kiosk)
-        assert presses(kiosk) == before
+    page = touched(touchscreen, kiosk, size)
+    points = [middle(page.locator(one)) for one in ("[data-widget=load] > [type=submit]", ".menu-key")]
+    points.append(middle(page.locator(".frame-keys [type=submit]")))
+    before = presses(kiosk)
+    clean(page, 30)
+    page.evaluate(COUNTS)
+    for x, y in points:
+        page.touchscreen.tap(x, y)
+        page.mouse.click(x, y)
+    for key in ("Tab", "Enter", " ", "Escape", "F5"):
+        page.keyboard.press(key)
+    expect(page.locator("#cleaning")).to_be_visible()
+    assert float(page.locator("#cleaning b").evaluate("(b) => b.offsetHeight")) >= 120
+    expect(page.locator("#state")).to_be_in_viewport(ratio=1)
+    x, y = middle(page.locator("#state"))
+    inside = "([x, y]) => document.elementFromPoint(x, y).closest('#cleaning') === null"
+    assert page.evaluate(inside, [x, y])
+    expect(page.locator(".sheet")).to_have_count(0)
+    expect(page.locator("#menu")).to_be_hidden()
+    assert page.evaluate("arrived") == []
+    permit(kiosk, HALT)
+    expect(page.locator("#state b")).to_have_text("LOCKED")
+    permit(kiosk)
+    assert presses(kiosk) == before
 
 
 def test_it_ends_by_itself_and_then_keys_work(screen: Page) -> None:
@@ -244,17 +242,15 @@ def test_a_touched_screen_has_none_of_the_browsers_gestures(screen: Page) -> Non
     assert screen.locator(".hold").evaluate("(key) => getComputedStyle(key).touchAction") == "none"
 
 
-def test_a_developers_browser_keeps_them(chromium: Browser, kiosk: Server) -> None:
-    with opened(chromium.new_context(), kiosk) as page:
-        assert all(page.evaluate(GESTURES).values())
+def test_a_developers_browser_keeps_them(page: Page, kiosk: Server) -> None:
+    assert all(loaded(page, kiosk).evaluate(GESTURES).values())
 
 
 def test_a_panel_may_leave_them(
-    chromium: Browser, servers: Callable[[Server], Server], tmp_path_factory: pytest.TempPathFactory
+    touchscreen: Page, servers: Callable[[Server], Server], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     server = servers(touched_server(tmp_path_factory.mktemp("panel"), screen="kiosk = false"))
-    with touched(chromium, server) as page:
-        assert all(page.evaluate(GESTURES).values())
+    assert all(touched(touchscreen, server).evaluate(GESTURES).values())
 
 
 TONES: Final = """

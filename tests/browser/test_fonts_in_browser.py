@@ -1,7 +1,9 @@
 """What needs its place, with each set of fonts that a kiosk may have."""
 
+from typing import Final
+
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.test_control_in_browser import (
     FIRST,
@@ -11,17 +13,20 @@ from tests.browser.test_control_in_browser import (
     button,
     kiosk,
     opens,
+    reused_pages,
     take,
     tap,
 )
-from tests.browser.test_links_in_browser import Keep
 from tests.browser.test_pages import SIZES
 from tests.runtime.test_several_robots import MANY, heard, ten
 from tests.support.fonts import SETS
-from tests.support.pages import place
-from tests.support.parts import ROOT, Server
+from tests.support.pages import DRAWN, place
+from tests.support.parts import Server
 
-__all__ = ["kiosk", "opens", "ten"]  # fixtures
+__all__ = ["kiosk", "opens", "reused_pages", "ten"]  # fixtures
+
+
+SCROLLED: Final = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
 
 
 @pytest.fixture(scope="module", params=SETS)
@@ -29,35 +34,37 @@ def fonts(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.mark.parametrize(("width", "height"), SIZES)
-def test_the_bar_fits_and_nothing_moves_when_somebody_asks(
-    opens: Opens, width: int, height: int
-) -> None:
+def publish_at(page: Page, size: tuple[int, int]) -> FloatRect:
+    """Where the button is in a window of this size."""
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.evaluate(DRAWN)
+    return place(button(page, "Publish"))
+
+
+def test_the_bar_fits_and_nothing_moves_when_somebody_asks(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
-    for page in (first, second):
-        page.set_viewport_size({"width": width, "height": height})
-    size = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     take(first)
-    before = button(first, "Publish").bounding_box()
+    before = {size: publish_at(first, size) for size in SIZES}
     tap(second, "Request control")
     expect(button(first, "Keep")).to_be_visible()
-    assert button(first, "Publish").bounding_box() == before
-    for page in (first, second):
-        assert page.evaluate(size) <= [width, height]
-        assert bar(page).evaluate("e => e.scrollWidth <= e.clientWidth")
-        bar(page).click()
-        whole = page.locator("#whole p")
-        expect(whole).to_have_text(bar(page).text_content() or "")
-        assert whole.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
-        page.keyboard.press("Escape")
-        for one in page.locator("#control button:visible").all():
-            box = place(one)
-            assert box["height"] >= 44
-            assert box["width"] * 0.22 >= 19.9
-    left, right = button(first, "Give").bounding_box(), button(first, "Keep").bounding_box()
-    assert left is not None
-    assert right is not None
-    assert (right["x"] - left["x"] - left["width"]) * 0.22 >= 4.9
+    for width, height in SIZES:
+        assert publish_at(first, (width, height)) == before[width, height]
+        for page in (first, second):
+            page.set_viewport_size({"width": width, "height": height})
+            page.evaluate(DRAWN)
+            assert page.evaluate(SCROLLED) <= [width, height]
+            assert bar(page).evaluate("e => e.scrollWidth <= e.clientWidth")
+            bar(page).click()
+            whole = page.locator("#whole p")
+            expect(whole).to_have_text(bar(page).text_content() or "")
+            assert whole.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
+            page.keyboard.press("Escape")
+            for one in page.locator("#control button:visible").all():
+                box = place(one)
+                assert box["height"] >= 44
+                assert box["width"] * 0.22 >= 19.9
+        left, right = place(button(first, "Give")), place(button(first, "Keep"))
+        assert (right["x"] - left["x"] - left["width"]) * 0.22 >= 4.9
 
 
 # With all lamps at their longest: where they begin and end, and where the header's last key ends.
@@ -70,17 +77,17 @@ LONGEST = """() => {
 }"""
 
 
-@pytest.mark.parametrize(("width", "height"), SIZES)
 def test_beside_the_banner_the_lamps_keep_their_place_whatever_they_say(
-    servers: Keep, page: Page, width: int, height: int
+    demo: Server, page: Page
 ) -> None:
-    page.set_viewport_size({"width": width, "height": height})
-    page.goto(servers(Server(ROOT)).url)
-    expect(page.locator("#banner")).to_be_visible()
-    expect(page.locator('.lamps > :not([data-state="ok"])')).to_have_count(0)
-    left, then_left, right, then_right, end = page.evaluate(LONGEST)
-    assert (left, right) == (then_left, then_right)
-    assert end <= width
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(demo.url)
+        expect(page.locator("#banner")).to_be_visible()
+        expect(page.locator('.lamps > :not([data-state="ok"])')).to_have_count(0)
+        left, then_left, right, then_right, end = page.evaluate(LONGEST)
+        assert (left, right) == (then_left, then_right)
+        assert end <= width
 
 
 def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:

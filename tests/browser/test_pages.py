@@ -278,8 +278,9 @@ def test_a_restarted_server_opens_by_a_fresh_snapshot(
 
 
 def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
-    server: Server, node: RosNode, page: Page
+    server: Server, node: RosNode, own_page: Page
 ) -> None:
+    page = own_page
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
     posts: list[Request] = []

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.bridge.test_parameters_on_bridge import PANEL
 from tests.support import cyclone
@@ -66,8 +66,9 @@ def test_texts_and_switches_are_set(kiosk: Server, robot: CycloneRobot, page: Pa
 
 
 def test_what_the_robot_says_before_the_receipt_is_in_the_input_after_it(
-    kiosk: Server, robot: CycloneRobot, page: Page
+    kiosk: Server, robot: CycloneRobot, own_page: Page
 ) -> None:
+    page = own_page
     limit = widget(page, "limit")
 
     def late(route: Route) -> None:
@@ -164,10 +165,9 @@ def test_what_is_read_only_has_no_button(kiosk: Server, page: Page) -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1024, 600)])
 def test_targets_fit_gloves_and_nothing_moves_when_a_lock_comes(
-    kiosk: Server, robot: CycloneRobot, chromium: Browser, width: int, height: int
+    kiosk: Server, robot: CycloneRobot, page: Page, width: int, height: int
 ) -> None:
-    context = chromium.new_context(viewport={"width": width, "height": height})
-    page = context.new_page()
+    page.set_viewport_size({"width": width, "height": height})
     page.goto(kiosk.url)
     expect(page.get_by_role("button", name="Set Speed", exact=True)).to_be_enabled()
     places = """() => [
@@ -186,7 +186,6 @@ def test_targets_fit_gloves_and_nothing_moves_when_a_lock_comes(
     expect(page.get_by_role("button", name="Set Speed", exact=True)).to_be_disabled()
     assert page.evaluate(places) == before
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    context.close()
 
 
 def test_a_page_without_its_server_shows_old_values(kiosk: Server, page: Page) -> None:

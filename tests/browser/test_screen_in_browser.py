@@ -5,10 +5,11 @@ from collections.abc import Iterator
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.test_layout_in_browser import PANEL
-from tests.support.pages import place
+from tests.support.browsers import sized
+from tests.support.pages import DRAWN, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready
 
@@ -102,39 +103,33 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-def sized(page: Page, width: int, height: int) -> Page:
-    page.set_viewport_size({"width": width, "height": height})
-    return page
-
-
 def button(page: Page, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_nothing_overflows_on_any_screen(
-    cell: Server, several: Server, page: Page, width: int, height: int
-) -> None:
-    sized(page, width, height)
+@pytest.mark.parametrize("look", ["normal", "large"])
+def test_nothing_overflows_on_any_screen(cell: Server, several: Server, page: Page, look: str) -> None:
     for url in (f"{cell.url}/pages/cell", f"{cell.url}/pages/setup", several.url):
-        for look in ("normal", "large"):
-            page.context.add_cookies([{"name": "kiosk_text_size", "value": look, "url": url}])
-            page.goto(url)
-            expect(page.locator("#clock")).not_to_be_empty()
-            assert page.evaluate(OVERFLOWS) == [], f"{url}, {look}"
-            assert page.evaluate(CUT) == [], f"{url}, {look}"
+        page.context.add_cookies([{"name": "kiosk_text_size", "value": look, "url": url}])
+        page.goto(url)
+        expect(page.locator(f'html[data-text-size="{look}"]')).to_be_attached()
+        expect(page.locator("#clock")).not_to_be_empty()
+        for width, height in SCREENS:
+            sized(page, width, height).evaluate(DRAWN)
+            assert page.evaluate(OVERFLOWS) == [], f"{url}, {width}"
+            assert page.evaluate(CUT) == [], f"{url}, {width}"
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_the_frame_stays_where_it_is_when_the_page_scrolls(
-    several: Server, page: Page, width: int, height: int
-) -> None:
-    sized(page, width, height).goto(several.url)
-    header = page.locator("header").bounding_box()
-    page.locator("main").evaluate("(main) => main.scrollTo(0, main.scrollHeight)")
-    assert page.locator("header").bounding_box() == header
-    last = page.locator(".cell:visible").last
-    expect(last).to_be_in_viewport()
+def test_the_frame_stays_where_it_is_when_the_page_scrolls(several: Server, page: Page) -> None:
+    page.goto(several.url)
+    for width, height in SCREENS:
+        sized(page, width, height).evaluate(DRAWN)
+        page.locator("main").evaluate("(main) => main.scrollTo(0, 0)")
+        header = page.locator("header").bounding_box()
+        page.locator("main").evaluate("(main) => main.scrollTo(0, main.scrollHeight)")
+        assert page.locator("header").bounding_box() == header
+        last = page.locator(".cell:visible").last
+        expect(last).to_be_in_viewport()
 
 
 def shown_groups(page: Page) -> list[str]:
@@ -170,13 +165,12 @@ def test_groups_that_have_no_room_side_by_side_take_turns(
     assert page.evaluate(OVERFLOWS) == []
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS[:4])
-def test_without_scripts_all_groups_are_there(
-    cell: Server, without_scripts: Page, width: int, height: int
-) -> None:
-    sized(without_scripts, width, height).goto(f"{cell.url}/pages/cell")
-    assert shown_groups(without_scripts) == ["Production", "Belt", "Cell"]
-    expect(without_scripts.locator(".group-tab:visible")).to_have_count(0)
+def test_without_scripts_all_groups_are_there(cell: Server, without_scripts: Page) -> None:
+    without_scripts.goto(f"{cell.url}/pages/cell")
+    for width, height in SCREENS[:4]:
+        sized(without_scripts, width, height)
+        assert shown_groups(without_scripts) == ["Production", "Belt", "Cell"]
+        expect(without_scripts.locator(".group-tab:visible")).to_have_count(0)
 
 
 def test_a_phone_only_shows(cell: Server, page: Page) -> None:
@@ -261,33 +255,31 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     expect(page.locator("#whole")).to_be_hidden()
 
 
-@pytest.mark.parametrize("scripts", [True, False])
-@pytest.mark.parametrize(("width", "height"), SCREENS[:4])
 def test_the_menu_leads_to_the_log_and_changes_the_look(
-    cell: Server, chromium: Browser, width: int, height: int, scripts: bool
+    cell: Server, page: Page, without_scripts: Page
 ) -> None:
-    context = chromium.new_context(
-        viewport={"width": width, "height": height}, java_script_enabled=scripts
-    )
-    page = context.new_page()
-    page.goto(f"{cell.url}/pages/setup")
-    menu, root = page.locator("#menu"), page.locator("html")
-    expect(menu).to_be_hidden()
-    button(page, "Menu").click()
-    expect(menu).to_be_visible()
-    for one in menu.locator("a:visible, button:visible").all():
-        box = place(one)
-        assert box["height"] >= 44
-        assert box["x"] + box["width"] <= width
-    button(page, "Dark").click()
-    expect(root).to_have_attribute("data-theme", "dark")
-    assert page.url == f"{cell.url}/pages/setup"
-    button(page, "Menu").click()
-    expect(button(page, "Dark")).to_have_attribute("aria-pressed", "true")
-    menu.get_by_role("link").click()
-    expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
-    expect(root).to_have_attribute("data-theme", "dark")
-    context.close()
+    for shown in (page, without_scripts):
+        shown.goto(f"{cell.url}/pages/setup")
+        menu, root = shown.locator("#menu"), shown.locator("html")
+        for width, height in SCREENS[:4]:
+            sized(shown, width, height)
+            expect(menu).to_be_hidden()
+            button(shown, "Menu").click()
+            expect(menu).to_be_visible()
+            for one in menu.locator("a:visible, button:visible").all():
+                box = place(one)
+                assert box["height"] >= 44
+                assert box["x"] + box["width"] <= width
+            shown.keyboard.press("Escape")
+        button(shown, "Menu").click()
+        button(shown, "Dark").click()
+        expect(root).to_have_attribute("data-theme", "dark")
+        assert shown.url == f"{cell.url}/pages/setup"
+        button(shown, "Menu").click()
+        expect(button(shown, "Dark")).to_have_attribute("aria-pressed", "true")
+        menu.get_by_role("link").click()
+        expect(shown.get_by_role("heading", name="Operator's log")).to_be_visible()
+        expect(root).to_have_attribute("data-theme", "dark")
 
 
 def test_the_tabs_change_sides(cell: Server, page: Page) -> None:

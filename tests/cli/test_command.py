@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError
+from pathlib import Path
 
 import pytest
 
@@ -107,7 +108,22 @@ def test_every_command_is_a_module_of_its_name(name: str) -> None:
     assert callable(module.main)
 
 
-def test_to_check_a_panel_takes_no_server() -> None:
-    code = "import sys; from app.cli.command import main; main(['check']); print(*sys.modules)"
-    said = subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, text=True)
-    assert {"uvicorn", "fastapi", "zenoh"} & set(said.split()) == set()
+def after(*words: str, said: str) -> list[str]:
+    """What an expression is in a new process after a command; its parts."""
+    code = (
+        f"import gc, sys; from app.cli.command import main; main({list(words)}); print(); print({said})"
+    )
+    output = subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, text=True)
+    return output.splitlines()[-1].split()
+
+
+def test_to_check_a_panel_takes_no_server_and_what_it_imports_is_left_alone() -> None:
+    said = "gc.isenabled(), gc.get_freeze_count() > len(gc.get_objects()), *sys.modules"
+    collects, frozen, *modules = after("check", said=said)
+    assert (collects, frozen) == ("True", "True")
+    assert {"uvicorn", "fastapi", "zenoh"} & set(modules) == set()
+
+
+def test_to_verify_a_log_takes_no_panel(tmp_path: Path) -> None:
+    modules = after("log", "verify", f"--data={tmp_path}", said="*sys.modules")
+    assert {"app.audit.verify"} == {"app.audit.verify", "app.panel", "pydantic"} & set(modules)

@@ -2,7 +2,6 @@
 
 import os
 import socket
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,17 +16,16 @@ from app.cli.arguments import environment
 from app.cli.command import main
 from app.settings import PACKAGE
 from app.web.serving import OPTIONS
+from tests.support import command
+from tests.support.command import COMMAND
 from tests.support.parts import ROOT, Process, free_port, until
 
 SHIPPED = PACKAGE / "panel.toml"
-RUN = [sys.executable, "-m", "app.cli", "run"]
 
 
 def said(*words: str, status: int, env: Mapping[str, str] | None = None) -> str:
     """What a start that fails says."""
-    done = subprocess.run(
-        [*RUN, *words], cwd=ROOT, env=env, capture_output=True, text=True, timeout=60, check=False
-    )
+    done = command.run(COMMAND, "run", *words, env=env)
     assert (done.returncode, done.stdout) == (status, "")
     assert "Traceback" not in done.stderr
     return done.stderr
@@ -38,7 +36,7 @@ def test_a_panel_file_is_all_that_it_needs(tmp_path: Path) -> None:
     panel.write_text(SHIPPED.read_text().replace('en = "Robot cell 1"', 'en = "My cell"'))
     options = ["--port", str(port), "--data", str(tmp_path / "data"), "--name", "cell1.local"]
     env = {"KIOSK_PANEL": str(SHIPPED)}  # what is said on the command line goes before it
-    process = Process([*RUN, str(panel), *options], env, cwd=ROOT)
+    process = Process([sys.executable, "-m", COMMAND, "run", str(panel), *options], env, cwd=ROOT)
     try:
         until(lambda: f"the panel is at http://127.0.0.1:{port}" in process.text, "it listens", 30)
         page = httpx.get(f"http://127.0.0.1:{port}/", headers={"host": "cell1.local"}, trust_env=False)

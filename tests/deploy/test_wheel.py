@@ -18,12 +18,18 @@ import pytest
 from ruamel.yaml import YAML
 
 from app.settings import PACKAGE
+from tests.support import locked
 from tests.support.parts import ROOT, Process, Server, free_port, until
 from tests.support.shown_commands import commands_for
 
 SHIPPED: Final = PACKAGE / "panel.toml"
 # What the pages' commands read and write of the machine is in a folder instead.
 PLACES: Final = ("opt", "etc/operator-panel", "var/lib/operator-panel", "backup/panel")
+# Two commands of the service page are done in another way, see `locked`; `make release` runs them.
+VENV: Final = "python3 -m venv /opt/operator-panel/current"
+DEPENDENCIES: Final = (
+    "/opt/operator-panel/current/bin/pip install --require-hashes -r requirements.lock"
+)
 ABSOLUTE: Final = re.compile(rf"(?<![\w.])/(?={'|'.join(PLACES)}\b)")
 RELEASE: Final = "/opt/operator-panel/current"  # where the service page installs it
 SERVICE: Final = "test_a_wheel_is_installed_as_the_service_page_says"
@@ -58,6 +64,17 @@ class Machine:
     def here(self, command: str) -> str:
         """A page's command, with this folder's paths."""
         return ABSOLUTE.sub(f"{self.root}/", command)
+
+    def install(self, command: str) -> None:
+        """A command of the service page."""
+        environment = Path(self.here(RELEASE))
+        if command == DEPENDENCIES:
+            locked.add_dependencies(environment)
+            return
+        done = self.run(command.replace(VENV, f"{VENV} --without-pip"))
+        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+        if command == VENV:
+            locked.add_pip(environment)
 
     def run(self, command: str) -> subprocess.CompletedProcess[str]:
         path = f"{Path(sys.executable).parent}:/usr/local/bin:/usr/bin:/bin"
@@ -97,14 +114,16 @@ def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
     (mine.root / "opt/operator-panel").mkdir()
     (mine.root / "opt/operator-panel/0.2").symlink_to("current")
     for command in of_pages(SERVICE):
-        done = mine.run(command)
-        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+        mine.install(command)
     return mine
 
 
 def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: Path) -> None:
     commands = of_pages(SERVICE)
-    assert sum("pip install" in one for one in commands) == 2
+    assert commands[:2] == [VENV, DEPENDENCIES]
+    assert [one for one in commands if "pip install" in one][1:] == [commands[2]]
+    requirements = machine.run(f"{RELEASE}/bin/pip check")
+    assert requirements.returncode == 0, requirements.stdout
     version = machine.run(f"{RELEASE}/bin/operator-panel --version")
     assert version.stdout.split() == ["operator-panel", wheel.name.split("-")[1]]
     check = machine.run(f"{RELEASE}/bin/operator-panel check /etc/operator-panel/panel.toml")
@@ -118,6 +137,12 @@ def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: 
         "of('jazzy').service_types('std_srvs/srv/SetBool')"
     )
     assert machine.run(f"{RELEASE}/bin/python -c {shlex.quote(services)}").returncode == 0
+
+
+def test_the_dependencies_of_the_tests_are_those_that_are_locked_for_the_panel() -> None:
+    of_tests = locked.entries(ROOT / "tests/requirements.lock")
+    assert len(locked.entries(locked.LOCK)) > 20
+    assert locked.entries(locked.LOCK).items() <= of_tests.items()
 
 
 def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: Path) -> None:

@@ -17,11 +17,24 @@ RECORDING: Final = "cell1-2026-05-04.mcap"
 
 
 def runs() -> list[tuple[Row, Shown]]:
-    """Each command that is run here, once; those with the same beside them follow one another."""
+    """Each command that is run here, once; those with the same beside them follow one another, and come
+    after what runs beside them."""
     once = {one.command: one for one in reversed(shown())}
     found = [(row, one) for one in once.values() if (row := row_of(one.command)) and row.kind == "run"]
     order = rows()
-    return sorted(found, key=lambda pair: (pair[0].text("beside"), order.index(pair[0])))
+
+    def place(pair: tuple[Row, Shown]) -> tuple[str, bool, int]:
+        row, one = pair
+        needed = row.text("beside")
+        return needed or runs_beside(one.command), bool(needed), order.index(row)
+
+    return sorted(found, key=place)
+
+
+def runs_beside(command: str) -> str:
+    """The name of what is beside commands, and started by this command; "" for none."""
+    names = {row.text("beside") for row in rows()}
+    return next((name for name in names if name and beside()[name]["command"] == command), "")
 
 
 class Machine:
@@ -30,7 +43,7 @@ class Machine:
     def __init__(self, folder: Path) -> None:
         self.shell = Shell(folder)
         self._name = ""
-        self._beside: Process | None = None
+        self.running: Process | None = None
         # `checkout` has links to the repository's files: these are its own.
         (self.shell.checkout / "cell1.toml").write_text(STEPS[-1])
         mcap_file(folder).rename(self.shell.checkout / RECORDING)
@@ -39,11 +52,11 @@ class Machine:
         """Has that run and nothing else; "" is nothing."""
         if name == self._name:
             return
-        if self._beside is not None:
-            self.shell.interrupt(self._beside)
-            self._beside = None
+        if self.running is not None:
+            self.shell.interrupt(self.running)
+            self.running = None
         if name:
-            self._beside = self.shell.start(**_command(name))
+            self.running = self.shell.start(**_command(name))
         self._name = name
 
 
@@ -81,6 +94,11 @@ def test_what_is_not_run_here_has_its_reason_or_its_test(row: Row) -> None:
 
 @pytest.mark.parametrize(("row", "one"), runs(), ids=lambda value: getattr(value, "place", ""))
 def test_it_does_what_its_page_says(machine: Machine, row: Row, one: Shown) -> None:
+    if name := runs_beside(one.command):
+        machine.beside(name)
+        assert machine.running is not None
+        assert machine.running.count(row.text("until"))
+        return
     machine.beside(row.text("beside"))
     if wanted := row.text("until"):
         machine.shell.interrupt(machine.shell.start(one.command, wanted))

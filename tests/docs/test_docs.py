@@ -3,8 +3,6 @@
 import json
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +14,7 @@ from app.panel import load_panel
 from app.settings import PREFIX, VARIABLES
 from app.web.serving import OPTIONS
 from bench.report import BEGIN, END
+from tests.support import command
 from tests.support.parts import ROOT, Server, as_response, until
 from tests.test_imports import ROOMS
 
@@ -144,11 +143,9 @@ def test_the_example_of_a_snapshot_can_be_asked_for(kiosk: Server) -> None:
 
 
 def test_the_log_is_verified_as_its_page_shows(kiosk: Server) -> None:
-    _, *command = shlex.split(shown("operators-log.md", "sh")[0])
-    run = subprocess.run(
-        [sys.executable, *command, "--data", str(kiosk.data)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    words = shlex.split(shown("operators-log.md", "sh")[0])
+    assert words[1] == "-m"
+    run = command.run(*words[2:], "--data", str(kiosk.data))
     assert (run.returncode, run.stdout[:4]) == (0, "ok, "), run.stderr
 
 

@@ -2,8 +2,6 @@
 
 import re
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Final
@@ -11,6 +9,7 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
+from tests.support import command
 from tests.support.parts import ROOT, Server
 
 DOCS: Final = ROOT / "docs"
@@ -109,7 +108,6 @@ def test_a_backup_of_a_running_servers_log_is_whole(demo: Server, tmp_path: Path
         closing(sqlite3.connect(tmp_path / name)) as copy,
     ):
         log.backup(copy)  # as sqlite3's .backup does
-    command = [sys.executable, "-m", "app.log", "verify", "--data", str(tmp_path)]
-    verified = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    verified = command.run("app.log", "verify", "--data", str(tmp_path))
     assert verified.returncode == 0, verified.stdout + verified.stderr
     assert int(verified.stdout.split()[1]) >= 3

@@ -3,7 +3,6 @@
 import re
 import shlex
 import subprocess
-import sys
 from collections.abc import Callable
 from itertools import accumulate
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
+from tests.support import command
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
 
 TEXT: Final = (ROOT / "docs/tutorial.md").read_text()
@@ -44,14 +44,7 @@ def loads(server: Server) -> bool:
 
 def checked(folder: Path) -> subprocess.CompletedProcess[str]:
     """The tutorial's check, in a folder that has the file."""
-    return subprocess.run(
-        [sys.executable, *shlex.split(CHECK)[1:]],
-        cwd=folder,
-        env={"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return command.run(*shlex.split(CHECK)[2:], folder=folder, env={})
 
 
 def test_each_command_is_one_that_these_tests_know() -> None:

@@ -3,6 +3,7 @@
 import os
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
@@ -61,10 +62,14 @@ class SwayScreen(KioskScreen):
         self._keyboard = subprocess.Popen(["wtype", "-s", "1000000"], env=self._env)
         until(lambda: self.evaluate("document.hasFocus()"), "the page has the focus")
 
-    def end(self) -> None:
+    def unplug_keyboard(self) -> None:
         if self._keyboard is not None:
             self._keyboard.kill()
             self._keyboard.wait()
+            self._keyboard = None
+
+    def end(self) -> None:
+        self.unplug_keyboard()
         super().end()
 
     def picture(self) -> tuple[int, int, bytes]:
@@ -85,30 +90,53 @@ class SwayScreen(KioskScreen):
         subprocess.run(["swaymsg", "-s", socket, "--", *command], check=False, capture_output=True)
 
 
+def started(server: Server, folder: Path, *options: str) -> SwayScreen:
+    """A screen that shows the panel."""
+    panel = f"--panel={ROOT / 'app/panel.toml'}"
+    screen = SwayScreen(
+        server.url, folder / "r", panel, *options, before=NO_ROOT, flags=WITHOUT_GPU, **NO_SCREEN
+    )
+    try:
+        until(screen.lives, "the panel is shown")
+    except BaseException:
+        screen.end()
+        raise
+    return screen
+
+
 @pytest.fixture
 def sway(tmp_path: Path, demo: Server) -> Iterator[Callable[..., SwayScreen]]:
-    made: list[SwayScreen] = []
+    """Starts a screen with options of the test's own."""
+    with ExitStack() as stack:
 
-    def make(*options: str) -> SwayScreen:
-        panel = f"--panel={ROOT / 'app/panel.toml'}"
-        screen = SwayScreen(
-            demo.url, tmp_path / "r", panel, *options, before=NO_ROOT, flags=WITHOUT_GPU, **NO_SCREEN
-        )
-        made.append(screen)
-        until(screen.lives, "the panel is shown")
-        return screen
+        def make(*options: str) -> SwayScreen:
+            screen = started(demo, tmp_path, *options)
+            stack.callback(screen.end)
+            return screen
 
-    yield make
-    for screen in made:
-        screen.end()
+        yield make
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory, demo: Server) -> Iterator[SwayScreen]:
+    screen = started(demo, tmp_path_factory.mktemp("usual"))
+    yield screen
+    screen.end()
+
+
+@pytest.fixture
+def screen(usual: SwayScreen) -> Iterator[SwayScreen]:
+    """The screen without options, which the tests of this file share."""
+    until(usual.lives, "the panel is shown")
+    yield usual
+    usual.unplug_keyboard()
 
 
 def colours(pixels: bytes) -> set[bytes]:
     return {pixels[at : at + 3] for at in range(0, len(pixels) - 2, 3)}
 
 
-def test_the_panel_fills_the_screen(sway: Callable[..., SwayScreen]) -> None:
-    screen = sway()
+def test_the_panel_fills_the_screen(screen: SwayScreen) -> None:
     width, height, _ = screen.picture()
     assert (width, height) == PICTURE
     assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE]
@@ -121,8 +149,7 @@ def test_a_rotated_screen_is_laid_out_upright(sway: Callable[..., SwayScreen]) -
     assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE[::-1]]
 
 
-def test_no_key_leads_out_of_the_panel(sway: Callable[..., SwayScreen]) -> None:
-    screen = sway()
+def test_no_key_leads_out_of_the_panel(screen: SwayScreen) -> None:
     screen.plug_in_keyboard()
     screen.evaluate("window.before = devicePixelRatio")
     screen.evaluate(COLLECT_KEYS)
@@ -157,8 +184,7 @@ def test_what_wakes_a_dark_screen_does_not_reach_the_panel(
     assert set(until(typed, "keys arrive again", every_s=0.2)) == {"b"}
 
 
-def test_a_compositor_that_ends_is_started_again(sway: Callable[..., SwayScreen]) -> None:
-    screen = sway()
+def test_a_compositor_that_ends_is_started_again(screen: SwayScreen) -> None:
     screen.evaluate("window.before = true")
     screen.tell("exit")
     until(lambda: not screen.evaluate("window.before"), "the page is gone")

@@ -54,10 +54,19 @@ def screens(tmp_path: Path) -> Iterator[Callable[..., KioskScreen]]:
         one.end()
 
 
-@pytest.fixture
-def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
-    mine = live(bridge.endpoint, tmp_path)
+@pytest.fixture(scope="module")
+def server(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = live(bridge.endpoint, tmp_path_factory.mktemp("server"))
     until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def screen(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[KioskScreen]:
+    """One for all faults: each comes to a watcher that has met others."""
+    folder = tmp_path_factory.mktemp("screen") / "run"
+    mine = KioskScreen(server.url, folder, "--compositor=none", f"--panel={PANEL}")
     yield mine
     mine.end()
 
@@ -77,14 +86,29 @@ def heard(node: RosNode, name: str) -> list[str]:
 
 # These leave the page as it is.
 PAGE_STAYS: Final = {"GPU process killed", "another window"}
+# Noticed by the longest silence: of the browser, of what it draws, of the page's events. With these it
+# is measured how soon the panel is back; of the others it is shown that it is.
+LATEST: Final = {"browser frozen", "GPU process frozen", "scripts stopped"}
 
 
 @pytest.mark.real_time
-@pytest.mark.parametrize("fault", FAULTS)
-def test_what_hangs_or_crashes_is_back_and_no_press_is_lost_or_doubled(
-    server: Server, node: RosNode, screens: Callable[..., KioskScreen], fault: str
+@pytest.mark.parametrize("fault", sorted(LATEST))
+def test_the_panel_is_back_within_ten_seconds(
+    server: Server, node: RosNode, screen: KioskScreen, fault: str
 ) -> None:
-    screen = screens(server.url, f"--panel={PANEL}")
+    took_s = break_and_press_on(server, node, screen, fault)
+    assert took_s < BACK_WITHIN_S, screen.process.text
+
+
+@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - LATEST))
+def test_what_hangs_or_crashes_is_back(
+    server: Server, node: RosNode, screen: KioskScreen, fault: str
+) -> None:
+    break_and_press_on(server, node, screen, fault)
+
+
+def break_and_press_on(server: Server, node: RosNode, screen: KioskScreen, fault: str) -> float:
+    """The seconds until the panel is back. No press is lost or doubled."""
     until(screen.lives, "the panel is shown")
     name = f"{fault} {secrets.token_hex(4)}"
     screen.press_on(name)
@@ -107,7 +131,7 @@ def test_what_hangs_or_crashes_is_back_and_no_press_is_lost_or_doubled(
     arrived = heard(node, name)
     assert published(server, name) == arrived
     assert len(arrived) == len(set(arrived))
-    assert took_s < BACK_WITHIN_S, screen.process.text
+    return took_s
 
 
 def test_it_waits_for_the_server_in_the_panels_languages(

@@ -1,8 +1,6 @@
 """`python -m app.check`: what it prints, and its exit status."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ from app.cli.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE
+from tests.support import command
 from tests.support.parts import TESTS
 
 SHIPPED = PACKAGE / "panel.toml"
@@ -154,8 +153,7 @@ def test_the_whole_message_of_each_press_is_printed(
 def test_the_exit_status_says_good_faulty_or_unreadable(tmp_path: Path, text: str, status: int) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(text)
-    command = [sys.executable, "-m", "app.check", str(path)]
-    ended = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True, check=False)
+    ended = command.run("app.check", str(path))
     assert ended.returncode == status
     assert "Traceback" not in ended.stderr
 

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from tests.support.forked import Forked, as_here
+
 ENDS_WITHIN_S: Final = 10.0
 
 
@@ -26,14 +28,19 @@ class Commanded:
 
     def start(self) -> None:
         """Starts the program, or restarts it after its end."""
-        self._process: subprocess.Popen[str] = subprocess.Popen(
+        self._process = self._started()
+        self.first = self._answer()
+
+    def _started(self) -> subprocess.Popen[str] | Forked:
+        if self._options.keys() == {"env"} and as_here():
+            return Forked.ros_program(self._command, self._options["env"])
+        return subprocess.Popen(
             self._command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             **self._options,
         )
-        self.first = self._answer()
 
     @property
     def pid(self) -> int:

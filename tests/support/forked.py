@@ -1,4 +1,5 @@
-"""Kiosk servers forked from one process, see `kiosk_parent`, with the interface of `Popen`."""
+"""Processes forked from one that has imported what they need, with the interface of `Popen`: kiosk
+servers, see `kiosk_parent`, and ROS 2 nodes, see `ros_parent`."""
 
 import atexit
 import json
@@ -12,9 +13,10 @@ import threading
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, Literal
 
 ROOT: Final = Path(__file__).resolve().parent.parent.parent
+KIOSK_PARENT: Final = "tests.support.kiosk_parent"
 # Variables that take effect only at the start of a process.
 AT_BEGIN: Final = ("LD_", "MALLOC", "PYTHON")
 NETWORK: Final = Path("/proc/thread-self/ns/net")  # a test may have moved its thread into another one
@@ -23,26 +25,28 @@ APPS: Final = ("app.main:", "tests.support.apps.")
 FORKED_TOO: Final = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": ""}
 
 
+def as_here() -> bool:
+    """Whether a child of a parent that was started before is as one that is started here and now."""
+    return NETWORK.stat().st_ino == OURS and os.environ.get("FAULTS") != "long"
+
+
 def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> bool:
     """Whether the command starts this project's server with this Python and no special environment."""
     if list(command[:3]) != [sys.executable, "-m", "uvicorn"] or folder != ROOT:
         return False
-    if not command[3].startswith(APPS):
-        return False
-    if NETWORK.stat().st_ino != OURS or os.environ.get("FAULTS") == "long":
-        return False
     special = {name: value for name, value in env.items() if name.startswith(AT_BEGIN)}
-    return "--reload" not in command and special.items() <= FORKED_TOO.items()
+    ordinary = "--reload" not in command and special.items() <= FORKED_TOO.items()
+    return as_here() and ordinary and command[3].startswith(APPS)
 
 
 @cache
-def _parent() -> socket.socket:
-    """The socket to the parent of all forked servers, which is started on first use."""
+def _parent(python: str, module: str) -> socket.socket:
+    """The socket to a parent of forked processes, which is started on first use."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for one in (ours, theirs):
         one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.support.kiosk_parent", str(theirs.fileno())],
+        [python, "-m", module, str(theirs.fileno())],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": ""},
         pass_fds=[theirs.fileno()],
@@ -58,23 +62,52 @@ def _parent() -> socket.socket:
 
 
 class Forked:
-    """A forked server; the subset of `Popen` that the tests use."""
+    """A forked process; the subset of `Popen` that the tests use. `piped` are those of the standard
+    streams that are pipes to here, the others are those of this process."""
 
-    stdin = stdout = None
-
-    def __init__(self, command: Sequence[str], env: Mapping[str, str]) -> None:
-        self.args = command
+    def __init__(
+        self,
+        parent: socket.socket,
+        arguments: Sequence[str],
+        env: Mapping[str, str],
+        piped: Sequence[Literal["stdin", "stdout", "stderr"]],
+    ) -> None:
+        self.args = arguments
         self.returncode: int | None = None
         self._lock = threading.Lock()
-        stderr, stderr_writer = os.pipe2(os.O_CLOEXEC)
-        self._status, status_writer = os.pipe2(os.O_CLOEXEC)
-        order = json.dumps({"arguments": list(command[3:]), "env": {**os.environ, **env}})
-        socket.send_fds(_parent(), [order.encode()], [stderr_writer, status_writer])
-        os.close(stderr_writer)
-        os.close(status_writer)
-        self.stderr: IO[str] = open(stderr, encoding="utf-8")  # noqa: SIM115 - closed by the reader
-        self._text = b""
+        files = {"stdin": 0, "stdout": 1, "stderr": 2}
+        streams: dict[str, IO[str]] = {}
+        for name in piped:
+            read, write = os.pipe2(os.O_CLOEXEC)
+            ours, files[name] = (write, read) if name == "stdin" else (read, write)
+            mode = "w" if name == "stdin" else "r"
+            streams[name] = os.fdopen(ours, mode, encoding="utf-8")  # closed by who reads or writes
+        self.stdin, self.stdout, self.stderr = map(streams.get, files)
+        self._status, files["status"] = os.pipe2(os.O_CLOEXEC)
+        order = json.dumps({"arguments": list(arguments), "env": dict(env)})
+        socket.send_fds(parent, [order.encode()], list(files.values()))
+        for theirs in (*piped, "status"):
+            os.close(files[theirs])
         self.pid = int(self._line(None) or 0)
+
+    @classmethod
+    def server(cls, command: Sequence[str], env: Mapping[str, str]) -> "Forked":
+        """A kiosk server whose stderr is read."""
+        parent = _parent(sys.executable, KIOSK_PARENT)
+        return cls(parent, [str(ROOT), *command[2:]], {**os.environ, **env}, ["stderr"])
+
+    @classmethod
+    def command(cls, folder: Path, words: Sequence[str], env: Mapping[str, str]) -> "Forked":
+        """`python -m WORDS` in a folder, with one of the project's modules; its output is read."""
+        parent = _parent(sys.executable, KIOSK_PARENT)
+        return cls(parent, [str(folder), *words], env, ["stdout", "stderr"])
+
+    @classmethod
+    def ros_program(cls, command: Sequence[str], env: Mapping[str, str]) -> "Forked":
+        """A program of `tests/ros` that is controlled by stdin and stdout."""
+        return cls(
+            _parent(command[0], "tests.support.ros_parent"), command[1:], env, ["stdin", "stdout"]
+        )
 
     def _line(self, timeout_s: float | None) -> bytes | None:
         """The next line of the status pipe (the pid, then the exit code); None at the timeout."""
@@ -83,7 +116,7 @@ class Forked:
         line = bytearray()
         while not line.endswith(b"\n"):
             byte = os.read(self._status, 1)
-            assert byte, f"the parent of the kiosks has ended before {self.args!r}"
+            assert byte, f"the parent has ended before {self.args!r}"
             line += byte
         return bytes(line)
 

@@ -10,6 +10,9 @@ HIDE: Final = """(hidden) => {
   document.dispatchEvent(new Event("visibilitychange"));
 }"""
 
+# Waits until what a new size changes is drawn.
+DRAWN: Final = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
 # The heights that the rows of a group need, without the room that is left over.
 ROWS: Final = """(number) => {
   const grid = document.querySelector(`[data-group="${number}"] > .grid`);

@@ -94,7 +94,7 @@ class Process:
     def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
         self._process: subprocess.Popen[str] | Forked
         if can_fork(command, env, options.get("cwd")):
-            self._process = Forked(command, env)
+            self._process = Forked.server(command, env)
         else:
             self._process = subprocess.Popen(
                 command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options

@@ -79,7 +79,8 @@ class KioskScreen:
         page = self.evaluate(LOOK)
         if not page or not page["url"].startswith(self.url) or page["age_s"] is None:
             return False
-        return bool(page["drawn"] and page["age_s"] < ALIVE_WITHIN_S)
+        runs = self.evaluate("'operatorPanel' in window")  # until then it is as young as its document
+        return bool(runs and page["drawn"] and page["age_s"] < ALIVE_WITHIN_S)
 
     def press_on(self, name: str) -> None:
         self.evaluate(f"({PRESS_ON})({json.dumps(name)})")

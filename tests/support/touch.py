@@ -5,8 +5,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Page, expect
 
+from tests.support.browsers import SIZE, sized
 from tests.support.pages import place
 from tests.support.parts import ENOUGH_S, Server, until
 from tests.support.servers import demo_server
@@ -172,26 +173,24 @@ def opened(context: BrowserContext, server: Server, path: str = "/") -> Iterator
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(server.url + path)
-    expect(page.locator("html[data-floor]")).to_be_attached()
-    yield page
+    yield loaded(page, server, path)
     context.close()
     assert errors == []
 
 
-@contextmanager
-def touched(
-    chromium: Browser, server: Server, size: tuple[int, int] = SIZES[0], **options: Any
-) -> Iterator[Page]:
-    """A page on a screen that is touched, with the page's scripts ready."""
-    width, height = size
-    context = chromium.new_context(
-        viewport={"width": width, "height": height}, has_touch=True, **options
-    )
-    with opened(context, server) as page:
-        if page.locator("template:is(#keypad, #keyboard)").count():
-            expect(page.locator("body[data-touch-entry]")).to_be_attached()
-        yield page
+def loaded(page: Page, server: Server, path: str = "/") -> Page:
+    """The page with a page of the server and its scripts."""
+    page.goto(server.url + path)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    return page
+
+
+def touched(page: Page, server: Server, size: tuple[int, int] = SIZE) -> Page:
+    """The page, on a screen that is touched, with the server's first page and its scripts."""
+    loaded(sized(page, *size), server)
+    if page.locator("template:is(#keypad, #keyboard)").count():
+        expect(page.locator("body[data-touch-entry]")).to_be_attached()
+    return page
 
 
 class Keys:

@@ -60,11 +60,9 @@ def published(kiosk: Server) -> dict[str, Any] | None:
     return receipt if receipt["outcome"] == "published" else None
 
 
-def check(project: Path, panel: str, *options: str) -> subprocess.CompletedProcess[str]:
-    path = project / "checked.toml"
-    path.write_text(panel)
+def check(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "app.check", *options, path],
+        [sys.executable, "-m", "app.check", *arguments],
         cwd=project,
         capture_output=True,
         text=True,
@@ -109,30 +107,31 @@ def test_a_new_command_takes_no_other_input_than_its_own(kiosk: Server) -> None:
 
 
 def test_app_check_knows_a_new_kind(project: Path) -> None:
-    panel = (project / "panel.toml").read_text()
-    good = check(project, panel, "--verbose")
+    good = check(project, "--verbose", "panel.toml")
     assert good.returncode == 0, good.stderr
     assert "publishes /operation1 (std_msgs/msg/String)" in good.stdout
     assert 'data: "one; two; three"' in good.stdout
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "faults"),
-    [
-        ('type = "std_msgs/msg/String"', 'type = "std_msgs/msg/Bool"', ["lines are for a string"]),
-        ('label = "Heard"', 'label = "Heard"\nmost = 0', ["page[0].widget[1].most", "1 or more"]),
-        ('label = "Heard"', 'label = "Heard"\nmots = 3', ['did you mean "most"?']),
-        ('text = "one', 'text = "{name} one', ['no input "name"']),
-        ('interlock = "operation"', 'interlock = "operate"', ['no interlock "operate"']),
-        ('kind = "lines"', 'kind = "line"', ['unknown kind "line"; did you mean "lines"?']),
-    ],
+MISTAKES: Final = (
+    ('type = "std_msgs/msg/String"', 'type = "std_msgs/msg/Bool"', ["lines are for a string"]),
+    ('label = "Heard"', 'label = "Heard"\nmost = 0', ["page[0].widget[1].most", "1 or more"]),
+    ('label = "Heard"', 'label = "Heard"\nmots = 3', ['did you mean "most"?']),
+    ('text = "one', 'text = "{name} one', ['no input "name"']),
+    ('interlock = "operation"', 'interlock = "operate"', ['no interlock "operate"']),
+    ('kind = "lines"', 'kind = "line"', ['unknown kind "line"; did you mean "lines"?']),
 )
-def test_app_check_finds_the_faults_of_a_new_kind(
-    project: Path, old: str, new: str, faults: list[str]
-) -> None:
+
+
+def test_app_check_finds_the_faults_of_a_new_kind(project: Path) -> None:
     panel = (project / "panel.toml").read_text()
-    assert panel.count(old) == 1
-    found = check(project, panel.replace(old, new))
-    assert found.returncode == 1, found.stdout
-    for fault in faults:
-        assert fault in found.stderr
+    names = [f"mistake{number}.toml" for number in range(len(MISTAKES))]
+    for name, (old, new, _) in zip(names, MISTAKES, strict=True):
+        assert panel.count(old) == 1
+        (project / name).write_text(panel.replace(old, new))
+    found = check(project, *names)
+    assert (found.returncode, found.stdout) == (1, "")
+    _, *said = re.split(r"^mistake\d\.toml can't be used:$", found.stderr, flags=re.MULTILINE)
+    for of_one, (_, new, faults) in zip(said, MISTAKES, strict=True):
+        for fault in faults:
+            assert fault in of_one, new

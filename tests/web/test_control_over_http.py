@@ -6,6 +6,7 @@ import io
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -55,31 +56,64 @@ class Client:
         return found[1]
 
 
-@pytest.fixture
-def kiosk(tmp_path: Path) -> Iterator[Server]:
-    path = control_panel(tmp_path, f"takeover_after_s = {FAST_S}")
+@contextmanager
+def started(folder: Path) -> Iterator[Server]:
+    path = control_panel(folder, f"takeover_after_s = {FAST_S}")
     mine = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_PROXIES=PROXY)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    try:
+        until(mine.ready, "ready")
+        yield mine
+    finally:
+        mine.end()
 
 
-@pytest.fixture
-def client(kiosk: Server) -> Iterator[Callable[..., Client]]:
-    """Makes clients that are closed with the test."""
+@contextmanager
+def clients_of(server: Server) -> Iterator[Callable[..., Client]]:
+    """Makes clients that are closed at the end."""
     made: list[Client] = []
 
     def make(address: str = "", base: str = "") -> Client:
-        made.append(Client(kiosk, address, base))
+        made.append(Client(server, address, base))
         return made[-1]
 
     yield make
     for one in made:
+        if server.process.running:
+            one.control("release")
         one.http.close()
 
 
-def test_a_press_needs_control(client: Callable[..., Client], kiosk: Server) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """That of all tests for which it does not matter what clients were there before."""
+    with started(tmp_path_factory.mktemp("control")) as mine:
+        yield mine
+
+
+@pytest.fixture
+def client(kiosk: Server) -> Iterator[Callable[..., Client]]:
+    """Makes clients of the shared server, where no client has control before and after the test."""
+    with clients_of(kiosk) as make:
+        assert kiosk.snapshot()["control"]["holder"] == ""
+        yield make
+
+
+@pytest.fixture
+def own_kiosk(tmp_path: Path) -> Iterator[Server]:
+    """A server of the test's own, which has seen no client."""
+    with started(tmp_path) as mine:
+        yield mine
+
+
+@pytest.fixture
+def own_client(own_kiosk: Server) -> Iterator[Callable[..., Client]]:
+    """Makes clients of the test's own server."""
+    with clients_of(own_kiosk) as make:
+        yield make
+
+
+def test_a_press_needs_control(own_client: Callable[..., Client], own_kiosk: Server) -> None:
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     free = ann.press()
     assert (free.status_code, free.json()["outcome"]) == (409, "refused")
     assert "No panel has control of the robot. Take control first." in free.json()["reason"]
@@ -88,15 +122,15 @@ def test_a_press_needs_control(client: Callable[..., Client], kiosk: Server) -> 
     refused = bob.press()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "Panel 1 (192.0.2.1) has control of the robot." in refused.json()["reason"]
-    assert kiosk.press("operation", "no cookie at all").status_code == 409
-    assert kiosk.by("socket").press("operation", "no cookie at all").status_code == 409
+    assert own_kiosk.press("operation", "no cookie at all").status_code == 409
+    assert own_kiosk.by("socket").press("operation", "no cookie at all").status_code == 409
     address = {"x-forwarded-for": "192.0.2.1"}
     for token, status in ((ann.http.cookies[COOKIE], 200), (bob.http.cookies[COOKIE], 409)):
-        with kiosk.socket(cookie=f"{COOKIE}={token}", **address) as socket:
+        with own_kiosk.socket(cookie=f"{COOKIE}={token}", **address) as socket:
             answer = socket.press(widget="operation", inputs={"message": "by socket"})
             assert answer.status_code == status, answer.json()
     names = ("Panel 1 (192.0.2.1)", "Panel 2 (192.0.2.2)", "a program (127.0.0.1)")
-    until(lambda: all(f"by {n} with" in kiosk.process.text for n in names), "the log names each")
+    until(lambda: all(f"by {n} with" in own_kiosk.process.text for n in names), "the log names each")
 
 
 def test_only_one_of_many_gets_it(client: Callable[..., Client]) -> None:
@@ -105,18 +139,18 @@ def test_only_one_of_many_gets_it(client: Callable[..., Client]) -> None:
     assert [one.press().status_code for one in clients] == [200] + [409] * 7
 
 
-def test_asking_granting_and_giving_up(client: Callable[..., Client], kiosk: Server) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+def test_asking_granting_and_giving_up(own_client: Callable[..., Client], own_kiosk: Server) -> None:
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     ann.take()
     assert bob.control("ask").json()["done"]
-    assert kiosk.snapshot()["control"]["asker"] == bob.id
-    assert kiosk.snapshot()["control"]["asker_name"] == "Panel 2 (192.0.2.2)"
+    assert own_kiosk.snapshot()["control"]["asker"] == bob.id
+    assert own_kiosk.snapshot()["control"]["asker_name"] == "Panel 2 (192.0.2.2)"
     assert bob.control("give", to=bob.id).status_code == 409
     granted = ann.control("give", to=bob.id)
     assert granted.json()["control"]["holder"] == bob.id
     assert (ann.press().status_code, bob.press().status_code) == (409, 200)
     assert bob.control("release").json()["done"]
-    assert kiosk.snapshot()["control"]["holder"] == ""
+    assert own_kiosk.snapshot()["control"]["holder"] == ""
     assert bob.press().status_code == 409
 
 
@@ -194,9 +228,9 @@ def test_a_request_goes_through_without_a_touch_of_the_holder(
 
 
 @pytest.mark.real_time
-def test_a_lost_holder_frees_it(client: Callable[..., Client], kiosk: Server) -> None:
-    ann = client("192.0.2.1")
-    with kiosk.stream() as stream:
+def test_a_lost_holder_frees_it(own_client: Callable[..., Client], own_kiosk: Server) -> None:
+    ann = own_client("192.0.2.1")
+    with own_kiosk.stream() as stream:
         stream.next("snapshot")
         ann.take()
         assert stream.next("control")[1]["holder"] == ann.id
@@ -207,8 +241,8 @@ def test_a_lost_holder_frees_it(client: Callable[..., Client], kiosk: Server) ->
     assert ann.press().status_code == 409
 
 
-def test_the_panel_at_the_cell_takes_over(client: Callable[..., Client]) -> None:
-    ann, cell = client("192.0.2.1"), client()
+def test_the_panel_at_the_cell_takes_over(own_client: Callable[..., Client]) -> None:
+    ann, cell = own_client("192.0.2.1"), own_client()
     ann.take()
     assert cell.take()
     reason = ann.press().json()["reason"]
@@ -223,17 +257,17 @@ def test_an_address_that_a_client_makes_up_is_not_the_cell(client: Callable[...,
 
 
 def test_the_first_page_of_the_panel_at_the_cell_takes_control(
-    client: Callable[..., Client], kiosk: Server
+    own_client: Callable[..., Client], own_kiosk: Server
 ) -> None:
-    cell = client()
-    assert kiosk.snapshot()["control"]["holder"] == ""  # by a program nothing is taken
+    cell = own_client()
+    assert own_kiosk.snapshot()["control"]["holder"] == ""  # by a program nothing is taken
     html = cell.http.get("/pages/operation", headers={"sec-fetch-dest": "document"}).text
     assert "This panel has control of the robot." in html
-    assert kiosk.snapshot()["control"]["holder"] == cell.id
+    assert own_kiosk.snapshot()["control"]["holder"] == cell.id
 
 
-def test_the_page_is_right_for_each_before_any_script(client: Callable[..., Client]) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+def test_the_page_is_right_for_each_before_any_script(own_client: Callable[..., Client]) -> None:
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     ann.take()
     until(lambda: ann.press().status_code == 200, "pressed")
     locked = re.compile(r'aria-describedby="why-operation receipt-operation" disabled')
@@ -277,6 +311,7 @@ def test_without_a_cookie_control_is_not_taken_but_a_cookie_given(kiosk: Server)
         first = program.post("/control/take", json={})
         assert (first.status_code, first.json()["done"]) == (409, False)
         assert program.post("/control/take", json={}).json()["done"]
+        assert program.post("/control/release", json={}).json()["done"]
 
 
 def test_pages_of_other_sites_get_no_control(kiosk: Server, client: Callable[..., Client]) -> None:
@@ -357,9 +392,9 @@ def test_a_form_that_is_sent_twice_is_one_act(client: Callable[..., Client]) -> 
 
 
 def test_acts_are_in_the_operators_log_its_page_and_its_csv(
-    client: Callable[..., Client], kiosk: Server
+    own_client: Callable[..., Client], own_kiosk: Server
 ) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     ann.take()
     bob.control("take", id="bobs-act")
     ann.control("release")
@@ -377,8 +412,8 @@ def test_acts_are_in_the_operators_log_its_page_and_its_csv(
     assert "Another panel has control. You can request it." in html
 
 
-def test_more_acts_than_a_client_may_are_refused(client: Callable[..., Client]) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+def test_more_acts_than_a_client_may_are_refused(own_client: Callable[..., Client]) -> None:
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     ann.take()
     answers = [bob.control("give", to="0" * 12) for _ in range(int(CLIENT_QUOTA.burst) * 3)]
     limited = next(one for one in answers if one.status_code == 429)
@@ -407,12 +442,14 @@ def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
 
 
 def test_after_a_restart_no_client_has_it(
-    client: Callable[..., Client], kiosk: Server, tmp_path: Path
+    own_client: Callable[..., Client], own_kiosk: Server, tmp_path: Path
 ) -> None:
-    ann = client("192.0.2.1")
+    ann = own_client("192.0.2.1")
     ann.take()
-    kiosk.process.end()
-    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
+    own_kiosk.process.end()
+    again = Server(
+        ROOT, own_kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY
+    )
     try:
         until(again.ready, "ready")
         ann.control("here", touched=True)

@@ -218,7 +218,8 @@ def test_a_page_presses_on_its_socket_and_gets_a_late_answer_there(kiosk: Server
     assert not socket.is_closed()
 
 
-def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, page: Page) -> None:
+def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, own_page: Page) -> None:
+    page = own_page
     sockets: list[WebSocket] = []
     page.on("websocket", lambda socket: sockets.append(socket))
     page.add_init_script(
@@ -240,8 +241,9 @@ def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, page: Page) 
 
 @pytest.mark.parametrize("fault", ["it does not open", "it breaks", "it hangs"])
 def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
-    kiosk: Server, page: Page, fault: str
+    kiosk: Server, own_page: Page, fault: str
 ) -> None:
+    page = own_page
     posts = posts_of(page)
     said: list[str | bytes] = []
     sockets: list[WebSocketRoute] = []

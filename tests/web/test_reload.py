@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
+from uvicorn import Config
+from uvicorn.supervisors.watchfilesreload import FileFilter
 
 from tests.support.parts import ROOT, Server
 
@@ -17,21 +19,35 @@ FOLDERS = ("app", "templates", "static")
 PATTERNS = ("*.toml", "*.json5", "*.html", "*.css", "*.js", "*.po", "*.msg", "*.srv", "*.action")
 RELOAD = ["--reload", *(f"--reload-dir={name}" for name in FOLDERS)]
 RELOAD += [f"--reload-include={pattern}" for pattern in PATTERNS]
+NO_SOURCES = {"", ".pyc", ".svg"}
+PANEL = "cell/panel.toml"
+FAULT = ('kind = "readout"', 'kind = "readuot" # <b>')
+SCREEN = "templates/screen.html"
+# What is said of each.
+TEMPLATE_FAULTS = {
+    "{% endblok %}": "unknown tag 'endblok'",
+    "{{ page.titel }}": "no attribute 'titel'",
+    "{{ 1 + words }}": "unsupported operand",
+}
 STARTED_MS = 30_000  # on a busy machine
 
 
 class Checkout:
-    """A copy of the project's sources, served as `make dev` serves them."""
+    """A copy of the project's sources, served as `make dev` serves them, with a panel of another folder
+    that has a fault at first."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         for name in FOLDERS:
             shutil.copytree(ROOT / name, folder / name)
         shutil.copy(ROOT / "zenoh.json5", folder)
+        cell = folder / "cell"
+        cell.mkdir()
+        shutil.copy(ROOT / "app/panel.toml", cell)
+        self.edit("cell/panel.toml", *FAULT)
+        options = [*RELOAD, f"--reload-dir={cell}"]
         self.server = Server(
-            folder,
-            KIOSK_DEV="1",
-            options=RELOAD,
+            folder, KIOSK_DEV="1", KIOSK_PANEL=str(cell / "panel.toml"), options=options
         )
 
     def edit(self, name: str, old: str, new: str) -> None:
@@ -60,66 +76,51 @@ def test_make_dev_watches_the_folder_of_another_panel(tmp_path: Path) -> None:
     assert f"--reload-dir={tmp_path} " in made(KIOSK_PANEL=str(tmp_path / "cell1.toml"))
 
 
-@pytest.fixture(scope="module")
-def checkout(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Checkout]:
-    """One for all: each test takes its changes back, but the last."""
-    mine = Checkout(tmp_path_factory.mktemp("checkout"))
+def test_each_kind_of_file_is_watched() -> None:
+    config = Config("app.main:app", reload=True, reload_dirs=[*FOLDERS], reload_includes=[*PATTERNS])
+    accepts = FileFilter(config)
+    files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file()]
+    sources = {path for path in files if path.suffix not in NO_SOURCES}
+    assert len(sources) > 400
+    assert {path for path in sources if not accepts(path)} == set()
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Iterator[Checkout]:
+    mine = Checkout(tmp_path)
     yield mine
     mine.server.end(signal.SIGINT)
 
 
-def test_a_panel_with_a_fault_is_a_page_that_says_where_until_it_is_mended(
-    checkout: Checkout, page: Page
-) -> None:
+def test_an_open_browser_shows_what_is_saved_or_its_fault(checkout: Checkout, page: Page) -> None:
     page.goto(checkout.server.url)
-    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
-    checkout.edit("app/panel.toml", 'kind = "readout"', 'kind = "readuot" # <b>')
-    fault = 'page[0].group[0].widget[1].kind "last_heard", line 43: unknown kind "readuot"'
-    expect(page.locator("li").first).to_contain_text(fault, timeout=STARTED_MS)
-    expect(page.locator("h1")).to_contain_text("app/panel.toml can't be used:")
-    answer = checkout.server.http.get("/pages/operation")
-    assert (answer.status_code, answer.headers["refresh"]) == (503, "1")
-    assert checkout.server.http.get("/", headers={"host": "elsewhere"}).status_code == 403
-    checkout.edit("app/panel.toml", 'kind = "readuot" # <b>', 'kind = "readout"')
+    check_panels_fault(checkout, page)
+    checkout.edit(PANEL, *reversed(FAULT))
     expect(page.get_by_role("button", name="Publish1")).to_be_visible(timeout=STARTED_MS)
-
-
-@pytest.mark.parametrize("fault", ["{% endblok %}", "{{ page.titel }}", "{{ 1 + words }}"])
-def test_a_template_with_a_fault_is_reported_and_the_page_comes_back_by_itself(
-    checkout: Checkout, page: Page, fault: str
-) -> None:
-    page.goto(checkout.server.url)
-    checkout.edit("templates/screen.html", "<main>", f"<main>{fault}")
-    expect(page.locator("body")).to_contain_text("templates/screen.html", timeout=STARTED_MS)
-    checkout.edit("templates/screen.html", f"<main>{fault}", "<main>")
-    expect(page.get_by_role("button", name="Publish1")).to_be_visible(timeout=STARTED_MS)
-
-
-def test_every_kind_of_change_reaches_an_open_browser(checkout: Checkout, page: Page) -> None:
-    page.goto(checkout.server.url)
-    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
-    checkout.edit("app/panel.toml", 'label = "Publish1"', 'label = "Pick up"')
-    expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
-    checkout.edit("templates/screen.html", ">{{ page.title }}</h2>", ">A new heading</h2>")
-    expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
+    good = "<main>"
+    for fault, words in TEMPLATE_FAULTS.items():
+        checkout.edit(SCREEN, good, good := f"<main>{fault}")
+        expect(page.locator("body")).to_contain_text(words, timeout=STARTED_MS)
+        expect(page.locator("body")).to_contain_text(SCREEN)
+    checkout.edit(SCREEN, good, "<main>")
+    checkout.edit(SCREEN, ">{{ page.title }}</h2>", ">A new heading</h2>")
+    checkout.edit(PANEL, 'label = "Publish1"', 'label = "Pick up"')
     checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
-    expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
     checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
+    expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
+    expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
+    expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
     expect(page.locator('[data-lamp="server"]')).to_contain_text("Changed server", timeout=STARTED_MS)
 
 
-def test_it_starts_with_a_faulty_panel_and_shows_the_fault(tmp_path: Path, page: Page) -> None:
-    panel = tmp_path / "panel.toml"
-    panel.write_text('title = "Half a panel"\n')
-    options = [*RELOAD, f"--reload-dir={tmp_path}"]
-    mine = Server(ROOT, options=options, KIOSK_DEV="1", KIOSK_PANEL=str(panel))
-    try:
-        page.goto(mine.url)
-        expect(page.locator("li")).to_contain_text("page: is missing")
-        panel.write_text((ROOT / "app/panel.toml").read_text())
-        expect(page.get_by_role("button", name="Publish1")).to_be_visible(timeout=STARTED_MS)
-    finally:
-        mine.end(signal.SIGINT)
+def check_panels_fault(checkout: Checkout, page: Page) -> None:
+    """The fault is a page that says where, and is asked for again until it is mended."""
+    fault = 'page[0].group[0].widget[1].kind "last_heard", line 43: unknown kind "readuot"'
+    expect(page.locator("li").first).to_contain_text(fault)
+    expect(page.locator("h1")).to_contain_text("panel.toml can't be used:")
+    answer = checkout.server.http.get("/pages/operation")
+    assert (answer.status_code, answer.headers["refresh"]) == (503, "1")
+    assert checkout.server.http.get("/", headers={"host": "elsewhere"}).status_code == 403
 
 
 def test_in_production_nothing_is_watched(tmp_path: Path) -> None:

@@ -1,0 +1,45 @@
+"""The command as a process: its exit status, its output, and Ctrl-C. Other tests fork it from a process
+that has imported what it needs; here it is also started as a user starts it."""
+
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.settings import PACKAGE
+from tests.support import command
+from tests.support.command import COMMAND, Started
+from tests.support.parts import free_port
+
+Start = Callable[..., Started]
+
+
+@pytest.fixture(params=[command.start, command.start_new], ids=["forked", "new"])
+def start(request: pytest.FixtureRequest) -> Start:
+    started: Start = request.param
+    return started
+
+
+def test_it_has_the_folder_and_the_environment_that_it_is_given(start: Start, tmp_path: Path) -> None:
+    shutil.copy(PACKAGE / "panel.toml", tmp_path / "cell1.toml")
+    env = {"KIOSK_PANEL": "cell1.toml"}
+    done = command.finished(start(COMMAND, "check", folder=tmp_path, env=env))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f'{tmp_path}/cell1.toml: good: "Robot cell 1"')
+
+
+def test_a_mistake_is_one_sentence_and_status_2(start: Start) -> None:
+    done = command.finished(start(COMMAND, "topics", "--conect", "tcp/127.0.0.1:1"))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("operator-panel topics: --conect is not an option of this command")
+
+
+def test_ctrl_c_ends_it_without_words(start: Start) -> None:
+    process = start("app.simulator", f"tcp/127.0.0.1:{free_port()}")
+    assert process.stderr is not None
+    assert "listening at tcp/127.0.0.1:" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    done = command.finished(process)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
