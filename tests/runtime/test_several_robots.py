@@ -143,6 +143,8 @@ def two(
         path = panel_file(tmp_path, *(entry(n + 1, b.endpoint) for n, b in enumerate(bridges)))
         kiosk = servers(live("tcp/127.0.0.1:1", tmp_path, KIOSK_PANEL=str(path)))
         until(kiosk.ready, "both robots are ready")
+        for node in nodes:
+            until(partial(node.endpoints, "/operation1"), "the robot sees who publishes")
         yield kiosk, bridges, nodes
     finally:
         for node in nodes:
@@ -208,6 +210,7 @@ def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
     kiosk = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
     until(kiosk.ready, "ready")
     second = kiosk.robot("r2")
+    until(partial(node.endpoints, "/robot2/operation"), "the robot sees who publishes")
     # The node listens since a moment ago: until the bridge knows, a press says that no one hears it.
     until(
         lambda: second.press("operation", "second").json()["outcome"] == "published", "heard", 10, 0.2
