@@ -7,6 +7,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from app.i18n import sentences
 from tests.browser.test_layout_in_browser import PANEL
 from tests.support.browsers import sized
 from tests.support.pages import DRAWN, place
@@ -39,6 +40,11 @@ CUT: Final = """() => {
   return [...texts]
     .filter((one) => one.checkVisibility() && cut(one) && unsigned(getComputedStyle(one)))
     .map((one) => one.textContent);
+}"""
+SAYS: Final = """(shown, [state, text, language]) => {
+  shown.dataset.state = state;
+  shown.lastElementChild.textContent = text;
+  shown.lastElementChild.lang = language;
 }"""
 LONG: Final = (
     "A text that has much more to say than two lines of a key on a small screen can hold, to its end"
@@ -118,6 +124,16 @@ def test_nothing_overflows_on_any_screen(cell: Server, several: Server, page: Pa
             sized(page, width, height).evaluate(DRAWN)
             assert page.evaluate(OVERFLOWS) == [], f"{url}, {width}"
             assert page.evaluate(CUT) == [], f"{url}, {width}"
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_each_state_of_the_robot_fits_a_phone(cell: Server, page: Page, language: str) -> None:
+    page.goto(f"{cell.url}/pages/cell")
+    sized(page, 390, 844)
+    for state in ("ready", "online", "locked", "unknown", "lost"):
+        page.locator(".robot-state").evaluate(SAYS, [state, sentences(language)[f"state_{state}"], language])
+        page.evaluate(DRAWN)
+        assert page.evaluate(OVERFLOWS) == [], state
 
 
 def test_the_frame_stays_where_it_is_when_the_page_scrolls(several: Server, page: Page) -> None:
