@@ -130,8 +130,9 @@ def test_nothing_overflows_on_any_screen(cell: Server, several: Server, page: Pa
 def test_each_state_of_the_robot_fits_a_phone(cell: Server, page: Page, language: str) -> None:
     page.goto(f"{cell.url}/pages/cell")
     sized(page, 390, 844)
+    shown = page.locator(".robot-state")
     for state in ("ready", "online", "locked", "unknown", "lost"):
-        page.locator(".robot-state").evaluate(SAYS, [state, sentences(language)[f"state_{state}"], language])
+        shown.evaluate(SAYS, [state, sentences(language)[f"state_{state}"], language])
         page.evaluate(DRAWN)
         assert page.evaluate(OVERFLOWS) == [], state
 
