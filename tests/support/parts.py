@@ -63,17 +63,24 @@ STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
 
 # Even on a busy machine, anything immediate happens within this time.
 ENOUGH_S = 40.0
+SOONEST_S, LATEST_S = 0.01, 0.1  # until the next look at a condition
+GROWS = 0.05  # per second that it was waited for
 
 
-def until(what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float = 0.01) -> Any:
-    """Waits for a condition and returns its value; fails with `why` when time is up."""
-    end = time.monotonic() + within_s
+def until(
+    what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float | None = None
+) -> Any:
+    """Waits for a condition and returns its value; fails with `why` when time is up. Where `every_s`
+    does not say how often it looks, it looks less often the longer it waits: a look may be a request,
+    and takes CPU time from what it waits for."""
+    began = time.monotonic()
     while True:
         if found := what():
             return found
-        if time.monotonic() > end:
+        waited = time.monotonic() - began
+        if waited > within_s:
             raise AssertionError(f"not within {within_s} s: {why}")
-        time.sleep(every_s)
+        time.sleep(min(SOONEST_S + GROWS * waited, LATEST_S) if every_s is None else every_s)
 
 
 def free_port() -> int:
