@@ -14,7 +14,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from app.kiosk.page_script import LOOK
-from tests.support.parts import CHROMIUM, ROOT, Process, free_port
+from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client
 
 WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
 HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)
@@ -57,10 +57,12 @@ class KioskScreen:
     def pages(self) -> list[dict[str, Any]]:
         """The pages that the browser has; none while it does not answer."""
         with suppress(httpx.HTTPError):
-            url = f"http://127.0.0.1:{self.port}/json/list"
-            found = httpx.get(url, timeout=ANSWER_WITHIN_S, trust_env=False).json()
-            return [one for one in found if one["type"] == "page"]
+            return [one for one in self._devtools("list") if one["type"] == "page"]
         return []
+
+    def _devtools(self, what: str) -> Any:
+        with http_client(f"http://127.0.0.1:{self.port}", ANSWER_WITHIN_S) as http:
+            return http.get(f"/json/{what}").json()
 
     def call(self, method: str, **params: Any) -> dict[str, Any] | None:
         """The result of a command to the page; None if it does not answer."""
@@ -90,9 +92,8 @@ class KioskScreen:
 
     def processes(self, kind: str) -> list[int]:
         """Those of a kind: "browser", "renderer" or "GPU"."""
-        url = f"http://127.0.0.1:{self.port}/json/version"
-        at = httpx.get(url, timeout=ANSWER_WITHIN_S, trust_env=False).json()["webSocketDebuggerUrl"]
-        found = _called(at, "SystemInfo.getProcessInfo", {}) or {}
+        browser = self._devtools("version")["webSocketDebuggerUrl"]
+        found = _called(browser, "SystemInfo.getProcessInfo", {}) or {}
         return [one["id"] for one in found["processInfo"] if one["type"] == kind]
 
     def send(self, kind: str, number: signal.Signals) -> None:
