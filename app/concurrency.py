@@ -75,4 +75,5 @@ class InFlight:
     async def drained(self, within_s: float) -> None:
         """Waits until no command is in flight, at most `within_s` seconds."""
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._idle.wait(), within_s)
+            async with asyncio.timeout(within_s):
+                await self._idle.wait()

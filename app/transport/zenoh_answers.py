@@ -32,7 +32,10 @@ async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]]
 
     ask(Callback(on_reply, on_end, indirect=False))
     with suppress(TimeoutError):
-        await asyncio.wait_for(done, timeout_s + 1)
+        async with asyncio.timeout(
+            timeout_s + 1
+        ):  # `wait_for` may lose a cancel that comes with the end
+            await done
     return answers, time.monotonic() < end
 
 

@@ -87,7 +87,8 @@ class TrendDisk:
         now = time.time()
         self._queue.put(lambda: self._call(loaded, self._load(now)))
         try:
-            await asyncio.wait_for(done, LOAD_TIMEOUT_S)
+            async with asyncio.timeout(LOAD_TIMEOUT_S):
+                await done
         except TimeoutError:
             log.error("%s takes too long: trends begin without earlier values", self._folder)
         self._timer = self._loop.call_later(WRITE_EVERY_S, self._tick)
