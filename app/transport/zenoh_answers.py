@@ -32,9 +32,8 @@ async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]]
 
     ask(Callback(on_reply, on_end, indirect=False))
     with suppress(TimeoutError):
-        async with asyncio.timeout(
-            timeout_s + 1
-        ):  # `wait_for` may lose a cancel that comes with the end
+        # Not `wait_for`: that of Python 3.11 loses a cancel that comes with the end.
+        async with asyncio.timeout(timeout_s + 1):
             await done
     return answers, time.monotonic() < end
 

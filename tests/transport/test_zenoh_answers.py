@@ -1,10 +1,10 @@
 """The answers to a Zenoh query on the event loop."""
 
 import asyncio
-from collections.abc import Callable
-from typing import Any
 
 import pytest
+import zenoh
+from zenoh.handlers import Callback
 
 from app.transport.zenoh_answers import collected
 
@@ -14,14 +14,16 @@ def test_a_cancel_that_comes_with_the_last_answer_is_not_lost() -> None:
 
 
 async def _cancelled_as_it_ends() -> None:
-    ends: list[Callable[[], None]] = []
+    handlers: list[Callback[zenoh.Reply]] = []
 
     async def asks_again_and_again() -> None:
         while True:
-            await collected(lambda callback: ends.append(callback.drop), 10)
+            await collected(handlers.append, 10)
 
-    def end(asking: "asyncio.Task[Any]") -> None:
-        ends.pop()()  # its end is handed over, and runs before the cancel
+    def end(asking: "asyncio.Task[None]") -> None:
+        drop = handlers.pop().drop
+        assert drop is not None
+        drop()  # its end is handed over, and runs before the cancel
         asyncio.get_running_loop().call_soon(asking.cancel)
 
     asking = asyncio.create_task(asks_again_and_again())
