@@ -96,7 +96,7 @@ class Kiosk(Peer):
     id: str = "kiosk"
     title: str = "this panel"
     shown: str = '[data-widget="operation1"] button'
-    button: str = '[data-widget^="operation"] button'
+    button: str = '[data-widget^="operation"] button[formaction]'
     widgets: int = 0
     robots: tuple[Robot, ...] = ()
 
