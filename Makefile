@@ -34,7 +34,7 @@ dev: .venv/test
 # Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
 # pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
 # without them.
-WORKERS ?= 7
+WORKERS ?= 5
 # What is read of the tests is kept, wherever else nothing of Python's is: to prepare it anew takes each
 # worker as long as all that it does with it.
 test: export PYTHONDONTWRITEBYTECODE :=
