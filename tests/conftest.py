@@ -30,8 +30,8 @@ from tests.support.parts import (
     Server,
     free_port,
     live,
-    until,
 )
+from tests.support.servers import ready
 
 expect.set_options(timeout=1000 * ENOUGH_S)
 sentences(ENGLISH)  # read before any test measures time
@@ -185,10 +185,8 @@ def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
 @pytest.fixture(scope="module")
 def demo() -> Iterator[Server]:
     """A kiosk with the shipped panel, on the robot that it simulates."""
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT)) as mine:
+        yield mine
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from app.web.display_choice import CHOICES, COOKIE
 from app.web.language import COOKIE as LANGUAGE
 from tests.support.browsers import ReusedPage
 from tests.support.pages import DRAWN, place
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
 # Rules of WCAG 2.2 A and AA, and axe's best practices; and those of them that depend on a theme.
@@ -49,10 +50,8 @@ def plan() -> Iterator[Server]:
 
 
 def demo(panel: str) -> Iterator[Server]:
-    mine = Server(ROOT, KIOSK_PANEL=panel, KIOSK_MODE="demo", KIOSK_DEV="1")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=panel, KIOSK_MODE="demo", KIOSK_DEV="1")) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Error, Page, expect
 from tests.support.browsers import ReusedPage
 from tests.support.pages import place
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.servers import ready
 from tests.web.test_control_over_http import PROXY, control_panel
 
 IDLE_S = 4.0
@@ -28,10 +29,8 @@ Opens = Callable[..., Page]
 @pytest.fixture
 def kiosk(tmp_path: Path) -> Iterator[Server]:
     panel = control_panel(tmp_path, f"takeover_after_s = {IDLE_S}")
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_PROXIES=PROXY)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_PROXIES=PROXY)) as mine:
+        yield mine
 
 
 ReusedPages = Callable[[str, bool], ReusedPage]

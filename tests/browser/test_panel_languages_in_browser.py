@@ -5,16 +5,15 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
+from tests.support.servers import ready
 from tests.web.test_panel_languages import APP, PANEL
 
 
 @pytest.fixture(scope="module")
 def kiosk() -> Iterator[Server]:
-    mine = Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))) as mine:
+        yield mine
 
 
 def choose(page: Page, language: str) -> None:

@@ -16,6 +16,7 @@ from app.web.serving import OPTIONS
 from bench.report import BEGIN, END
 from tests.support import command
 from tests.support.parts import ROOT, Server, as_response, until
+from tests.support.servers import ready
 from tests.test_imports import ROOMS
 
 DOCS: Final = ROOT / "docs"
@@ -109,11 +110,9 @@ def test_each_example_of_json_is_json(example: str) -> None:
 @pytest.fixture(scope="module")
 def kiosk() -> Iterator[Server]:
     """The shipped panel's, where the example of a press can be made."""
-    mine = Server(ROOT, KIOSK_MODE="demo")
-    until(mine.ready, "ready")
-    until(lambda: mine.widget("operation")["enabled"], "the button is open")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_MODE="demo")) as mine:
+        until(lambda: mine.widget("operation")["enabled"], "the button is open")
+        yield mine
 
 
 def test_a_press_is_answered_as_its_example_shows(kiosk: Server) -> None:

@@ -19,6 +19,7 @@ import pytest
 from app.i18n import render, say
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, live, until
 from tests.support.screen import KioskScreen
+from tests.support.servers import ready
 
 BACK_WITHIN_S: Final = 10.0
 PANEL: Final = ROOT / "app/panel.toml"
@@ -56,10 +57,8 @@ def screens(tmp_path: Path) -> Iterator[Callable[..., KioskScreen]]:
 
 @pytest.fixture(scope="module")
 def server(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = live(bridge.endpoint, tmp_path_factory.mktemp("server"))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(live(bridge.endpoint, tmp_path_factory.mktemp("server"))) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")

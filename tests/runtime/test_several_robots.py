@@ -26,6 +26,7 @@ from tests.support.parts import (
     live,
     until,
 )
+from tests.support.servers import ready
 
 MANY = 10
 PANEL = (ROOT / "app/panel.toml").read_text()
@@ -52,10 +53,8 @@ def ten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Ten demo robots behind one server."""
     folder = tmp_path_factory.mktemp("ten")
     path = panel_file(folder, *(entry(number + 1) for number in range(MANY)))
-    mine = Server(ROOT, KIOSK_PANEL=str(path))
-    until(mine.ready, "every robot is ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(path))) as mine:
+        yield mine
 
 
 def heard(server: Server) -> str:

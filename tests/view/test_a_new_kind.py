@@ -14,6 +14,7 @@ from typing import Any, Final
 import pytest
 
 from tests.support.parts import ROOT, Server, until
+from tests.support.servers import ready
 
 GUIDE: Final = ROOT / "docs/adding-a-widget-kind.md"
 BLOCK: Final = re.compile(r'^```[\w+]+ title="([^"]+)"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
@@ -47,11 +48,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def kiosk(project: Path) -> Iterator[Server]:
-    mine = Server(project, KIOSK_PANEL=str(project / "panel.toml"))
-    until(mine.ready, "ready")
-    until(lambda: mine.widget("greet")["enabled"], "the demo robot permits", within_s=40)
-    yield mine
-    mine.end()
+    with ready(Server(project, KIOSK_PANEL=str(project / "panel.toml"))) as mine:
+        until(lambda: mine.widget("greet")["enabled"], "the demo robot permits", within_s=40)
+        yield mine
 
 
 def published(kiosk: Server) -> dict[str, Any] | None:

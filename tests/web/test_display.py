@@ -7,7 +7,8 @@ from typing import Final
 import pytest
 
 from app.web.display_choice import KEPT_S
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
 
 HTML: Final = {"accept": "text/html"}
 LOOK: Final = re.compile(
@@ -23,10 +24,8 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel.write_text(
         (ROOT / "app/panel.toml").read_text().replace("\ntitle =", '\ntheme = "dark"\ntitle =', 1)
     )
-    mine = Server(ROOT, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(panel))) as mine:
+        yield mine
 
 
 def looks(kiosk: Server, path: str, cookie: str = "") -> tuple[str, ...]:

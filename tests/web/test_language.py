@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.web.language import COOKIE, negotiated
-from tests.support.parts import ROOT, Server, events_in, until
+from tests.support.parts import ROOT, Server, events_in
+from tests.support.servers import ready
 
 AVAILABLE = ("de", "en", "pt-BR")
 LANGUAGE = "qps"  # of tests/support/apps/translated.py
@@ -52,10 +53,8 @@ def translated_panel(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel = translated_panel(tmp_path_factory.mktemp("panel"))
-    mine = Server(ROOT, app="tests.support.apps.translated:app", KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, app="tests.support.apps.translated:app", KIOSK_PANEL=str(panel))) as mine:
+        yield mine
 
 
 def test_a_page_is_in_the_language_of_its_reader(server: Server) -> None:

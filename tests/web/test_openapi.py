@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from tests.support.form import LONG, several
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
 
 CONTROL = "\n[control]\nrequired = true\n"
 EXAMPLES = several(3, 20)  # of each operation
@@ -28,10 +29,8 @@ def panel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def kiosk(panel: Path) -> Iterator[Server]:
-    mine = Server(ROOT, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(panel))) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ from shutil import copytree
 
 import pytest
 
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
 
 
 @pytest.fixture
@@ -20,10 +21,8 @@ def server(folder: Path) -> Iterator[Server]:
     (folder / "plan.html").write_text(
         (folder / "plan.html").read_text() + "<p>{{ title }} {{ 'a < b' }} {{ icon('map') }}</p>"
     )
-    mine = Server(ROOT, KIOSK_PANEL=str(folder / "panel.toml"))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(folder / "panel.toml"))) as mine:
+        yield mine
 
 
 def test_widgets_stand_where_the_template_places_them(server: Server, folder: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from tests.support.parts import ROOT, Server, events_in, until
+from tests.support.servers import ready
 
 APP = "tests.support.apps.three_languages:app"
 PANEL = ROOT / "tests/three_languages.toml"
@@ -16,12 +17,10 @@ LABELS = {"en": "Speed", "ja": "速度", "de": "Geschwindigkeit"}
 
 @pytest.fixture(scope="module")
 def kiosk() -> Iterator[Server]:
-    mine = Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))
-    until(mine.ready, "ready")
-    until(lambda: text_of(mine, "speed", "en") == "−1,234.5 mm/s", "a value is shown")
-    until(lambda: widget(mine, "set_limit", "en")["enabled"], "a press is permitted")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))) as mine:
+        until(lambda: text_of(mine, "speed", "en") == "−1,234.5 mm/s", "a value is shown")
+        until(lambda: widget(mine, "set_limit", "en")["enabled"], "a press is permitted")
+        yield mine
 
 
 def read_by(language: str) -> dict[str, str]:

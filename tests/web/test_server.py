@@ -30,6 +30,7 @@ from tests.support.parts import (
     live,
     until,
 )
+from tests.support.servers import ready
 
 SHIPPED = (ROOT / "app/panel.toml").read_text()
 FORM = {"content-type": "application/x-www-form-urlencoded"}
@@ -44,11 +45,9 @@ def client_of(bridge: Bridge) -> zenoh.Config:
 
 @pytest.fixture(scope="module")
 def demo() -> Iterator[Server]:
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    until(lambda: mine.widget("operation1")["enabled"], "the demo robot permits", within_s=40)
-    yield mine
-    mine.end()
+    with ready(Server(ROOT)) as mine:
+        until(lambda: mine.widget("operation1")["enabled"], "the demo robot permits", within_s=40)
+        yield mine
 
 
 def test_demo_mode_shows_its_banner_on_every_page(demo: Server) -> None:

@@ -24,6 +24,7 @@ from app.web.proxies import Proxies
 from app.web.serving import bounded, urls
 from tests.support.apps.small import CONNECTIONS
 from tests.support.parts import ROOT, Server, free_port, until
+from tests.support.servers import ready
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 ELSEWHERE = "127.0.0.2"  # another address of this machine
@@ -32,18 +33,14 @@ MB = 1_000_000
 
 @pytest.fixture(scope="module")
 def plain() -> Iterator[Server]:
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT)) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")
 def hasty() -> Iterator[Server]:
-    mine = Server(ROOT, app="tests.support.apps.hasty:app")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, app="tests.support.apps.hasty:app")) as mine:
+        yield mine
 
 
 def opened(server: Server, address: str = "127.0.0.1") -> socket.socket:
