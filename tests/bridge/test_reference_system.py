@@ -40,8 +40,8 @@ def test_a_press_reaches_the_robot_with_its_text_intact(
 
 
 def arrives(server: Server, node: RosNode) -> bool:
-    """Whether a press gets to the node; nothing of it is on its way any more. A Fast DDS node that has
-    not yet discovered the bridge's writer never gets what this sends meanwhile."""
+    """Whether a press gets to the node; nothing of it is on its way any more. What is sent
+    before a Fast DDS node has discovered the bridge's writer never arrives."""
     text = f"there? {secrets.token_hex(4)}"
     if server.press("operation", text).json()["outcome"] != "published":
         return False

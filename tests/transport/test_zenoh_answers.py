@@ -20,15 +20,12 @@ async def _cancelled_as_it_ends() -> None:
         while True:
             await collected(handlers.append, 10)
 
-    def end(asking: "asyncio.Task[None]") -> None:
-        drop = handlers.pop().drop
-        assert drop is not None
-        drop()  # its end is handed over, and runs before the cancel
-        asyncio.get_running_loop().call_soon(asking.cancel)
-
     asking = asyncio.create_task(asks_again_and_again())
     await asyncio.sleep(0)
-    end(asking)
+    drop = handlers.pop().drop
+    assert drop is not None
+    drop()  # its end is handed over, and runs before the cancel
+    asyncio.get_running_loop().call_soon(asking.cancel)
     with pytest.raises(asyncio.CancelledError):
         async with asyncio.timeout(5):
             await asking
