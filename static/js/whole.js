@@ -33,20 +33,34 @@ function isCut(text) {
   return text.scrollHeight > text.clientHeight + 1;
 }
 
-function markCut(key) {
-  const cut = [...key.querySelectorAll(".face > p")].some(isCut);
-  key.querySelector(".more").hidden = !cut && !key.querySelector('[data-text="more"]')?.textContent;
+function showCut(key, cut) {
+  const isWhole = !cut && !key.querySelector('[data-text="more"]')?.textContent;
+  key.querySelector(".more").toggleAttribute("hidden", isWhole);
   if (key === shown && sheet.matches(":popover-open") && !fillSheet()) sheet.hidePopover();
+}
+
+const changed = new Set(); // keys whose face or size is another since the last frame
+
+function mark(key) {
+  if (!changed.size) requestAnimationFrame(markAll);
+  changed.add(key);
+}
+
+// All are measured before the first is changed: the page is laid out once.
+function markAll() {
+  const keys = [...changed].map((key) => [key, [...key.querySelectorAll(".face > p")].some(isCut)]);
+  changed.clear();
+  for (const [key, cut] of keys) showCut(key, cut);
 }
 
 function equip(key) {
   const more = document.getElementById("more").content.firstElementChild.cloneNode(true);
   const face = key.querySelector(".face");
   face.append(more);
-  const mark = () => requestAnimationFrame(() => markCut(key));
-  new MutationObserver(mark).observe(face, { childList: true, characterData: true, subtree: true });
-  new MutationObserver(mark).observe(key.querySelector("button"), { attributeFilter: ["disabled"] });
-  new ResizeObserver(mark).observe(key);
+  const observer = new MutationObserver(() => mark(key));
+  observer.observe(face, { childList: true, characterData: true, subtree: true });
+  observer.observe(key.querySelector("button"), { attributeFilter: ["disabled"] });
+  new ResizeObserver(() => mark(key)).observe(key);
   key.addEventListener("click", ({ target }) => {
     const locked = key.querySelector("button").disabled && !target.closest("button");
     if (locked || target.closest(".more")) showWhole(key);
