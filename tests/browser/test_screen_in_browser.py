@@ -2,10 +2,11 @@
 a key's whole text can be read, the menu works, and keys of the frame come back to their page."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import CDPSession, Locator, Page, expect
 
 from app.i18n import sentences
 from tests.browser.test_layout_in_browser import PANEL
@@ -46,6 +47,30 @@ SAYS: Final = """(shown, [state, text, language]) => {
   shown.lastElementChild.textContent = text;
   shown.lastElementChild.lang = language;
 }"""
+LOCK_ALL: Final = """() => {
+  for (const key of document.querySelectorAll(".key")) {
+    key.querySelector("button").disabled = true;
+    key.querySelector(".face > p").textContent = "longer than the face of a key ".repeat(9);
+  }
+}"""
+NEXT_FRAME: Final = "() => new Promise((shown) => requestAnimationFrame(() => setTimeout(shown)))"
+HEAD: Final = """
+title = "Keys"
+mode = "demo"
+[[page]]
+id = "one"
+title = "One"
+"""
+KEY: Final = """
+[[page.widget]]
+id = "key{}"
+kind = "publish"
+label = "Key"
+topic = "/operation1"
+type = "std_msgs/msg/String"
+message = {{ data = "" }}
+"""
+KEYS: Final = 40
 LONG: Final = (
     "A text that has much more to say than two lines of a key on a small screen can hold, to its end"
 )
@@ -270,6 +295,27 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     expect(page.locator("#whole p")).to_have_text("Another.")
     page.locator("[data-widget=locked] > button").evaluate("(one) => { one.disabled = false; }")
     expect(page.locator("#whole")).to_be_hidden()
+
+
+def test_keys_that_lock_at_once_cost_one_layout(tmp_path: Path, page: Page) -> None:
+    many = HEAD + "".join(KEY.format(number) for number in range(KEYS))
+    with demo_server(tmp_path, many) as mine:
+        page.goto(mine.url)
+        page.evaluate(NEXT_FRAME)
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable")
+        before = style_recalculations(session)
+        page.evaluate(LOCK_ALL)
+        page.evaluate(NEXT_FRAME)
+        counted = style_recalculations(session) - before
+        assert page.locator(".key .more:visible").count() == KEYS
+    assert counted < KEYS / 2
+
+
+def style_recalculations(session: CDPSession) -> float:
+    """How often the browser has computed the page's styles."""
+    metrics = session.send("Performance.getMetrics")["metrics"]
+    return next(float(one["value"]) for one in metrics if one["name"] == "RecalcStyleCount")
 
 
 def test_the_menu_leads_to_the_log_and_changes_the_look(
