@@ -32,6 +32,9 @@ class Symbols(NamedTuple):
 # The minus sign of every language: a hyphen is too short to be seen from afar, and not read aloud.
 MINUS: Final = "\N{MINUS SIGN}"
 PLAIN: Final = Symbols({ord("-"): MINUS}, ".", ":", ISO_DATE)
+# What Babel says of the panel's languages. Each page names them: an English panel need not hold what
+# Babel knows of all, 5 MB.
+OWN_NAMES: Final = {"de": "Deutsch", "en": "English", "ja": "日本語"}
 
 
 @cache
@@ -96,9 +99,14 @@ def date_time_in(text: str, language: str) -> str:
     return f"{date_in(day, language)} {time_in(time, language)}"
 
 
-@cache
 def own_name(language: str) -> str:
     """What a language is called in itself: "Deutsch"; its tag where Babel does not know it."""
+    return OWN_NAMES.get(language) or babel_name(language)
+
+
+@cache
+def babel_name(language: str) -> str:
+    """The same, as Babel says it."""
     locale = locale_of(language)
     name = locale.get_display_name() if locale is not None else None
     return f"{name[0].upper()}{name[1:]}" if name else language

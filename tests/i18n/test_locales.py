@@ -10,7 +10,7 @@ from app.clock import format_datetime, format_time
 from app.i18n import date_and_time, number, render, say, sentences, text_in, time_of_day
 from app.i18n.__main__ import faults
 from app.i18n.catalogue import ENGLISH, catalogues_in, files
-from app.i18n.locales import number_from, own_name
+from app.i18n.locales import OWN_NAMES, babel_name, number_from, own_name
 from tests.support.catalogues import write_catalogue
 
 
@@ -94,6 +94,7 @@ def test_a_language_is_named_in_itself() -> None:
         "Português (Brasil)",
         "qps",
     ]
+    assert {tag: babel_name(tag) for tag in OWN_NAMES} == OWN_NAMES
 
 
 def test_a_catalogue_whose_language_has_no_name_or_another_decimal_sign_is_found(
