@@ -95,4 +95,4 @@ if __name__ == "__main__":
     prepare(compiled)
     gc.freeze()  # a child does not look at all of this at its end: it would take 0.3 s
     parent.run()  # in a forked server, it ends by SystemExit
-    shutil.rmtree(compiled)
+    shutil.rmtree(compiled, ignore_errors=True)
