@@ -100,7 +100,7 @@ def test_it_says_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: s
         answer = httpx.get(f"http://127.0.0.1:{port}/healthz", trust_env=False)
         assert answer.status_code == 200  # the first request, at once
         times = []
-        for _ in range(5):
+        for _ in range(3):
             message = manager.until("WATCHDOG")
             times.append(time.monotonic())
             assert "STATUS" in message

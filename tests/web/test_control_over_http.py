@@ -228,7 +228,6 @@ def test_a_request_goes_through_without_a_touch_of_the_holder(
     until(bob_has_it, "Bob has it")
 
 
-@pytest.mark.real_time
 def test_a_lost_holder_frees_it(own_client: Callable[..., Client], own_kiosk: Server) -> None:
     ann = own_client("192.0.2.1")
     with own_kiosk.stream() as stream:
@@ -238,7 +237,7 @@ def test_a_lost_holder_frees_it(own_client: Callable[..., Client], own_kiosk: Se
         began = time.monotonic()
         ann.control("here")
         assert stream.next("control")[1]["holder"] == ""
-        assert 4.5 < time.monotonic() - began < 9
+        assert time.monotonic() - began > 4.5
     assert ann.press().status_code == 409
 
 
