@@ -9,8 +9,7 @@ export const TAP_AGAIN_MS = 700;
 const UNTOUCHED_MS = 60_000;
 
 export function newId() {
-  const bytes = crypto.getRandomValues(new Uint8Array(16));
-  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 // A key that is held down is one press.

@@ -1,6 +1,7 @@
 // Draws a trend's columns into the elements that the server has rendered (templates/widgets/trend.html); the same as
 // app/view/trend_plot.py.
 const SIZE = 1000;
+const PER_COLUMN_PX = 1.5;
 const VALUE_TICK_PX = 45;
 const NAME_ROOM = 12; // percent of the height that the name of a limit takes
 const TIME_TICK_PX = 90;
@@ -30,8 +31,9 @@ export class Plot {
     }));
   }
 
-  get width() {
-    return this.#area.clientWidth;
+  // How many columns the server is asked for.
+  get mostColumns() {
+    return Math.min(1000, Math.max(50, Math.round(this.#area.clientWidth / PER_COLUMN_PX)));
   }
 
   // `columns` of each pen are [number, lowest, highest, last, whether it begins a line].
@@ -133,4 +135,11 @@ function* valueTicks(low, high, most) {
 // A number as the panel's language writes it, with a true minus sign.
 export function written(text) {
   return text.replace("-", "−").replace(".", document.documentElement.dataset.decimal ?? ".");
+}
+
+// Seconds as "2 d 03:04:05".
+export function duration(s) {
+  const two = (number) => String(Math.floor(number)).padStart(2, "0");
+  const days = s >= 86400 ? `${Math.floor(s / 86400)} d ` : "";
+  return `${days}${two((s % 86400) / 3600)}:${two((s % 3600) / 60)}:${two(s % 60)}`;
 }

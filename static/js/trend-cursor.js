@@ -1,0 +1,77 @@
+// The cursor of a trend: a line that a finger or a keyboard sets, and the values there.
+import { written } from "./trend-plot.js";
+
+const NEAR = 0.02; // of the plot's width: how far from the cursor a value may be
+const STEP = 0.02; // of the plot's width, by a key
+const NOTHING = "—";
+
+export class Cursor {
+  #root;
+  #plot;
+  #drawn = null; // {begin, end, width, span} of what the plot shows
+  #columns = [];
+  #time = null; // in seconds since the epoch
+
+  constructor(root, plot) {
+    this.#root = root;
+    this.#plot = plot;
+    const area = root.querySelector(".area");
+    const point = (event) => this.#point((event.clientX - area.getBoundingClientRect().left) / area.clientWidth);
+    area.addEventListener("pointerdown", point);
+    area.addEventListener("pointermove", (event) => event.buttons && point(event));
+    area.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  // It goes when its time has left the plot.
+  remove() {
+    this.#time = null;
+  }
+
+  show(drawn, columns) {
+    [this.#drawn, this.#columns] = [drawn, columns];
+    this.#show();
+  }
+
+  #point(place) {
+    if (!this.#drawn) return;
+    const { begin, end } = this.#drawn;
+    this.#time = begin + Math.min(Math.max(place, 0), 1) * (end - begin);
+    this.#show();
+  }
+
+  #key(event) {
+    const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
+    if (!this.#drawn || (!by && event.key !== "Escape")) return;
+    event.preventDefault();
+    const { begin, end } = this.#drawn;
+    if (by) return this.#point(((this.#time ?? end) - begin) / (end - begin) + by);
+    this.remove();
+    this.#show();
+  }
+
+  #show() {
+    const { begin, end } = this.#drawn;
+    if (this.#time !== null && this.#time < begin) this.remove();
+    const shown = this.#time !== null && this.#time <= end;
+    const line = this.#root.querySelector(".cursor");
+    line.setAttribute("visibility", shown ? "visible" : "hidden");
+    const box = this.#root.querySelector(".cursor-values");
+    box.hidden = !shown;
+    if (!shown) return;
+    const place = (this.#time - begin) / (end - begin);
+    for (const name of ["x1", "x2"]) line.setAttribute(name, `${place * 100}%`);
+    box.dataset.side = place < 0.5 ? "right" : "left";
+    const values = this.#plot.pens.flatMap((pen, i) => [["span", pen.name], ["span", this.#valueAt(pen, this.#columns[i])]]);
+    const texts = [["b", this.#plot.clockOf(this.#time)], ...values];
+    box.replaceChildren(...texts.map(([tag, text]) => Object.assign(document.createElement(tag), { textContent: text })));
+  }
+
+  #valueAt(pen, columns) {
+    const distance = (one) => Math.abs(this.#plot.timeOf(one[0]) - this.#time);
+    const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);
+    if (!nearest || distance(nearest) > this.#drawn.width + NEAR * this.#drawn.span) return NOTHING;
+    const [, low, high] = nearest;
+    const text = (value) => written(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
+    return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();
+  }
+}
