@@ -1,4 +1,5 @@
-"""Imports go one way, from what knows nothing to what wires all; Zenoh has two doors."""
+"""Imports go one way, from what knows nothing to what wires all; Zenoh has two doors. Modules are
+short."""
 
 import ast
 import graphlib
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from app.settings import PACKAGE
+from tests.support.parts import ROOT
 
 # The rooms, from the ground up: a room imports only from those before it.
 ROOMS = (
@@ -218,3 +220,17 @@ def test_the_interfaces_know_nothing_but_errors() -> None:
 def test_what_decides_knows_no_http(module: str) -> None:
     frameworks = {"starlette", "uvicorn", "jinja2", "app.web.routes"}
     assert {name for name in imported()[module] if name.startswith(tuple(frameworks))} == set()
+
+
+MOST_LINES = {"app": ("*.py", 300), "static": ("*.js", 150)}
+
+
+@pytest.mark.parametrize("folder", MOST_LINES)
+def test_modules_are_short(folder: str) -> None:
+    pattern, most = MOST_LINES[folder]
+    lengths = {
+        str(path.relative_to(ROOT)): len(path.read_text().splitlines())
+        for path in (ROOT / folder).rglob(pattern)
+    }
+    assert lengths
+    assert {path: length for path, length in lengths.items() if length > most} == {}
