@@ -1,4 +1,5 @@
-"""The operator's log if the panel file switches it off: keeps nothing."""
+"""The operator's log if the panel file switches it off: keeps nothing, and refuses presses while
+another server has the folder."""
 
 import logging
 from collections.abc import Callable, Collection, Iterator

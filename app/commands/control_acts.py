@@ -121,8 +121,8 @@ class ControlActs:
     def log_passing(self, passing: Passing) -> None:
         """Logs a change of control without an act, such as a timeout. Does not wait for the disk."""
         who, other = passing.who, passing.other.title if passing.other else say("no_client")
-        reason = say(f"log_{passing.code}", name=who.title, other=other)
-        self._press_log.note(passing.code, origin_of(who), reason)
+        reason = say(f"log_control_{passing.how}", name=who.title, other=other)
+        self._press_log.note(f"control_{passing.how}", origin_of(who), reason)
 
     def _begin(
         self, request: ActRequest, act_id: str, at: float | None, life_s: float

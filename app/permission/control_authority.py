@@ -31,10 +31,10 @@ Refusal = Literal[
 
 
 class Passing(NamedTuple):
-    """A change of control without an act: `code` says how, `who` had it, took it or requested it, and
-    `other` is in control now."""
+    """A change of control without an act: `who` had it, took it or requested it, and `other` is in
+    control now."""
 
-    code: str
+    how: Literal["lost", "idle", "first_page", "request_lost"]
     who: Principal
     other: Principal | None = None
 
@@ -189,7 +189,7 @@ class ControlAuthority:
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
         if by_hand and not self.holder and not self._given_up and self._may_override(who):
             self._hold(who, life_s, "taken at its first page")
-            self._passed(Passing("control_first_page", who))
+            self._passed(Passing("first_page", who))
 
     def advance(self) -> None:
         """What time alone has changed."""
@@ -197,11 +197,11 @@ class ControlAuthority:
         if self._asker and now >= self._asker.alive_until:
             asker = self._asker.who
             self._end_request()
-            self._passed(Passing("control_request_lost", asker))
+            self._passed(Passing("request_lost", asker))
         if self._holder and now >= self._holder.alive_until:
-            self._pass_by_time("control_lost", f"lost by {self._holder.who}")
+            self._pass_by_time("lost", f"lost by {self._holder.who}")
         elif now >= self._due():
-            self._pass_by_time("control_idle", "taken over for want of a touch")
+            self._pass_by_time("idle", "taken over for want of a touch")
 
     def view(self) -> ControlView:
         """What the pages show."""
@@ -248,11 +248,11 @@ class ControlAuthority:
         self._install(heir)
         self._tell(f"control {how}, now of {heir.who if heir else 'no one'}")
 
-    def _pass_by_time(self, code: str, how: str) -> None:
+    def _pass_by_time(self, how: Literal["lost", "idle"], told: str) -> None:
         before = self._holder
-        self._pass_on(how)
+        self._pass_on(told)
         if before:
-            self._passed(Passing(code, before.who, self._holder.who if self._holder else None))
+            self._passed(Passing(how, before.who, self._holder.who if self._holder else None))
 
     def _end_request(self) -> None:
         if self._asker:
