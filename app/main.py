@@ -8,6 +8,7 @@ import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
+from typing import Final
 
 from fastapi import Depends, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
@@ -56,8 +57,21 @@ from app.web.serving import check_port, urls
 
 log = logging.getLogger("kiosk")
 
-READ_TIMEOUT_S = 1.0  # for browsers to read their responses at shutdown
-RESPONSE_TIMEOUT_S = 2.0  # for the robot to respond at shutdown; then the result of a press is unknown
+# With several robots, their paths stand below that of each.
+OF_A_ROBOT: Final = (
+    pages,
+    events,
+    presses,
+    press_socket,
+    control,
+    hold_socket,
+    parameters,
+    frames,
+    log_lines,
+    trends,
+)
+READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown
+RESPONSE_TIMEOUT_S: Final = 2.0  # for the robot's at shutdown; then the result of a press is unknown
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -66,50 +80,22 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     ros_logging.configure_logging(settings.log_level)
     panel = load_panel(settings.panel, lambda of: settings.data_folder(mode_of(settings, of)))
     check_zenoh(settings, panel)
-
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with _app_state(settings, panel, app.state.server) as state:
-            app.state.app_state = state
-            loop = asyncio.get_running_loop()
-
-            async def ending() -> None:
-                watchdog.notify_stopping()
-                try:
-                    state.fleet.close()
-                    state.log.close()
-                    await state.in_flight.drained(RESPONSE_TIMEOUT_S)
-                finally:
-                    state.fleet.cancel_all()
-                    await state.in_flight.drained(READ_TIMEOUT_S)
-                    loop.call_later(READ_TIMEOUT_S, listen_sockets.abort_unsent, ports)
-
-            ports: set[int] = set()
-            watchdog = _watchdog(state)
-            with graceful_shutdown(loop, ending):
-                works = (
-                    watchdog.run(),
-                    _log_urls(app.state.server, ports, settings.hosts),
-                    pages.compiled(state.templates.environment(panel.language)),
-                )
-                tasks = [asyncio.create_task(work) for work in works]
-                try:
-                    yield
-                finally:
-                    for task in tasks:
-                        task.cancel()
-                    await asyncio.gather(*tasks, return_exceptions=True)
-                    watchdog.notify_stopping()
-
     app = Application(
         title="Operator panel",
         summary="The HTTP interface of a robot cell's touch panel.",
-        lifespan=lifespan,
+        lifespan=partial(_lifespan, settings, panel),
         docs_url=None,  # these pages load scripts from other servers
         redoc_url=None,
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
     )
+    _add_middleware(app, settings)
+    _add_routes(app, settings.dev)
+    return app
+
+
+def _add_middleware(app: FastAPI, settings: Settings) -> None:
+    """The last that is added sees a request first."""
     if settings.dev:
         app.add_exception_handler(Exception, on_error_in_development)
     app.add_middleware(LanguageHeaders)
@@ -118,28 +104,55 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(StartErrorsInWords)
-    for routes in (
-        pages,
-        events,
-        presses,
-        press_socket,
-        control,
-        hold_socket,
-        parameters,
-        frames,
-        log_lines,
-        trends,
-    ):
+
+
+def _add_routes(app: FastAPI, dev: bool) -> None:
+    for routes in OF_A_ROBOT:
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, display):
         app.include_router(common.router)
-    if settings.dev:
+    if dev:
         from app.web.routes import gallery
 
         app.include_router(gallery.router)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
-    return app
+
+
+@asynccontextmanager
+async def _lifespan(settings: Settings, panel: Panel, app: FastAPI) -> AsyncIterator[None]:
+    """From the start of the server to its end."""
+    async with _app_state(settings, panel, app.state.server) as state:
+        app.state.app_state = state
+        ports: set[int] = set()
+        watchdog = _watchdog(state)
+        with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
+            works = (
+                watchdog.run(),
+                _log_urls(app.state.server, ports, settings.hosts),
+                pages.compiled(state.templates.environment(panel.language)),
+            )
+            tasks = [asyncio.create_task(work) for work in works]
+            try:
+                yield
+            finally:
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+                watchdog.notify_stopping()
+
+
+async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
+    """What runs gets its time to end, and browsers theirs to read."""
+    watchdog.notify_stopping()
+    try:
+        state.fleet.close()
+        state.log.close()
+        await state.in_flight.drained(RESPONSE_TIMEOUT_S)
+    finally:
+        state.fleet.cancel_all()
+        await state.in_flight.drained(READ_TIMEOUT_S)
+        asyncio.get_running_loop().call_later(READ_TIMEOUT_S, listen_sockets.abort_unsent, ports)
 
 
 @asynccontextmanager
