@@ -23,7 +23,7 @@ from app.audit.ticket import Results
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogCorrupt, LogError
 from tests.support.operator_log import pressed, run, sent, until_good
-from tests.support.parts import until
+from tests.support.parts import ENOUGH_S, until
 from tests.support.words import english
 
 FREE = Limits(required=False)
@@ -204,7 +204,9 @@ def test_too_many_at_once_are_refused_in_words(
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
         presses = [asyncio.create_task(log.pressed(pressed(n))) for n in range(50)]
-        await asyncio.sleep(0.1)
+        async with asyncio.timeout(ENOUGH_S):
+            while sum(press.done() for press in presses) < 38:
+                await asyncio.sleep(0.01)
         disk.open.set()
         results = await asyncio.gather(*presses, return_exceptions=True)
         refused = [result for result in results if isinstance(result, LogError)]

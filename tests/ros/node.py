@@ -10,6 +10,7 @@ import re
 import sys
 import threading
 import time
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -18,10 +19,9 @@ from commands import obey
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from rclpy.subscription import RCLError
 from type_description_interfaces.srv import GetTypeDescription
 
-GONE_S = 2.0  # within which a publisher that was withdrawn is gone
+GONE_S = 20.0  # within which what is destroyed is gone
 
 
 def type_named(name: str) -> Any:
@@ -69,6 +69,8 @@ def qos_of(given: dict[str, Any]) -> QoSProfile:
 class Commands:
     def __init__(self, name: str) -> None:
         self.node = rclpy.create_node(name)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
         self.heard_on: dict[str, list[dict[str, Any]]] = {}
         self.subscribed: set[tuple[str, str]] = set()
         self.came_at: dict[str, list[float]] = {}
@@ -103,16 +105,7 @@ class Commands:
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         if topic in self.publishers:  # the node would keep it for good
             self.withdraw(topic)
-        end = time.monotonic() + GONE_S
-        while True:
-            try:
-                publisher = self.node.create_publisher(type_named(type), topic, qos_of(qos))
-                break
-            except RCLError:  # one of another type is not gone yet: its timer was at it
-                if time.monotonic() > end:
-                    raise
-                time.sleep(0.02)
-        self.publishers[topic] = publisher
+        self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))
 
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self.publishers[topic]
@@ -205,13 +198,21 @@ class Commands:
                 raise TimeoutError(f"{service} does not answer")
             return serialize_message(answer.result()).hex()
         finally:
-            self.node.destroy_client(client)
+            self._while_nothing_waits(self.node.destroy_client, client)
 
     def withdraw(self, topic: str) -> None:
         timer = self.timers.pop(topic, None)
         if timer is not None:
-            self.node.destroy_timer(timer)
-        self.node.destroy_publisher(self.publishers.pop(topic))
+            self._while_nothing_waits(self.node.destroy_timer, timer)
+        self._while_nothing_waits(self.node.destroy_publisher, self.publishers.pop(topic))
+
+    def _while_nothing_waits(self, destroy: Callable[[Any], Any], entity: Any) -> None:
+        """On the thread that spins: it ends with an exception where it waits for what is destroyed."""
+        done = threading.Event()
+        task = self.executor.create_task(destroy, entity)
+        task.add_done_callback(lambda _: done.set())
+        if not done.wait(GONE_S):
+            raise TimeoutError(f"{entity} is still there after {GONE_S:g} s")
 
     def subscribers(self, topic: str) -> int:
         return int(self.publishers[topic].get_subscription_count())
@@ -238,12 +239,10 @@ class Commands:
 def main() -> None:
     rclpy.init()
     commands = Commands(sys.argv[1])
-    executor = SingleThreadedExecutor()
-    executor.add_node(commands.node)
 
     def spin() -> None:
         with contextlib.suppress(ExternalShutdownException):
-            executor.spin()
+            commands.executor.spin()
 
     spinning = threading.Thread(target=spin)
     spinning.start()
