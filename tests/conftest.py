@@ -17,6 +17,7 @@ from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
 from tests.support import domains, holds
 from tests.support.browsers import BROWSERS, FAILED, Browsers, ReusedPage
+from tests.support.operator_log import wait_for_the_disk
 from tests.support.parts import (
     BRIDGE,
     CHROMIUM,
@@ -103,6 +104,12 @@ def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setattr(tempfile, "tempdir", str(folder))
         yield
     shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patient_log() -> None:
+    """In this process; forked servers have the same."""
+    wait_for_the_disk()
 
 
 @pytest.fixture(scope="session")

@@ -25,6 +25,7 @@ from jinja2 import Environment, FileSystemBytecodeCache
 from app.cli.command_table import COMMANDS
 from app.panel import load_panel
 from tests.support.fork_parent import ForkParent
+from tests.support.operator_log import wait_for_the_disk
 
 MAIN: Final = Path("app/main.py")
 PANEL: Final = Path("app/panel.toml")
@@ -73,6 +74,7 @@ def prepare(templates: str) -> None:
     """Loads the message types and builds a panel's models. The first server compiles the templates into
     the folder `templates`, the others read them from there."""
     load_panel(PANEL)
+    wait_for_the_disk()
     keep = partialmethod(Environment.__init__, bytecode_cache=FileSystemBytecodeCache(templates))
     setattr(Environment, "__init__", keep)  # noqa: B010 - mypy takes no assignment to a method
 
