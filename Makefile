@@ -67,7 +67,7 @@ FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random
 	tests/runtime/test_nothing_grows.py tests/commands/test_holds.py tests/permission/test_control_authority.py \
 	tests/interfaces/test_fields.py tests/interfaces/test_values.py tests/interfaces/test_cdr_on_ros.py \
 	tests/commands/test_final_check.py tests/robot/test_topics.py tests/panel/test_toml_lines.py \
-	tests/panel/test_mistakes.py tests/web/test_openapi.py
+	tests/panel/test_mistakes.py tests/web/test_openapi.py tests/kiosk/test_watcher.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)

@@ -58,7 +58,7 @@ from app.web.serving import check_port, urls
 log = logging.getLogger("kiosk")
 
 # With several robots, their paths stand below that of each.
-OF_A_ROBOT: Final = (
+ROBOT_ROUTES: Final = (
     pages,
     events,
     presses,
@@ -107,7 +107,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
 
 
 def _add_routes(app: FastAPI, dev: bool) -> None:
-    for routes in OF_A_ROBOT:
+    for routes in ROBOT_ROUTES:
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, display):
@@ -143,7 +143,7 @@ async def _lifespan(settings: Settings, panel: Panel, app: FastAPI) -> AsyncIter
 
 
 async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
-    """What runs gets its time to end, and browsers theirs to read."""
+    """Ends the sessions and the log, and waits for outstanding responses."""
     watchdog.notify_stopping()
     try:
         state.fleet.close()

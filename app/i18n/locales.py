@@ -100,13 +100,13 @@ def date_time_in(text: str, language: str) -> str:
 
 
 def own_name(language: str) -> str:
-    """What a language is called in itself: "Deutsch"; its tag where Babel does not know it."""
+    """What a language is called in itself: "Deutsch"."""
     return OWN_NAMES.get(language) or babel_name(language)
 
 
 @cache
 def babel_name(language: str) -> str:
-    """The same, as Babel says it."""
+    """What a language is called in itself, by Babel; its tag where Babel does not know it."""
     locale = locale_of(language)
     name = locale.get_display_name() if locale is not None else None
     return f"{name[0].upper()}{name[1:]}" if name else language

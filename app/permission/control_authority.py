@@ -248,9 +248,9 @@ class ControlAuthority:
         self._install(heir)
         self._tell(f"control {how}, now of {heir.who if heir else 'no one'}")
 
-    def _pass_by_time(self, how: Literal["lost", "idle"], told: str) -> None:
+    def _pass_by_time(self, how: Literal["lost", "idle"], log_line: str) -> None:
         before = self._holder
-        self._pass_on(told)
+        self._pass_on(log_line)
         if before:
             self._passed(Passing(how, before.who, self._holder.who if self._holder else None))
 

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import pytest
 
@@ -22,6 +23,7 @@ from app.audit.store import Store
 from app.audit.ticket import Results
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogCorrupt, LogError
+from app.process.shutdown import SHUTDOWN_TIMEOUT_S
 from tests.support.operator_log import pressed, run, sent, until_good
 from tests.support.parts import ENOUGH_S, until
 from tests.support.words import english
@@ -126,6 +128,29 @@ def test_what_comes_together_shares_a_commit_and_a_sync(tmp_path: Path, disk: Di
 
     run(tmp_path, work)
     assert verify(tmp_path).count == 201
+
+
+SHIPPED: Final = (audit_log.PRESSED_WITHIN_S, audit_log.CLOSED_WITHIN_S)  # before tests change them
+
+
+def test_all_waits_for_the_disk_end_before_a_shutdown_does() -> None:
+    assert SHIPPED == (2.0, 3.0)
+    assert sum(SHIPPED) + audit_log.ENDED_WITHIN_S < SHUTDOWN_TIMEOUT_S
+
+
+def test_a_result_does_not_wait_for_a_disk_that_hangs(
+    tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(audit_log, "CLOSED_WITHIN_S", 0.1)
+
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed(1))
+        disk.open.clear()
+        assert "the disk did not store the entry" in str(await log.closed(sent(entry)))
+        disk.open.set()
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "published")]
 
 
 @pytest.mark.real_time

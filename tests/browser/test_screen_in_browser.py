@@ -297,10 +297,13 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     expect(page.locator("#whole")).to_be_hidden()
 
 
-def test_keys_that_lock_at_once_cost_one_layout(tmp_path: Path, page: Page) -> None:
+def test_keys_that_lock_at_once_are_measured_together(tmp_path: Path, page: Page) -> None:
     many = HEAD + "".join(KEY.format(number) for number in range(KEYS))
     with demo_server(tmp_path, many) as mine:
         page.goto(mine.url)
+        expect(page.locator(".key .more")).to_have_count(KEYS)  # whole.js is loaded
+        clock = page.locator("#clock").text_content() or ""
+        expect(page.locator("#clock")).not_to_have_text(clock)  # a beat: the snapshot is shown
         page.evaluate(NEXT_FRAME)
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable")
@@ -308,7 +311,7 @@ def test_keys_that_lock_at_once_cost_one_layout(tmp_path: Path, page: Page) -> N
         page.evaluate(LOCK_ALL)
         page.evaluate(NEXT_FRAME)
         counted = style_recalculations(session) - before
-        assert page.locator(".key .more:visible").count() == KEYS
+        expect(page.locator(".key .more:visible")).to_have_count(KEYS)
     assert counted < KEYS / 2
 
 

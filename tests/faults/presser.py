@@ -93,7 +93,9 @@ class Account:
     latest_s: float
 
     def __str__(self) -> str:
-        return f"{self.pressed} pressed, {self.refused} refused, {self.received} received"
+        counts = f"{self.pressed} pressed, {self.refused} refused, {self.received} received"
+        unknown = self.pressed - self.refused - self.received
+        return f"{counts}, {unknown} unknown" if unknown > 0 else counts
 
 
 Arrivals = Callable[[], Sequence[tuple[float, str]]]

@@ -6,6 +6,7 @@ kept until `heard` asks.
 
 import contextlib
 import itertools
+import queue
 import re
 import sys
 import threading
@@ -198,21 +199,29 @@ class Commands:
                 raise TimeoutError(f"{service} does not answer")
             return serialize_message(answer.result()).hex()
         finally:
-            self._while_nothing_waits(self.node.destroy_client, client)
+            self._destroy_on_spin_thread(self.node.destroy_client, client)
 
     def withdraw(self, topic: str) -> None:
         timer = self.timers.pop(topic, None)
         if timer is not None:
-            self._while_nothing_waits(self.node.destroy_timer, timer)
-        self._while_nothing_waits(self.node.destroy_publisher, self.publishers.pop(topic))
+            self._destroy_on_spin_thread(self.node.destroy_timer, timer)
+        self._destroy_on_spin_thread(self.node.destroy_publisher, self.publishers.pop(topic))
 
-    def _while_nothing_waits(self, destroy: Callable[[Any], Any], entity: Any) -> None:
-        """On the thread that spins: it ends with an exception where it waits for what is destroyed."""
-        done = threading.Event()
-        task = self.executor.create_task(destroy, entity)
-        task.add_done_callback(lambda _: done.set())
-        if not done.wait(GONE_S):
-            raise TimeoutError(f"{entity} is still there after {GONE_S:g} s")
+    def _destroy_on_spin_thread(self, destroy: Callable[[Any], Any], entity: Any) -> None:
+        """Destroyed elsewhere, an entity that is waited for ends the spinning with an exception."""
+        results: queue.SimpleQueue[Exception | None] = queue.SimpleQueue()
+
+        def work() -> None:
+            try:
+                destroy(entity)
+            except Exception as error:
+                results.put(error)
+            else:
+                results.put(None)
+
+        self.executor.create_task(work)
+        if error := results.get(timeout=GONE_S):
+            raise error
 
     def subscribers(self, topic: str) -> int:
         return int(self.publishers[topic].get_subscription_count())

@@ -8,7 +8,7 @@ from typing import Final
 from app.audit import Entry, Limits, OperatorLog, Origin, audit_log, new_entry
 
 LIMITS: Final = Limits()
-DISK_WITHIN_S: Final = 20.0
+DISK_WITHIN_S: Final = 8.0
 
 
 def wait_for_the_disk() -> None:
