@@ -90,12 +90,12 @@ class Account:
     pressed: int
     received: int
     refused: int
+    unknown: int  # with a receipt that says so
     latest_s: float
 
     def __str__(self) -> str:
         counts = f"{self.pressed} pressed, {self.refused} refused, {self.received} received"
-        unknown = self.pressed - self.refused - self.received
-        return f"{counts}, {unknown} unknown" if unknown > 0 else counts
+        return f"{counts}, {self.unknown} unknown" if self.unknown else counts
 
 
 Arrivals = Callable[[], Sequence[tuple[float, str]]]
@@ -124,5 +124,5 @@ def accounted(
     assert not refused_ones, f"refused, but received: {refused_ones[:5]}"
     latest = max((at - by_text[text].at for at, text in came), default=0.0)
     assert latest <= late_s, f"received {latest:.2f} s after its press"
-    refused = sum(p.outcome == "refused" for p in presses)
-    return Account(len(presses), len(came), refused, latest)
+    refused, unknown = (sum(p.outcome == one for p in presses) for one in ("refused", "unknown"))
+    return Account(len(presses), len(came), refused, unknown, latest)
