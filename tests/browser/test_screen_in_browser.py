@@ -12,6 +12,7 @@ from app.i18n import sentences
 from tests.browser.test_layout_in_browser import PANEL
 from tests.support.browsers import sized
 from tests.support.pages import DRAWN, place
+from tests.support.panel_text import MAIN, START
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready
 
@@ -53,23 +54,6 @@ LOCK_ALL: Final = """() => {
     key.querySelector(".face > p").textContent = "longer than the face of a key ".repeat(9);
   }
 }"""
-NEXT_FRAME: Final = "() => new Promise((shown) => requestAnimationFrame(() => setTimeout(shown)))"
-HEAD: Final = """
-title = "Keys"
-mode = "demo"
-[[page]]
-id = "one"
-title = "One"
-"""
-KEY: Final = """
-[[page.widget]]
-id = "key{}"
-kind = "publish"
-label = "Key"
-topic = "/operation1"
-type = "std_msgs/msg/String"
-message = {{ data = "" }}
-"""
 KEYS: Final = 40
 LONG: Final = (
     "A text that has much more to say than two lines of a key on a small screen can hold, to its end"
@@ -298,18 +282,19 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
 
 
 def test_keys_that_lock_at_once_are_measured_together(tmp_path: Path, page: Page) -> None:
-    many = HEAD + "".join(KEY.format(number) for number in range(KEYS))
+    keys = (START.replace('"start"', f'"key{number}"') for number in range(KEYS))
+    many = 'title = "Keys"\nmode = "demo"\n' + MAIN + "".join(keys)
     with demo_server(tmp_path, many) as mine:
         page.goto(mine.url)
         expect(page.locator(".key .more")).to_have_count(KEYS)  # whole.js is loaded
         clock = page.locator("#clock").text_content() or ""
         expect(page.locator("#clock")).not_to_have_text(clock)  # a beat: the snapshot is shown
-        page.evaluate(NEXT_FRAME)
+        page.evaluate(DRAWN)
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable")
         before = style_recalculations(session)
         page.evaluate(LOCK_ALL)
-        page.evaluate(NEXT_FRAME)
+        page.evaluate(DRAWN)
         counted = style_recalculations(session) - before
         expect(page.locator(".key .more:visible")).to_have_count(KEYS)
     assert counted < KEYS / 2
