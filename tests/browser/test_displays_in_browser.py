@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support.pages import widget
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, until
+from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 
 PANEL = """
@@ -266,7 +266,8 @@ def test_a_lamp_has_text_and_shape_for_each_state(cell: Server, robot: RosNode, 
 
     shows("No value yet", "waiting", "none")
     robot.advertise("/test_state", "std_msgs/msg/UInt8")
-    until(lambda: robot.subscribers("/test_state"), "the panel listens")
+    idle = {"data": 0}
+    publish_until(robot, "/test_state", idle, lambda: cell.widget("state")["state"] != "waiting")
     for value, *look in (
         (0, "Idle", "circle", "grey"),
         (2, "Fault", "cross", "red"),
@@ -310,12 +311,10 @@ def test_a_durability_that_the_robot_does_not_publish_is_reported(
             robot.withdraw("/test_current")
             until(lambda: mine.widget("current")["state"] == "waiting", "it went")
             robot.advertise("/test_current", "std_msgs/msg/Float32", durability="transient_local")
-
-            def is_heard() -> bool:
-                robot.publish("/test_current", {"data": 1.5})
-                return bool(mine.widget("current")["text"] == "1.5 A")
-
-            until(is_heard, "the right one is heard", every_s=0.2)
+            amperes = {"data": 1.5}
+            publish_until(
+                robot, "/test_current", amperes, lambda: mine.widget("current")["text"] == "1.5 A"
+            )
     finally:
         robot.withdraw("/test_current")
 

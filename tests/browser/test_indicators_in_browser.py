@@ -13,7 +13,7 @@ from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_width, reason, row_heights
 from app.panel.checks.tile_sizes import Screen
 from tests.support.pages import ROWS, widget
-from tests.support.parts import ROOT, Bridge, RosNode, Server, until
+from tests.support.parts import ROOT, Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server, panel_file
 
 PANEL: Final = """
@@ -96,6 +96,7 @@ label = "Part"
 field = "name"
 width = 2
 """
+TOPIC_OF: Final = {"arm": "/joint_states", "parts": "/diagnostics", "air": "/test_air"}
 TOPICS: Final = {
     "/joint_states": "sensor_msgs/msg/JointState",
     "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
@@ -120,8 +121,9 @@ def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory
             node.withdraw(topic)
 
 
-def air(node: RosNode, value: float) -> None:
-    node.publish("/test_air", {"data": value})
+def tell(cell: Server, node: RosNode, shown: str, /, **fields: Any) -> None:
+    """The robot says it on the topic of a widget: once, where it was heard there before."""
+    publish_until(node, TOPIC_OF[shown], fields, lambda: cell.widget(shown)["state"] != "waiting")
 
 
 def status(name: str, level: int) -> dict[str, Any]:
@@ -136,13 +138,15 @@ def test_a_gauge_moves_its_pointer_and_says_which_limit_it_is_beyond(
     expect(gauge).to_have_attribute("data-state", "waiting")
     expect(gauge.locator(".pointer")).to_be_hidden()
     expect(gauge.locator(".target")).to_have_text("set-point unknown")
-    node.publish("/test_air_set", {"data": 5.5})
+    publish_until(
+        node, "/test_air_set", {"data": 5.5}, lambda: cell.widget("air")["setpoint"] is not None
+    )
     for value, level, said, sign in (
         (5.5, "normal", "", ""),
         (6.5, "abnormal", "above normal 6", ".mild"),
         (2.5, "low", "below low 4", ".medium"),
     ):
-        air(node, value)
+        tell(cell, node, "air", data=value)
         expect(gauge).to_have_attribute("data-level", level)
         expect(gauge.locator(".said")).to_have_text(said)
         expect(gauge.locator(".value")).to_have_text(f"{value:g} bar")
@@ -152,7 +156,7 @@ def test_a_gauge_moves_its_pointer_and_says_which_limit_it_is_beyond(
             expect(gauge.locator(f".marks > {sign}")).to_be_visible()
     expect(gauge.locator(".setpoint")).to_have_attribute("y", "45%")
     expect(gauge.locator(".target")).to_have_text("set 5.5")
-    air(node, 11.0)
+    tell(cell, node, "air", data=11.0)
     lying = widget(page, "vacuum")
     expect(lying).to_have_attribute("data-beyond", "above")
     expect(lying.locator(".pointer")).to_have_attribute("x", "100%")
@@ -199,13 +203,12 @@ def test_joints_are_found_by_name_in_messages_of_any_order(
         (["lift", "joint_2", "joint_1"], [0.5, math.pi, -math.pi], ["−180.0", "+180.0", "+500.0"]),
         (["lift"], [0.75], ["missing", "missing", "+750.0"]),
     ):
-        node.publish("/joint_states", {"name": names, "position": positions})
+        tell(cell, node, "arm", name=names, position=positions)
         expect(values).to_have_text(texts)
     expect(joints.locator("li").nth(2).locator(".pointer")).to_have_attribute("x", "75%")
     expect(joints.locator("li").first.locator(".pointer")).to_be_hidden()
     expect(joints.locator(".said")).to_have_text("J1 is missing in the message and 1 more")
-    position = {"name": ["joint_1", "joint_2", "lift"], "position": [2.0, 0.0, 0.25]}
-    node.publish("/joint_states", position)
+    tell(cell, node, "arm", name=["joint_1", "joint_2", "lift"], position=[2.0, 0.0, 0.25])
     expect(joints.locator(".said")).to_have_text("J1 above its soft limit 90")
     expect(joints.locator("li").first.locator(".marks > .medium")).to_be_visible()
 
@@ -218,13 +221,13 @@ def test_a_table_keeps_the_latest_of_each_part_and_its_rows_stay_in_place(
     rows = table.locator("tbody tr:not([data-empty])")
     first = table.locator("tbody tr").first.element_handle()
     assert first is not None
-    node.publish("/diagnostics", {"status": [status("drive", 0), status("gripper", 0)]})
+    tell(cell, node, "parts", status=[status("drive", 0), status("gripper", 0)])
     expect(rows).to_have_text(["Good drive", "Good gripper"], use_inner_text=True)
-    node.publish("/diagnostics", {"status": [status("gripper", 1)]})
+    tell(cell, node, "parts", status=[status("gripper", 1)])
     expect(rows).to_have_text(["Warning gripper", "Good drive"], use_inner_text=True)
     expect(rows.first.locator("svg .triangle")).to_be_visible()
     more = [status(f"sensor {number}", 0) for number in range(5)]
-    node.publish("/diagnostics", {"status": more})
+    tell(cell, node, "parts", status=more)
     expect(table.locator(".said")).to_have_text("and 4 more")
     assert first.evaluate("(row) => row.isConnected && row.rowIndex") == 1
 
@@ -232,9 +235,9 @@ def test_a_table_keeps_the_latest_of_each_part_and_its_rows_stay_in_place(
 def test_without_scripts_the_page_shows_the_same(
     cell: Server, node: RosNode, without_scripts: Page
 ) -> None:
-    air(node, 2.5)
-    node.publish("/diagnostics", {"status": [status("gripper", 1)]})
-    node.publish("/joint_states", {"name": ["joint_1"], "position": [0.0]})
+    tell(cell, node, "air", data=2.5)
+    tell(cell, node, "parts", status=[status("gripper", 1)])
+    tell(cell, node, "arm", name=["joint_1"], position=[0.0])
     until(lambda: cell.widget("air")["text"] == "2.5", "the value arrived")
     until(lambda: cell.widget("arm")["joint_values"][0] == "+0.0", "the joint arrived")
     until(lambda: cell.widget("parts")["table_rows"], "the entry arrived")
@@ -248,8 +251,7 @@ def test_without_scripts_the_page_shows_the_same(
 
 
 def test_a_page_that_is_cut_off_shows_old_values(cell: Server, node: RosNode, page: Page) -> None:
-    air(node, 2.5)
-    until(lambda: cell.widget("air")["text"] == "2.5", "the value arrived")
+    tell(cell, node, "air", data=2.5)
     page.route("**/events*", lambda route: route.abort())
     page.goto(cell.url)
     for name in ("air", "arm", "parts"):

@@ -8,7 +8,15 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.support.pages import place
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, until
+from tests.support.parts import (
+    TAP_AGAIN_MS,
+    Bridge,
+    RosNode,
+    Server,
+    has_heard,
+    publish_until,
+    until,
+)
 from tests.support.servers import live_server
 
 PANEL: Final = """
@@ -53,8 +61,8 @@ def key(page: Page, way: str) -> Locator:
 
 
 def is_reported(cell: Server, node: RosNode, speed: float) -> None:
-    node.publish(REPORTED, {"data": speed})
-    until(lambda: cell.widget("speed")["text"] == f"{speed:g}", "the value is known")
+    reported = {"data": speed}
+    publish_until(node, REPORTED, reported, lambda: cell.widget("speed")["text"] == f"{speed:g}")
     until(lambda: cell.widget("speed")["enabled"], "the last press is over")
 
 

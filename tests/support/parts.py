@@ -273,6 +273,19 @@ class RosNode(Commanded):
         return locks | segments | {path.with_name(f"sem.{path.name}_mutex") for path in segments}
 
 
+def publish_until(
+    node: RosNode, topic: str, fields: Mapping[str, Any], is_known: Callable[[], Any]
+) -> None:
+    """Publishes until it has arrived: what a publisher of Fast DDS says just after it appeared may
+    never reach the bridge, though both know of each other."""
+
+    def arrives() -> Any:
+        node.publish(topic, fields)
+        return is_known()
+
+    until(arrives, f"what is published on {topic} arrives", every_s=0.1)
+
+
 def has_heard(node: RosNode, topic: str, count: int) -> bool:
     return len(node.heard(topic)) >= count
 
