@@ -34,15 +34,16 @@ dev: .venv/test
 # Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
 # pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
 # without them.
-WORKERS ?= 5
-# What is read of the tests is kept, wherever else nothing of Python's is: to prepare it anew takes each
-# worker as long as all that it does with it.
+WORKERS ?= 7
+# What is read of the tests is kept, wherever else nothing of Python's is, and is read once before the
+# workers begin: each of them would take 4 s to prepare it.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(if $(ARGS),.venv/test,test-parts)
 ifdef ARGS
 	$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS))
 	.venv/bin/pytest $(ARGS)
 else
+	.venv/bin/pytest --collect-only -qq > /dev/null || true  # the workers show why
 	.venv/bin/pytest --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; first=$$?; \
 	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && exit $$first
 endif
