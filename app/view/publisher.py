@@ -150,9 +150,9 @@ class ViewPublisher:
         """The events from the view before, as a page gets them."""
         if "update" not in self._news or page not in self._pages:
             return self._news
-        rest = {name: data for name, data in self._news.items() if name != "update"}
         changed = self._of_page(dict(self._news["update"]), page)
-        return {**rest, "update": changed} if changed else rest
+        events = {**self._news, "update": changed}  # in their order: keys lock before the rest is shown
+        return events if changed else {name: events[name] for name in events if name != "update"}
 
     def _all_of(
         self,

@@ -109,6 +109,16 @@ def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
     assert late["operation-enabled-updated"]["enabled"]
 
 
+def test_keys_change_before_the_frame_around_them_on_a_page_too(robot: RobotState) -> None:
+    publisher = ViewPublisher(view_of(robot), "r1", pages={"one": {"guarded"}})
+    old = {page: publisher.for_role("", page) for page in ("one", "")}
+    permits(robot)
+    publisher.post(view_of(robot))
+    for page, view in old.items():
+        sent = list(events(publisher.events_since(1, view, page=page)))
+        assert sent == ["operation-enabled-updated", "update", "link", "state"], page
+
+
 def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
     robot.graph.update_versions({})
