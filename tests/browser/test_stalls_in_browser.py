@@ -3,10 +3,7 @@ that has waited on the way."""
 
 import os
 import signal
-import socket
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -14,6 +11,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support.line import Line
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
 STOOD_STILL_S: Final = 5.0
@@ -84,69 +82,16 @@ def test_a_page_that_stood_still_shows_what_is_so_now_and_nothing_that_waited(
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
 
 
-class Line:
-    """A relay to a server: what the server sends passes at a limited speed, while a test wants it."""
-
-    def __init__(self, port: int) -> None:
-        self._server = port
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.port = int(self._listening.getsockname()[1])
-        self.slow = False
-        self.opened = 0
-        self._thread = threading.Thread(target=self._accept, daemon=True)
-        self._thread.start()
-
-    def _accept(self) -> None:
-        while True:
-            try:
-                browser, _ = self._listening.accept()
-            except OSError:
-                return  # closed
-            server = socket.create_connection(("127.0.0.1", self._server))
-            self._start(self._carry, browser, server)
-            self._start(self._crawl, server, browser)
-
-    def _start(self, how: Callable[[socket.socket, socket.socket], None], *ends: socket.socket) -> None:
-        threading.Thread(target=how, args=ends, daemon=True).start()
-
-    def _carry(self, browser: socket.socket, server: socket.socket) -> None:
-        try:
-            while data := browser.recv(65_536):
-                self.opened += data.startswith(b"GET /events?page=")
-                server.sendall(data)
-        except OSError:
-            pass
-        finally:
-            server.close()
-
-    def _crawl(self, server: socket.socket, browser: socket.socket) -> None:
-        try:
-            while data := server.recv(BYTES_PER_S // 10 if self.slow else 65_536):
-                browser.sendall(data)
-                if self.slow:
-                    time.sleep(0.1)
-        except OSError:
-            pass
-        finally:
-            browser.close()
-
-    def close(self) -> None:
-        self._listening.shutdown(socket.SHUT_RDWR)
-        self._listening.close()
-        self._thread.join(5)
-
-
 @pytest.fixture
 def line(kiosk: Server) -> Iterator[Line]:
-    mine = Line(kiosk.port)
-    yield mine
-    mine.close()
+    with Line(kiosk.port, BYTES_PER_S) as mine:
+        yield mine
 
 
 def test_a_page_whose_events_come_ever_later_asks_anew_and_then_follows_again(
     kiosk: Server, node: RosNode, page: Page, line: Line
 ) -> None:
-    page.goto(f"http://127.0.0.1:{line.port}")
+    page.goto(line.url)
     follows(page, node)
     opened = line.opened
     line.slow = True
