@@ -4,7 +4,7 @@ A language is a tag of BCP 47, such as "en" or "pt-BR". `msgid` is the code, `ms
 `{name}` where a parameter stands. What a catalogue lacks is said in English.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -14,6 +14,7 @@ ENGLISH: Final = "en"
 SUFFIX: Final = ".po"
 
 _folders: list[Path] = [Path(__file__).parent]
+_forget_made: list[Callable[[], None]] = []
 
 
 @contextmanager
@@ -29,9 +30,14 @@ def catalogues_in(folder: Path) -> Iterator[None]:
         _forget()
 
 
+def when_changed(forget: Callable[[], None]) -> None:
+    """`forget` is called when other catalogues count: what was made of those before is void."""
+    _forget_made.append(forget)
+
+
 def _forget() -> None:
-    files.cache_clear()
-    sentences.cache_clear()
+    for forget in (files.cache_clear, sentences.cache_clear, *_forget_made):
+        forget()
 
 
 @cache

@@ -7,9 +7,10 @@ their codes are in no catalogue, and each language writes them in its own way.
 
 import json
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any, Final, NoReturn, Union
 
-from app.i18n.catalogue import ENGLISH, sentences
+from app.i18n.catalogue import ENGLISH, sentences, when_changed
 from app.i18n.locales import date_time_in, number_in, time_in
 from app.printable import printable
 
@@ -95,7 +96,15 @@ def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> Tex
 
 def render(text: TextLike, language: str = ENGLISH) -> str:
     """As a reader of this language reads it."""
-    return text if isinstance(text, str) else printable(_filled(text, language))
+    return text if isinstance(text, str) else _rendered(text, language)
+
+
+@lru_cache(maxsize=1024)  # the same few sentences lock and open
+def _rendered(text: Text, language: str) -> str:
+    return printable(_filled(text, language))
+
+
+when_changed(_rendered.cache_clear)
 
 
 def _filled(text: Text, language: str) -> str:
@@ -152,8 +161,8 @@ _WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
 def localized(value: Any, language: str) -> Any:
     """The same JSON value with every Text in it rendered."""
     if isinstance(value, Text):
-        return render(value, language)
-    if isinstance(value, Mapping):
+        return _rendered(value, language)
+    if isinstance(value, dict):
         return {key: localized(one, language) for key, one in value.items()}
     if isinstance(value, list | tuple):
         return [localized(one, language) for one in value]

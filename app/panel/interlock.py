@@ -1,6 +1,7 @@
 """The description of an interlock: a field of a topic that permits commands."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
@@ -57,8 +58,8 @@ class Interlock(Description):
     def name(self) -> TextLike:
         return self.label or self.id
 
-    @property
-    def conditions(self) -> dict[str, Any]:
+    @cached_property
+    def conditions(self) -> Mapping[str, Any]:
         """Key → value of the given conditions."""
         given = {key: getattr(self, key) for key in CONDITIONS}
         return {key: value for key, value in given.items() if value is not None}

@@ -34,10 +34,10 @@ class Slices:
     def read(self, walk: Walk, size: int) -> Fields | None:
         """Decodes a message of `size` bytes; None if this turn's time ends first. DecodeError if the
         bytes are no such message."""
+        if size <= SMALL_BYTES:
+            return self.read_until(walk, math.inf)
         until = self._turn_deadline()
-        if size > SMALL_BYTES and self._now() >= until:
-            return None
-        return self.read_until(walk, until)
+        return None if self._now() >= until else self.read_until(walk, until)
 
     def read_until(self, walk: Walk, until: float) -> Fields | None:
         """The same until a time (monotonic seconds)."""

@@ -5,7 +5,8 @@ the difference to the newest. A client's role in control decides which view that
 each role. What is sent is encoded once for all streams of a language and a role: those that are equally
 far share the same bytes, the others those of each event that says all of something.
 
-A page gets what its own widgets show, and those of the frame; who names no page gets everything.
+A page gets what its own widgets show, and those of the frame: their locks, not the permissions behind
+them. Who names no page gets everything.
 """
 
 import asyncio
@@ -15,11 +16,11 @@ from typing import Any, Final
 
 from pydantic_core import to_json
 
-from app.i18n import ENGLISH, render
+from app.i18n import ENGLISH, localized
 from app.permission.control_authority_view import Role
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
-from app.view.sections import Events, difference
+from app.view.sections import PERMISSION_EVENT, Events, difference
 from app.view.view import View, for_role
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
@@ -30,7 +31,7 @@ SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"
 
 def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
     """JSON in one line, for clients that read lines. NaN and infinity are null; a Text is rendered."""
-    text = to_json(data, inf_nan_mode="null", fallback=lambda one: render(one, language))
+    text = to_json(localized(data, language), inf_nan_mode="null")
     for separator, escaped in SEPARATORS.items():
         text = text.replace(separator, escaped)
     return text
@@ -137,22 +138,23 @@ class ViewPublisher:
         prepared = self._prepared.get(key)
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
-            news = self._news_of(page) if latest else difference(view, self.for_role(role, page))
+            news = self._news if latest else difference(view, self.for_role(role, page))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, language)
                 if name == "update"
                 else self._all_of(name, data, language)
-                for name, data in news.items()
+                for name, data in self._shown(news, page).items()
             )
         return prepared
 
-    def _news_of(self, page: str) -> Events:
-        """The events from the view before, as a page gets them."""
-        if "update" not in self._news or page not in self._pages:
-            return self._news
-        changed = self._of_page(dict(self._news["update"]), page)
-        events = {**self._news, "update": changed}  # in their order: keys lock before the rest is shown
-        return events if changed else {name: events[name] for name in events if name != "update"}
+    def _shown(self, news: Events, page: str) -> Events:
+        """The events that a page gets, in their order: keys lock before the rest is shown."""
+        if page not in self._pages:
+            return news
+        shown = {name: data for name, data in news.items() if not name.endswith(PERMISSION_EVENT)}
+        if own := self._of_page(dict(shown.pop("update", {})), page):
+            shown = {"update": own, **shown}
+        return shown
 
     def _all_of(
         self,

@@ -1,6 +1,7 @@
 """The state of the robot in one word, as the frame shows it: pure, from the verdicts."""
 
 from collections.abc import Collection
+from functools import cache
 from typing import Final, Literal, TypedDict
 
 from app.i18n import TextLike, say
@@ -33,7 +34,9 @@ def robot_word(passable: Verdict, interlocks: Collection[Verdict]) -> RobotWord:
     return _word("unknown" if refused else "ready")
 
 
+@cache
 def _word(state: State) -> RobotWord:
+    """The same object for the same state. It must not be changed."""
     return RobotWord(state=state, text=say(f"state_{state}"))
 
 

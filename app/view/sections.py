@@ -5,6 +5,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
 
+PERMISSION_EVENT: Final = "-enabled-updated"  # behind an interlock's id: for programs
+
 
 class Section(NamedTuple):
     """`name` is its key in a view and in a snapshot, `events` what brings a browser from one content
@@ -25,7 +27,7 @@ def whole(name: str, old: Any, new: Any) -> Events:
 
 def _interlocks(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
     """One event for each permission."""
-    return {f"{name}-enabled-updated": state for name, state in new.items() if old.get(name) != state}
+    return {name + PERMISSION_EVENT: state for name, state in new.items() if old.get(name) != state}
 
 
 def _widgets(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:

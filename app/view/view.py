@@ -16,7 +16,7 @@ from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import for_role as control_for_role
 from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
-from app.permission.press_permission import Grounds, Question, permission
+from app.permission.press_permission import NO_GROUNDS, Grounds, Question, permission
 from app.robot.state import RobotState
 from app.view.kinds import Attributes, Enabled, enabled, show
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
@@ -81,7 +81,7 @@ def build_view(
     change `control` at `control_until`."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
-    grounds = Grounds(log_lock=lock)
+    grounds = Grounds(log_lock=lock) if lock else NO_GROUNDS
     questions = [
         Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
         for w in panel.commands
