@@ -26,6 +26,8 @@ log = logging.getLogger("kiosk.simulator")
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
+# A signal that comes to a thread of Zenoh's wakes no wait of the main thread, where it is handled.
+LOOK_S: Final = 0.2
 
 
 class Simulator:
@@ -132,7 +134,8 @@ def serve(
     try:
         with Simulator(endpoint, robots, interfaces, failed):
             listening()
-            ends.wait()
+            while not ends.wait(LOOK_S):
+                pass
     except zenoh.ZError as error:
         raise LinkError(f"can't listen at {endpoint}: {error}") from error
     if errors:
