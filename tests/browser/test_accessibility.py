@@ -1,12 +1,13 @@
 """What axe-core finds on the pages, what a keyboard reaches, how large targets are, and that nothing
 moves once a page is there."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from importlib.resources import files
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from app.i18n.catalogue import files as files_of_languages
 from app.panel import load_panel
@@ -16,7 +17,7 @@ from app.web.language import COOKIE as LANGUAGE
 from tests.support.browsers import ReusedPage
 from tests.support.line import Line
 from tests.support.pages import DRAWN, place
-from tests.support.parts import ROOT, Server
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
@@ -265,14 +266,43 @@ def test_what_is_touched_is_large_enough(example: Server, page: Page) -> None:
             assert min(stop["height"] / 12, stop["width"] / 18) * MM_PER_PX >= 1 - 0.01
 
 
-SHIFTS: Final = """new PerformanceObserver((list) => {
-  globalThis.shifts ??= [];
+# What moved, and whether the page has lost the server: the frame says so, in other words.
+SHIFTS: Final = """globalThis.shifts = [];
+globalThis.lost = false;
+new PerformanceObserver((list) => {
   for (const entry of list.getEntries()) {
     // A key's own face, and a unit that stands after its number, may.
     const moved = entry.sources.filter(({ node }) => !node?.parentElement?.closest(".face, .number"));
     globalThis.shifts.push(...moved.map(({ node }) => node?.outerHTML?.slice(0, 90)));
   }
-}).observe({ type: "layout-shift", buffered: true });"""
+}).observe({ type: "layout-shift", buffered: true });
+new MutationObserver(() => (globalThis.lost = true))
+  .observe(document, { subtree: true, attributeFilter: ["data-cut"] });"""
+
+
+def shifts(pages: Sequence[Page], url: str, states: Sequence[str]) -> list[list[str]]:
+    """What moved on each page until the robot has been in all these states; nothing where one has lost
+    the server in the meantime, as it may beside much work."""
+    for page in pages:
+        page.goto(url)
+    for state in states:
+        for page in pages:
+            expect(page.locator("#state")).to_have_attribute("data-state", state)
+    return [] if any(page.evaluate("lost") for page in pages) else [p.evaluate("shifts") for p in pages]
+
+
+@pytest.mark.parametrize(("path", "states"), [("/pages/setup", ["ready"]), ("/", ["locked", "ready"])])
+def test_nothing_moves_after_the_page_is_there(
+    example: Server, chromium: Browser, path: str, states: list[str]
+) -> None:
+    """Values come, and locks come and fall: what a key says moves nothing but its own face."""
+    sizes: list[ViewportSize] = [{"width": 1280, "height": 800}, {"width": 800, "height": 480}]
+    with ExitStack() as stack:
+        pages = [stack.enter_context(chromium.new_page(viewport=size)) for size in sizes]
+        for page in pages:
+            page.add_init_script(SHIFTS)
+        moved = until(lambda: shifts(pages, example.url + path, states), "pages keep their server")
+    assert moved == [[] for _ in sizes]
 
 
 SLOW: Final = 3_000  # bytes per second of a page that comes slowly
@@ -284,29 +314,11 @@ DRAWN_WHOLE: Final = """() => {
 }"""
 
 
-def comes_slowly(page: Page, line: Line, path: str) -> None:
-    line.slow = True
-    page.goto(line.url + path, wait_until="domcontentloaded")
-    line.slow = False
-
-
-@pytest.mark.parametrize("size", [(1280, 800), (800, 480)])
-def test_nothing_moves_after_the_page_is_there(example: Server, chromium: Browser, size: Any) -> None:
-    """Values come, and locks come and fall: what a key says moves nothing but its own face. Of a
-    page that comes slowly, as to a busy browser, no half is drawn."""
-    width, height = size
-    context = chromium.new_context(viewport={"width": width, "height": height})
-    context.add_init_script(SHIFTS)
-    page = context.new_page()
+def test_of_a_page_that_comes_slowly_no_half_is_drawn(example: Server, page: Page) -> None:
     with Line(example.port, SLOW) as line:
         page.goto(line.url)  # style sheet and scripts are there from now on
-        comes_slowly(page, line, "/pages/setup")
+        line.slow = True
+        page.goto(f"{line.url}/pages/setup", wait_until="domcontentloaded")
+        line.slow = False
         expect(page.locator("#state")).to_have_attribute("data-state", "ready")
         assert page.evaluate(DRAWN_WHOLE)
-        assert page.evaluate("globalThis.shifts ?? []") == []
-        comes_slowly(page, line, "/")
-        expect(page.locator("#state")).to_have_attribute("data-state", "locked")
-        expect(page.locator("#state")).to_have_attribute("data-state", "ready")
-        assert page.evaluate(DRAWN_WHOLE)
-        assert page.evaluate("globalThis.shifts ?? []") == []
-    context.close()
