@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
@@ -217,20 +217,36 @@ def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromi
     until(lambda: len(node.heard("/operation")) == before + 2, "the two presses, and no more")
 
 
+TAPS: Final = """() => {
+  globalThis.taps = [];
+  addEventListener("click", (event) => taps.push(event.timeStamp), true);
+}"""
+
+
 def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
+    page.evaluate(TAPS)
     publish = button(page, "Publish")
     expect(publish).to_be_enabled()
-    before = len(node.heard("/operation"))
     page.get_by_label("Message").fill("once")
-    publish.dblclick(delay=20)
-    expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+
+    def one_press_of_three_taps() -> bool:
+        """Not where the machine was so slow that the last one came later."""
+        before = len(node.heard("/operation"))
+        publish.dblclick(delay=20)
+        expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+        publish.click()
+        soon = float(page.evaluate("taps.at(-1) - taps.at(-3)")) < TAP_AGAIN_MS
+        page.wait_for_timeout(TAP_AGAIN_MS)
+        wanted = before + (1 if soon else 2)
+        until(lambda: len(node.heard("/operation")) >= wanted, "heard")
+        assert len(node.heard("/operation")) == wanted
+        return soon
+
+    until(one_press_of_three_taps, "three taps one soon after the other")
+    before = len(node.heard("/operation"))
     publish.click()
-    expect(publish).not_to_have_attribute("aria-busy", "true")
-    until(lambda: len(node.heard("/operation")) > before, "heard")
-    assert len(node.heard("/operation")) == before + 1
-    publish.click()
-    until(lambda: len(node.heard("/operation")) == before + 2, "a press after that is another one")
+    until(lambda: len(node.heard("/operation")) == before + 1, "a press after that is another one")
 
 
 @pytest.mark.real_time
