@@ -1,9 +1,8 @@
 """The reference system on the real parts: bridge, rclpy nodes, the server as users start it."""
 
 import re
-import secrets
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from socket import create_connection
@@ -12,11 +11,10 @@ import pytest
 import zenoh
 
 from tests.support.form import several
-from tests.support.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.parts import ROOT, Bridge, RosNode, Server, arrives, has_heard, live, until
 from tests.support.samples import TEXTS
 
 STARTS = several(12, 100)
-ARRIVES_WITHIN_S = 2.0
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 
 
@@ -37,18 +35,6 @@ def test_a_press_reaches_the_robot_with_its_text_intact(
     assert (answer.status_code, answer.json()["outcome"]) == (200, "published")
     until(lambda: len(node.heard("/operation")) > before, "the robot heard it")
     assert node.heard_data("/operation")[before:] == [text]
-
-
-def arrives(server: Server, node: RosNode) -> bool:
-    """Whether a press gets to the node; nothing of it is on its way any more. What is sent
-    before a Fast DDS node has discovered the bridge's writer never arrives."""
-    text = f"there? {secrets.token_hex(4)}"
-    if server.press("operation", text).json()["outcome"] != "published":
-        return False
-    with suppress(AssertionError):
-        until(lambda: text in node.heard_data("/operation"), "it arrives", ARRIVES_WITHIN_S)
-        return True
-    return False
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from app.printable import printable
 from tests.support.pages import HIDE, place
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, arrives, has_heard, live, until
 from tests.support.samples import TEXTS
 
 SIZES = [(1280, 800), (1024, 600)]
@@ -202,7 +202,7 @@ def test_a_page_without_scripts_loads_itself_again(
 
 
 def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromium: Browser) -> None:
-    until(server.ready, "ready")
+    until(partial(arrives, server, node), "the robot hears a press")
     before = len(node.heard("/operation"))
     for scripts in (True, False):
         context = chromium.new_context(java_script_enabled=scripts)
@@ -224,6 +224,7 @@ TAPS: Final = """() => {
 
 
 def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
+    until(partial(arrives, server, node), "the robot hears a press")
     page.goto(server.url)
     page.evaluate(TAPS)
     publish = button(page, "Publish")

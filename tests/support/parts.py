@@ -63,6 +63,7 @@ STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
 
 # Even on a busy machine, anything immediate happens within this time.
 ENOUGH_S = 40.0
+ARRIVES_WITHIN_S = 2.0
 SOONEST_S, LATEST_S = 0.01, 0.1  # until the next look at a condition
 GROWS = 0.05  # per second that it was waited for
 
@@ -284,6 +285,18 @@ def publish_until(
         return is_known()
 
     until(arrives, f"what is published on {topic} arrives", every_s=0.1)
+
+
+def arrives(server: "Server", node: RosNode) -> bool:
+    """Whether a press gets to the node; nothing of it is on its way any more. What is sent
+    before a Fast DDS node has discovered the bridge's writer never arrives."""
+    text = f"there? {secrets.token_hex(4)}"
+    if server.press("operation", text).json()["outcome"] != "published":
+        return False
+    with suppress(AssertionError):
+        until(lambda: text in node.heard_data("/operation"), "it arrives", ARRIVES_WITHIN_S)
+        return True
+    return False
 
 
 def has_heard(node: RosNode, topic: str, count: int) -> bool:
