@@ -158,7 +158,7 @@ def test_a_flood_on_an_interlock(rig: Rig, server: Server) -> None:
     until(lambda: watch.now("kept").enabled, "still permitted")
     published_at = time.monotonic()
     rig.robot.publish("/kept", {"data": False})
-    locked_s, _ = watch.locked_after(published_at, "kept", limit(SHOWN_WITHIN_S), "does not permit")
+    locked_s = watch.locked_after(published_at, "kept", limit(SHOWN_WITHIN_S), "does not permit")
     rig.robot.publish("/kept", {"data": True})
     watch.opened("kept")
     watch.end()
@@ -252,7 +252,7 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
         presses_work(presser)
         lied_at = time.monotonic()
         until(lambda: (liar.put("kept", b"\0\1\0\0"), not watch.now("kept").enabled)[1], "it locks")
-        locked_s, _ = watch.locked_after(lied_at, "kept", limit(SHOWN_WITHIN_S), "cannot be read")
+        locked_s = watch.locked_after(lied_at, "kept", limit(SHOWN_WITHIN_S), "cannot be read")
         for number in range(GARBAGE):
             liar.put(LISTENED_TO[number % len(LISTENED_TO)], lie(chance))
         until(lambda: "cannot be read" in watch.widgets["heard"]["note"], "the readout says so")

@@ -19,10 +19,11 @@ WELL: Final = 20  # presses that come through before and after
 @dataclass(frozen=True, slots=True)
 class Trial:
     """The result: `locked_s` from the fault to the first lock shown, `opened_s` from the repair to the
-    permission; `claimed` counts presses in between with the outcome `published`."""
+    permission; `claimed` counts presses with the outcome `published` while the part was broken. While
+    it breaks (the command that takes a link down runs for some milliseconds), a press may still come
+    through."""
 
     locked_s: float
-    reason: str
     opened_s: float
     account: Account
     claimed: int
@@ -49,14 +50,15 @@ def try_fault(
     """Breaks a part, waits for the lock and for `lasts_s`, repairs it, waits until presses are
     published.
 
-    `because` is in the reason of the lock that counts.
+    `because` is a regular expression; the lock that counts has a reason in which it is found.
     """
     watch, presser = Watch(server), Presser(server, widget)
     with answering(server):
         presses_work(presser)
         broken_at = time.monotonic()
         breaks()
-        locked_s, reason = watch.locked_after(broken_at, interlock, limit(locks_within_s), because)
+        gone_at = time.monotonic()
+        locked_s = watch.locked_after(broken_at, interlock, limit(locks_within_s), because)
         until(lambda: time.monotonic() >= broken_at + lasts_s, "the fault's time is over", lasts_s + 1)
         mended_at = time.monotonic()
         mends()
@@ -70,8 +72,8 @@ def try_fault(
         return press.answered_at < broken_at - UNDER_WAY_S or press.at > opened_at
 
     account = accounted(presses, lambda: rig.arrivals(widget), whole, limit(late_s))
-    claimed = sum(p.outcome == "published" and broken_at < p.at < mended_at for p in presses)
-    return Trial(locked_s, reason, opened_at - mended_at, account, claimed)
+    claimed = sum(p.outcome == "published" and gone_at < p.at < mended_at for p in presses)
+    return Trial(locked_s, opened_at - mended_at, account, claimed)
 
 
 def recorded(fault: str, trial: Trial) -> None:

@@ -1,6 +1,7 @@
 """What the kiosk shows while something breaks, and what its process takes: seen from outside."""
 
 import json
+import re
 import signal
 import threading
 import time
@@ -74,18 +75,16 @@ class Watch:
     def now(self, interlock: str) -> InterlockState:
         return self.states[interlock][-1]
 
-    def locked_after(
-        self, since: float, interlock: str, within_s: float, because: str = ""
-    ) -> tuple[float, str]:
-        """Seconds from `since` to the first later lock whose reason contains `because`, and its
-        reason."""
+    def locked_after(self, since: float, interlock: str, within_s: float, because: str = "") -> float:
+        """Seconds from `since` to the first later lock with a reason in which the regular expression
+        `because` is found."""
 
         def found() -> InterlockState | None:
             locks = (s for s in self.states[interlock] if s.at >= since and not s.enabled)
-            return next((s for s in locks if because in (s.reason or "")), None)
+            return next((s for s in locks if re.search(because, s.reason or "")), None)
 
         lock: InterlockState = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
-        return lock.at - since, lock.reason or ""
+        return lock.at - since
 
     def opened(self, interlock: str, within_s: float = ENOUGH_S) -> None:
         try:
