@@ -83,7 +83,7 @@ def test_a_latched_value_that_the_bridge_finds_late_does_not_count_as_fresh(
     it says how old it is. What a periodic one says next opens."""
     panel = tmp_path / "panel.toml"
     panel.write_text(PANEL)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel), EXACT_LIVENESS="1"))
     until(kiosk.ready, "joined")
     own_bridge.freeze()
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)

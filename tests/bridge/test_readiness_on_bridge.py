@@ -70,7 +70,7 @@ def some_time_passes(kiosk: Server) -> None:
 def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, EXACT_LIVENESS="1"))
     until(kiosk.ready, "ready")
     some_time_passes(kiosk)
     with main_loop_hangs(own_bridge):
@@ -89,7 +89,7 @@ def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
 def test_a_bridge_whose_main_loop_ended_is_seen_at_the_request(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, EXACT_LIVENESS="1"))
     until(kiosk.ready, "ready")
     with zenoh.open(client_of(own_bridge)) as other:
         token = other.liveliness().declare_token(f"@/{other.zid()}/@ros2_lv/XY")

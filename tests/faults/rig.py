@@ -112,7 +112,7 @@ def kiosk(endpoint: str, folder: Path, port: int = 0, panel: str = PANEL, **envi
     path.write_text(panel)
     zenoh = str(zenoh_file(folder, endpoint))
     given = {"KIOSK_PANEL": str(path), "KIOSK_ZENOH": zenoh, "PYTHONFAULTHANDLER": "1"}
-    return Server(ROOT, port, **given, **environment)
+    return Server(ROOT, port, EXACT_LIVENESS="1", **given, **environment)
 
 
 class Rig:

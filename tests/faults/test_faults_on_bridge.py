@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -17,6 +18,7 @@ from tests.support.parts import ROOT, Bridge, RosNode, Server, Stream, live, unt
 ENABLED = "operation-enabled-updated"
 FREEZES = 5
 LONG: Final = 400_000  # bytes of a message
+exact = partial(live, EXACT_LIVENESS="1")
 
 
 def speaking(node: RosNode, value: bool = True) -> None:
@@ -30,7 +32,7 @@ def strict(bridge: Bridge, folder: Path, condition: str) -> Server:
     panel = folder / "panel.toml"
     shipped = (ROOT / "app/panel.toml").read_text()
     panel.write_text(shipped.replace('field = "data"', f'field = "data"\n{condition}', 1))
-    return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
+    return exact(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
 
 
 def permitted(kiosk: Server) -> bool:
@@ -59,7 +61,7 @@ def kiosk(
 ) -> Server:
     """A kiosk behind a bridge that the test may end, whose robot permits."""
     speaking(own_node)
-    mine = servers(live(own_bridge.endpoint, tmp_path))
+    mine = servers(exact(own_bridge.endpoint, tmp_path))
     opened(mine)
     return mine
 
@@ -93,7 +95,7 @@ def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
 def test_after_a_return_an_old_permission_does_not_count(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(exact(own_bridge.endpoint, tmp_path))
     until(kiosk.ready, "ready")
     own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
     opened(kiosk)
@@ -144,7 +146,7 @@ def test_it_starts_without_a_bridge_and_keeps_trying(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     late = Bridge(domain + 3)
-    kiosk = servers(live(late.endpoint, tmp_path))
+    kiosk = servers(exact(late.endpoint, tmp_path))
     assert "No connection to the robot" in kiosk.widget("operation")["reason"]
     assert "bridge" in kiosk.http.get("/readyz").json()["reason"]
     late.start()
@@ -190,7 +192,7 @@ def test_what_the_robot_says_counts_after_each_of_many_freezes(
 ) -> None:
     """A session that Zenoh resumed by itself received nothing here after some freezes."""
     speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(exact(own_bridge.endpoint, tmp_path))
     for _ in range(FREEZES):
         own_node.publish("/operation_enabled", {"data": True})
         opened(kiosk)
@@ -259,7 +261,7 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
     own_node.advertise("/last_heard", "std_msgs/msg/String")
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     own_node.subscribe("/operation1", "std_msgs/msg/String")
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(exact(own_bridge.endpoint, tmp_path))
 
     def says_so() -> bool:
         own_node.publish("/operation_enabled", {"data": True})

@@ -36,7 +36,6 @@ UVICORN: Final = (
     "protocols.http.auto",
     "protocols.websockets.auto",
 )
-PATIENCE_S: Final = 10.0
 LATER: Final = (  # imported when a server starts, not by `app.main`
     "app.simulator.panel_robot",
     "app.simulator.zenoh_peer",
@@ -81,17 +80,19 @@ def prepare(templates: str) -> None:
 
 
 def bear_standstills() -> None:
-    """Beside other tests a server may stand still for a second. With a simulated robot, which stands
-    still with it, that refuses no press; what comes of it is tested with robots apart."""
-    from app.transport import bridge_liveness
+    """Beside other tests a server or a bridge may stand still for a second; here that locks nothing and
+    refuses no press. A test of what comes of it starts its server with `EXACT_LIVENESS=1`."""
+    from app.transport import bridge_liveness, bridge_peer, readiness
 
-    vars(bridge_liveness).update(STOOD_STILL_S=PATIENCE_S, SILENT_S=PATIENCE_S)
+    vars(bridge_liveness).update(STOOD_STILL_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
+    vars(bridge_peer)["WITHIN_S"] = 10.0
+    vars(readiness)["LIMIT_S"] = 15.0
 
 
 def become(arguments: list[str]) -> None:
     """Continues as `python -m MODULE …` in a folder."""
     folder, module, *_ = arguments
-    if "KIOSK_ZENOH" not in os.environ:
+    if not os.environ.get("EXACT_LIVENESS"):
         bear_standstills()
     os.chdir(folder)
     time.tzset()
