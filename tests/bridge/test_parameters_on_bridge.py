@@ -32,7 +32,6 @@ parameter = "speed"
 type = "double"
 unit = "m/s"
 max = 1.5
-timeout_s = 1.0
 {WIDGET}
 id = "name"
 label = "Name"
@@ -207,8 +206,13 @@ def test_whole_numbers_that_a_browser_has_not_are_exact(kiosk: Server, robot: Cy
     assert press(kiosk, "count", "9223372036854775808").status_code == 422
 
 
-def test_a_node_that_does_not_answer_in_time(kiosk: Server, robot: CycloneRobot) -> None:
-    robot.answer_parameters(service="set_parameters", seconds=2.0)
+def test_a_node_that_does_not_answer_in_time(
+    cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    hasty = PANEL.replace("max = 1.5\n", "max = 1.5\ntimeout_s = 1.0\n")
+    kiosk = servers(live_server(cyclone_bridge, tmp_path, hasty))
+    until(lambda: kiosk.widget("speed")["enabled"], "the parameters are read")
+    robot.answer_parameters(service="set_parameters", seconds=5.0)
     receipt = press(kiosk, "speed", 0.8, id="slow-1")
     assert (receipt.status_code, receipt.json()["outcome"]) == (504, "timed_out")
     assert "Cyclone" not in receipt.json()["reason"]
@@ -241,7 +245,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
     served(robot, own_client)
     kiosk = servers(live_server(own_cyclone_bridge, tmp_path, PANEL))
     until(lambda: kiosk.widget("name")["enabled"], "offered")
-    robot.answer_parameters(service="set_parameters", seconds=1.0)
+    robot.answer_parameters(service="set_parameters", seconds=4.0)
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(press, kiosk, "name", "later")
         until(lambda: robot.parameter_requests(service="set_parameters"), "the robot is at it")

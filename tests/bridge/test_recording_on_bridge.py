@@ -12,13 +12,13 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 
 from tests.interfaces.test_cdr_on_ros import RosCodec
-from tests.support.holds import PANEL
+from tests.support.holds import PANEL, PATIENT
 from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until
 from tests.support.servers import demo_server
 from tests.web.test_hold_socket import held, opened
 
 LOG = "rcl_interfaces/msg/Log"
-RECORD = "[record]\nbefore_s = 2\nafter_s = 1\n"
+RECORD = "[record]\nbefore_s = 10\nafter_s = {after_s}\n"
 READOUT = f"""
 [[page.widget]]
 id = "robot_log"
@@ -38,11 +38,17 @@ def codec() -> Iterator[RosCodec]:
     mine.end()
 
 
-def recording(bridge: Bridge, folder: Path) -> Server:
+def record(after_s: float) -> str:
+    """That a press is recorded until so long after it: a busy machine does what belongs together
+    within that time."""
+    return RECORD.format(after_s=after_s)
+
+
+def recording(bridge: Bridge, folder: Path, after_s: float = 6) -> Server:
     """A kiosk with the shipped panel and a readout, that records."""
     shipped = (ROOT / "app/panel.toml").read_text()
     panel = folder / "panel.toml"
-    panel.write_text(shipped.replace("[[interlock]]", f"{RECORD}[[interlock]]", 1) + READOUT)
+    panel.write_text(shipped.replace("[[interlock]]", f"{record(after_s)}[[interlock]]", 1) + READOUT)
     return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel), KIOSK_DATA=str(folder / "data"))
 
 
@@ -99,7 +105,7 @@ def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
     for schema, channel, message in found["/robot_log"]:
         assert (schema.name, schema.encoding, channel.message_encoding) == (LOG, "ros2msg", "cdr")
         assert b"\nMSG: builtin_interfaces/Time\nint32 sec\n" in schema.data
-        assert 0 <= message.log_time - message.publish_time < 1e9  # received after the bridge had it
+        assert 0 <= message.log_time - message.publish_time < 60e9  # received after the bridge had it
         decoded.append(codec.decode(schema.name, message.data))
     assert decoded[0]["stamp"] == {"sec": 7, "nanosec": 8}
     assert [one["msg"] for one in decoded] == sorted((one["msg"] for one in decoded), reverse=True)
@@ -112,7 +118,7 @@ def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
     ]
     pressed_at = found["/web_ui/presses"][0][2].log_time
     times = [message.log_time for _, _, message in found["/robot_log"]]
-    assert min(times) >= pressed_at - 2.1e9
+    assert min(times) >= pressed_at - 10.1e9
     assert min(times) < pressed_at < max(times)
 
 
@@ -130,7 +136,8 @@ def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, st
 def test_a_hold_is_recorded_from_its_begin_to_its_end(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(demo_server(tmp_path, PANEL + RECORD, KIOSK_DATA=str(tmp_path / "data")))
+    data = str(tmp_path / "data")
+    kiosk = servers(demo_server(tmp_path, PANEL + record(4), app=PATIENT, KIOSK_DATA=data))
     with opened(kiosk) as socket:
         assert socket.begin(inputs={"speed": 99})["state"] == "refused"
     with held(kiosk) as socket:
@@ -151,7 +158,7 @@ def test_a_hold_is_recorded_from_its_begin_to_its_end(
 def test_a_killed_server_leaves_a_recording_to_the_next_one(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(recording(own_bridge, tmp_path))
+    kiosk = servers(recording(own_bridge, tmp_path, after_s=60))
     until(kiosk.ready, "ready")
     own_node.advertise("/robot_log", LOG)
     says(own_node, kiosk, "before")

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -27,7 +27,7 @@ def speaking(node: RosNode, value: bool = True) -> None:
     node.publish("/operation_enabled", {"data": value})
 
 
-def strict(bridge: Bridge, folder: Path, condition: str, **more: str) -> Server:
+def strict(bridge: Bridge, folder: Path, condition: str, **more: Any) -> Server:
     """A kiosk whose interlock has one more condition."""
     panel = folder / "panel.toml"
     shipped = (ROOT / "app/panel.toml").read_text()

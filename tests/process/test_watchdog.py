@@ -16,7 +16,7 @@ import pytest
 
 from app.process.sd_notify import ServiceManager, status_line
 from app.process.watchdog import Watchdog
-from tests.support.parts import ROOT, Process, Server, free_port, live, until
+from tests.support.parts import ROOT, Process, Server, free_port, http_client, live, until
 
 INTERVAL_S = 1.0
 WATCHED = {"WATCHDOG_USEC": str(int(INTERVAL_S * 1e6))}
@@ -120,7 +120,7 @@ def wounded(listener: Listener) -> Iterator[tuple[Process, httpx.Client]]:
     env = {"NOTIFY_SOCKET": listener.address, **WATCHED, "PYTHONPATH": str(ROOT)}
     process = Process([sys.executable, "-c", STANDS_STILL, str(port)], env, cwd=ROOT)
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=2, trust_env=False) as http:
+        with http_client(f"http://127.0.0.1:{port}") as http:
             until(lambda: ready(listener), "it is well")
             yield process, http
     finally:
@@ -144,7 +144,7 @@ def test_no_ping_while_the_event_loop_stands_still(
 ) -> None:
     process, _ = wounded
     process.send(signal.SIGUSR2)
-    listener.silent_for("WATCHDOG", 0.1)  # one may have been sent before
+    until(lambda: listener.silent_for("WATCHDOG", 0.1), "those that were sent before are read")
     assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
 
 

@@ -14,7 +14,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from app.kiosk.page_script import LOOK
-from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client
+from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client, until
 
 WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
 HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)
@@ -27,9 +27,12 @@ PRESS = """(text) => {
 }"""
 # Presses ten times a second, each time with another text, until the page is gone.
 PRESS_ON = f"""(name) => {{
+    if (window.pressed === name) return true;
+    window.pressed = name;
     let number = 0;
     clearInterval(window.pressing);
     window.pressing = setInterval(() => ({PRESS})(`${{name}} ${{number++}}`), 100);
+    return true;
 }}"""
 
 
@@ -85,10 +88,12 @@ class KioskScreen:
         return bool(runs and page["drawn"] and page["age_s"] < ALIVE_WITHIN_S)
 
     def press_on(self, name: str) -> None:
-        self.evaluate(f"({PRESS_ON})({json.dumps(name)})")
+        """Presses ten times a second; each press has a text of its own."""
+        until(lambda: self.evaluate(f"({PRESS_ON})({json.dumps(name)})"), "the page presses")
 
     def stop_presses(self) -> None:
-        self.evaluate("clearInterval(window.pressing)")
+        stop = "clearInterval(window.pressing), true"
+        until(lambda: self.evaluate(stop), "the page presses no more")
 
     def processes(self, kind: str) -> list[int]:
         """Those of a kind: "browser", "renderer" or "GPU"."""
