@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, Page, expect
 
 from app.i18n import ENGLISH, sentences
@@ -35,6 +36,9 @@ from tests.support.parts import (
 from tests.support.servers import ready
 
 expect.set_options(timeout=1000 * ENOUGH_S)
+# An example may take long on a busy machine.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 sentences(ENGLISH)  # read before any test measures time
 
 

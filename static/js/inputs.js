@@ -67,3 +67,4 @@ function equip(input) {
 }
 
 for (const input of document.querySelectorAll("input[type=number]")) equip(input);
+document.documentElement.dataset.inputs = ""; // steps and commas are in force

@@ -27,8 +27,8 @@ from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
 from app.robot.state import RobotState
 from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
-from tests.support.holds import PANEL
-from tests.support.parts import Server, until
+from tests.support.holds import PANEL, PATIENT
+from tests.support.parts import ENOUGH_S, Server, until
 from tests.support.servers import demo_server
 from tests.support.words import english
 from tests.web.test_hold_socket import opened
@@ -49,7 +49,7 @@ message = { data = "{speed}" }
 
 @pytest.fixture
 def demo(tmp_path: Path) -> Iterator[Server]:
-    with demo_server(tmp_path, PANEL + DRIVE) as mine:
+    with demo_server(tmp_path, PANEL + DRIVE, app=PATIENT) as mine:
         yield mine
 
 
@@ -199,8 +199,9 @@ def test_they_are_summed_up_while_the_flood_goes_on(
         permits(cell.robot, False)
         for number in range(ENOUGH):
             await cell.press(f"f{number}")
-        await asyncio.sleep(0.3)
-        assert rows(tmp_path, Filter(text="more refusals", every=True), None, 10)
+        async with asyncio.timeout(ENOUGH_S):
+            while not rows(tmp_path, Filter(text="more refusals", every=True), None, 10):
+                await asyncio.sleep(0.01)
 
     written(tmp_path, work)
 

@@ -105,6 +105,7 @@ def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
     assert last["y"] + last["height"] < 600 - 12 / 0.22  # above the tabs
     page.get_by_role("link", name="Robot 7").click()
     expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")
+    expect(page.locator("html[data-floor]")).to_be_attached()  # its scripts are there
     page.get_by_label("Message").fill("from the screen")
     page.get_by_role("button", name="Publish", exact=True).click()
     expect(page.locator('[data-widget="last_heard"]')).to_contain_text("from the screen (/operation)")

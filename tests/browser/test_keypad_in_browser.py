@@ -34,6 +34,20 @@ KEY_SIZES: Final = """(keys) => Object.fromEntries(keys.map((key) => {
 }))"""
 
 
+# Whether a tap hits the key below the sheet, and whether it does so as the sheet closes.
+NOTE_HIT: Final = """() => {
+  window.hit = () => {
+    const key = document.querySelector("[data-widget=load]");
+    const { x, y, width, height } = key.getBoundingClientRect();
+    return key.contains(document.elementFromPoint(x + width / 2, y + height / 2));
+  };
+  new MutationObserver(() => {
+    const settles = "settling" in document.body.dataset && !document.querySelector(".sheet");
+    if (settles) window.hitAtClose ??= hit();
+  }).observe(document.body, { attributeFilter: ["data-settling"] });
+}"""
+
+
 def enter(page: Page, keys: str) -> None:
     for key in keys:
         page.locator(f'.sheet [data-key="{key}"]').tap()
@@ -213,9 +227,13 @@ def test_hold_keys_are_locked_while_it_is_open(screen: Page) -> None:
 
 
 def test_a_hold_ends_when_it_opens(screen: Page) -> None:
-    screen.get_by_role("button", name="Left").focus()
-    screen.keyboard.down(" ")
-    expect(screen.locator("[data-widget=jog][data-hold]")).to_be_attached()
+    def holds() -> bool:  # as soon as its script is there, and the stream has enabled it
+        screen.keyboard.up(" ")
+        screen.get_by_role("button", name="Left").focus()
+        screen.keyboard.down(" ")
+        return screen.locator("[data-widget=jog][data-hold]").count() == 1
+
+    until(holds, "it is held", every_s=0.2)
     open_for(screen, "#input-speed")
     expect(screen.locator("[data-widget=jog][data-hold]")).to_have_count(0)
     screen.keyboard.up(" ")
@@ -254,15 +272,12 @@ def test_stop_is_pressed_while_it_is_open(screen: Page) -> None:
 
 def test_a_second_tap_on_set_presses_nothing_below(screen: Page) -> None:
     open_for(screen, "#input-speed")
+    screen.evaluate(NOTE_HIT)
     screen.locator(".set-entry").tap()
-    hit = """() => {
-      const key = document.querySelector("[data-widget=load]");
-      const { x, y, width, height } = key.getBoundingClientRect();
-      return key.contains(document.elementFromPoint(x + width / 2, y + height / 2));
-    }"""
-    assert not screen.evaluate(hit)
+    screen.wait_for_function("() => window.hitAtClose !== undefined")
+    assert screen.evaluate("hitAtClose") is False
     settled(screen)
-    assert screen.evaluate(hit)
+    assert screen.evaluate("hit()")
 
 
 def test_another_field_takes_its_place_and_nothing_was_entered(screen: Page) -> None:

@@ -151,9 +151,15 @@ def take_control(page: Page) -> None:
 
 
 def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
+    expect(shown.locator("html[data-floor]")).to_be_attached()
     take_control(shown)
-    shown.locator('[data-widget="allow"] > button').click()
     dialog = shown.locator("dialog[open]")
+
+    def asks() -> bool:  # as soon as the script of the question is there
+        shown.locator('[data-widget="allow"] > button').click()
+        return dialog.is_visible()
+
+    until(asks, "it asks", every_s=0.2)
     expect(dialog.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
     expect(dialog.locator("dd")).to_have_text("(empty)")
     yes, no = box(shown, "dialog[open] .yes"), box(shown, "dialog[open] .no")

@@ -4,7 +4,7 @@ import re
 import signal
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -14,8 +14,19 @@ import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from app.printable import printable
+from tests.support import holds
 from tests.support.pages import HIDE, place
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, arrives, has_heard, live, until
+from tests.support.parts import (
+    TAP_AGAIN_MS,
+    Bridge,
+    RosNode,
+    Server,
+    arrives,
+    has_heard,
+    live,
+    publish_until,
+    until,
+)
 from tests.support.samples import TEXTS
 
 SIZES = [(1280, 800), (1024, 600)]
@@ -34,15 +45,26 @@ def why(page: Page, widget: str) -> Any:
     return page.locator(f"#why-{widget}")
 
 
-def permit(node: RosNode, value: bool) -> None:
-    node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": value})
+@pytest.fixture(scope="module")
+def node(node: RosNode) -> Iterator[RosNode]:
+    """The robot, which says whether it permits and what it heard last."""
+    topics = {"/operation_enabled": "std_msgs/msg/Bool", "/last_heard": "std_msgs/msg/String"}
+    for topic, type_name in topics.items():
+        node.advertise(topic, type_name)
+    yield node
+    for topic in topics:
+        node.withdraw(topic)
+
+
+def permit(server: Server, node: RosNode, value: bool) -> None:
+    holds.permit(server, node, value, widget="operation1")
 
 
 def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
     expect(button(page, "Publish1")).to_be_disabled()
     expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
-    permit(node, True)
+    permit(server, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
     expect(button(page, "Publish2")).to_be_enabled()
     before = len(node.heard("/operation1"))
@@ -50,7 +72,7 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
     button(page, "Publish1").click()
     expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1 at")
     until(lambda: node.heard_data("/operation1")[before:] == ["pick up"], "the robot has it")
-    permit(node, False)
+    permit(server, node, False)
     for name, widget in (("Publish1", "operation1"), ("Publish2", "operation2")):
         expect(button(page, name)).to_be_disabled()
         expect(button(page, name)).to_have_css("background-color", "rgb(169, 169, 169)")
@@ -60,7 +82,7 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
         described = button(page, name).get_attribute("aria-describedby") or ""
         assert f"why-{widget}" in described.split()
     expect(button(page, "Publish")).to_be_enabled()
-    permit(node, True)
+    permit(server, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
 
 
@@ -79,8 +101,7 @@ def polling(server: Server, node: RosNode, page: Page) -> Page:
     other = page.context.new_page()
     other.goto(f"{server.url}/log")
     other.evaluate(NO_STREAM_LEFT)
-    permit(node, True)
-    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    permit(server, node, True)
     with page.expect_request(SNAPSHOT):
         page.goto(server.url)
     expect(button(page, "Publish1")).to_be_enabled()
@@ -88,8 +109,10 @@ def polling(server: Server, node: RosNode, page: Page) -> Page:
 
 
 def say(node: RosNode, server: Server, text: str) -> None:
-    node.once("/last_heard", "std_msgs/msg/String", {"data": text})
-    until(lambda: server.widget("last_heard")["text"] == printable(text), "the server has it")
+    def is_known() -> bool:
+        return bool(server.widget("last_heard")["text"] == printable(text))
+
+    publish_until(node, "/last_heard", {"data": text}, is_known)
 
 
 def test_a_text_with_line_separators_keeps_no_button_open(
@@ -97,7 +120,7 @@ def test_a_text_with_line_separators_keeps_no_button_open(
 ) -> None:
     say(node, server, SEPARATED)
     expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
-    permit(node, False)
+    permit(server, node, False)
     expect(button(polling, "Publish1")).to_be_disabled()
     expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
 
@@ -114,7 +137,7 @@ def test_line_separators_that_come_as_they_are_end_no_line_of_a_snapshot(
     polling.route(SNAPSHOT, unescaped)
     say(node, server, SEPARATED)
     expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
-    permit(node, False)
+    permit(server, node, False)
     expect(button(polling, "Publish1")).to_be_disabled()
     expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
 
@@ -149,13 +172,11 @@ def test_a_reload_shows_the_true_state_before_any_script(
     server: Server, node: RosNode, without_scripts: Page
 ) -> None:
     until(server.ready, "ready")
-    permit(node, True)
-    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    permit(server, node, True)
     page = without_scripts
     page.goto(server.url)
     expect(button(page, "Publish1")).to_be_enabled()
-    permit(node, False)
-    until(lambda: not server.widget("operation1")["enabled"], "forbidden")
+    permit(server, node, False)
     page.reload()
     expect(button(page, "Publish1")).to_be_disabled()
     expect(why(page, "operation1")).to_contain_text("does not permit")
@@ -195,9 +216,9 @@ def test_a_page_without_scripts_loads_itself_again(
     page = without_scripts
     page.goto(mine.url)
     expect(button(page, "Publish1")).to_be_disabled()
-    permit(node, True)
+    permit(mine, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
-    permit(node, False)
+    permit(mine, node, False)
     expect(button(page, "Publish1")).to_be_disabled()
 
 
@@ -219,35 +240,39 @@ def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromi
 
 TAPS: Final = """() => {
   globalThis.taps = [];
-  addEventListener("click", (event) => taps.push(event.timeStamp), true);
+  addEventListener("click", () => taps.push(performance.now()), true);
 }"""
+JOINED_MS: Final = 700 - 50  # a tap so soon after another one is the same press
 
 
 def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
-    until(partial(arrives, server, node), "the robot hears a press")
     page.goto(server.url)
     page.evaluate(TAPS)
     publish = button(page, "Publish")
     expect(publish).to_be_enabled()
     page.get_by_label("Message").fill("once")
 
+    def presses() -> int:
+        """So far: what the server sends last arrives last."""
+        expect(publish).not_to_have_attribute("aria-busy", "true")
+        until(partial(arrives, server, node), "the robot hears a press")
+        return node.heard_data("/operation").count("once")
+
     def one_press_of_three_taps() -> bool:
         """Not where the machine was so slow that the last one came later."""
-        before = len(node.heard("/operation"))
+        before = presses()
         publish.dblclick(delay=20)
         expect(page.locator("#receipt-operation")).to_contain_text("Sent")
         publish.click()
-        soon = float(page.evaluate("taps.at(-1) - taps.at(-3)")) < TAP_AGAIN_MS
-        page.wait_for_timeout(TAP_AGAIN_MS)
-        wanted = before + (1 if soon else 2)
-        until(lambda: len(node.heard("/operation")) >= wanted, "heard")
-        assert len(node.heard("/operation")) == wanted
+        soon = float(page.evaluate("taps.at(-1) - taps.at(-3)")) < JOINED_MS
+        after = presses()
+        assert not soon or after == before + 1
         return soon
 
     until(one_press_of_three_taps, "three taps one soon after the other")
-    before = len(node.heard("/operation"))
+    before = presses()
     publish.click()
-    until(lambda: len(node.heard("/operation")) == before + 1, "a press after that is another one")
+    assert presses() == before + 1, "a press after that is another one"
 
 
 @pytest.mark.real_time
@@ -271,7 +296,7 @@ def test_a_lost_server_locks_every_control_within_two_seconds(
         expect(page.locator('[data-lamp="server"]')).to_have_attribute("data-state", "bad")
         if fault == "frozen":
             mine.process.send(signal.SIGCONT)
-            expect(button(page, "Publish")).to_be_enabled(timeout=15_000)
+            expect(button(page, "Publish")).to_be_enabled()
     finally:
         mine.process.send(signal.SIGCONT)
         mine.end(signal.SIGKILL)
@@ -322,10 +347,10 @@ def test_eight_tabs_of_one_browser_all_work(server: Server, node: RosNode, chrom
     for page in pages:
         page.goto(server.url)
         expect(button(page, "Publish")).to_be_enabled()
-    permit(node, True)
+    permit(server, node, True)
     for page in pages:
         expect(button(page, "Publish1")).to_be_enabled()
-    permit(node, False)
+    permit(server, node, False)
     for page in pages:
         expect(button(page, "Publish1")).to_be_disabled()
         expect(why(page, "operation1")).to_contain_text("does not permit")
@@ -349,14 +374,14 @@ def test_a_hidden_tab_gives_its_stream_back_and_takes_a_snapshot_when_shown(
         return f"kiosk_streams {count}.0" in server.http.get("/metrics").text
 
     until(server.ready, "ready")
-    permit(node, True)
+    permit(server, node, True)
     page.goto(server.url)
     expect(button(page, "Publish1")).to_be_enabled()
     until(lambda: streams(1), "one stream")
     page.evaluate(HIDE, True)
     until(lambda: streams(0), "no stream")
     expect(button(page, "Publish1")).to_be_disabled()
-    permit(node, False)
+    permit(server, node, False)
     page.evaluate(HIDE, False)
     until(lambda: streams(1), "one stream again")
     expect(why(page, "operation1")).to_contain_text("does not permit")
@@ -367,7 +392,7 @@ def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) ->
     hostile = "</p><img src=x onerror=alert(1)><script>document.title='owned'</script>"
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
-    node.once("/last_heard", "std_msgs/msg/String", {"data": hostile})
+    say(node, server, hostile)
     value = page.locator('[data-widget="last_heard"] .value')
     expect(value).to_have_text(hostile)
     page.reload()
@@ -409,7 +434,7 @@ def test_the_first_page_is_small_and_asks_no_other_host(demo: Server, chromium: 
 
     until(all_came, "all has come")
     urls = requested_urls()
-    assert len(urls) <= 11, urls
+    assert len(set(urls)) <= 11, urls  # a stream that is lost is opened again
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)
     assert received.total() < 30_000
@@ -423,7 +448,7 @@ def test_the_page_fits_its_screen_with_buttons_of_twenty_millimetres(
     page.set_viewport_size({"width": width, "height": height})
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
-    permit(node, True)
+    permit(server, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
     button(page, "Publish1").click()
     expect(page.locator("#receipt-operation1")).to_contain_text("Sent")
@@ -439,7 +464,7 @@ def test_the_page_fits_its_screen_with_buttons_of_twenty_millimetres(
     fits = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     assert page.evaluate(fits) <= [width, height]
     heading = page.locator('[data-widget="last_heard"]').bounding_box()
-    permit(node, False)
+    permit(server, node, False)
     expect(button(page, "Publish1")).to_be_disabled()
     # Nothing moved under a finger when the locks came.
     assert page.locator('[data-widget="last_heard"]').bounding_box() == heading

@@ -49,6 +49,7 @@ def test_a_browser_changes_its_language_and_no_other_ones(
 def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -> None:
     page.goto(kiosk.url)
     choose(page, "Deutsch")
+    expect(page.locator("html[lang=de][data-inputs]")).to_be_attached()
     entry = page.locator('[data-widget="limit"] input')
     entry.fill("")
     entry.press_sequentially("0,5")

@@ -12,6 +12,7 @@ from tests.support.cyclone import CycloneRobot
 from tests.support.pages import place, widget
 from tests.support.parts import Bridge, Server, until
 from tests.support.servers import live_server
+from tests.support.touch import loaded
 
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client
@@ -44,6 +45,7 @@ def test_a_number_is_stepped_and_set_with_gloves(
     expect(speed.locator(".value")).to_have_text("0.5 m/s")
     entry = speed.get_by_role("spinbutton")
     expect(entry).to_have_value("0.5")
+    expect(page.locator("html[data-inputs]")).to_be_attached()
     for _ in range(3):
         page.get_by_role("button", name="Speed: more").click()
     expect(entry).to_have_value("0.8")
@@ -113,11 +115,16 @@ def test_what_a_dialog_shows_is_what_is_set(
         until(lambda: kiosk.widget("limit")["enabled"], "the parameters are read")
         until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
         robot.set_parameter(name="limit", value=20)
-        page.goto(kiosk.url)
+        loaded(page, kiosk)
         entry = widget(page, "limit").get_by_role("spinbutton")
         expect(entry).to_have_value("20")
-        set_(page, "Limit")
         dialog = page.get_by_role("dialog")
+
+        def asks() -> bool:  # as soon as the script of the question is there
+            set_(page, "Limit")
+            return dialog.is_visible()
+
+        until(asks, "it asks", every_s=0.2)
         expect(dialog.locator("dd")).to_have_text("20")
         robot.set_parameter(name="limit", value=21)
         expect(widget(page, "limit").locator(".value")).to_have_text("21")

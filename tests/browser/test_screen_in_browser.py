@@ -184,8 +184,12 @@ def test_groups_that_have_no_room_side_by_side_take_turns(
     box = place(tab)
     assert min(box["width"], box["height"]) >= 44
     stop = button(page, "Stop").bounding_box()
-    tab.click()
-    expect(tab).to_have_attribute("aria-pressed", "true")
+
+    def is_shown() -> bool:  # as soon as the tabs' script is there
+        tab.click()
+        return tab.get_attribute("aria-pressed") == "true"
+
+    until(is_shown, "its group is shown", every_s=0.2)
     assert shown_groups(page) == then
     assert button(page, "Stop").bounding_box() == stop
     assert page.evaluate(OVERFLOWS) == []
@@ -238,6 +242,7 @@ def test_a_touch_on_a_locked_key_shows_its_whole_reason(long: Server, page: Page
     why = page.locator("#why-locked")
     expect(why).to_contain_text(DOORS)
     assert why.evaluate("(why) => why.scrollHeight > why.clientHeight")
+    expect(key.locator(".more")).to_be_attached()  # whole.js is loaded
     key.click()
     expect(whole.get_by_role("heading")).to_have_text("Locked")
     expect(whole.locator("p")).to_have_text(why.text_content() or "")
@@ -271,6 +276,7 @@ def test_what_a_key_was_answered_is_shown_whole_and_presses_nothing(long: Server
 def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     """What is no longer so is not read on."""
     sized(page, 1024, 600).goto(long.url)
+    expect(page.locator("[data-widget=locked] .more")).to_be_attached()  # whole.js is loaded
     page.locator("[data-widget=locked]").click()
     expect(page.locator("#whole p")).to_contain_text(DOORS)
     page.locator("#why-locked [data-text=reason]").evaluate(
@@ -339,7 +345,7 @@ def test_the_tabs_change_sides(cell: Server, page: Page) -> None:
     left = place(tabs)
     button(page, "Menu").click()
     button(page, "On the right").click()
-    expect(page.locator("html")).to_have_attribute("data-hand", "left")
+    expect(page.locator("html[data-hand=left][data-floor]")).to_be_attached()  # its styles apply
     moved = place(tabs)
     assert left["x"] == 0
     assert moved["x"] + moved["width"] == 1280

@@ -18,6 +18,7 @@ from tests.support.parts import (
     until,
 )
 from tests.support.servers import live_server
+from tests.support.touch import loaded
 
 PANEL: Final = """
 title = "Cell"
@@ -99,7 +100,7 @@ def test_a_press_is_one_step_and_the_next_waits_for_it(cell: Server, node: RosNo
 
 def test_the_value_under_the_finger_counts(cell: Server, node: RosNode, page: Page) -> None:
     is_reported(cell, node, 20.0)
-    page.goto(cell.url)
+    loaded(page, cell)
     down = key(page, "down")
     expect(down).to_have_attribute("value", "10")
     expect(down).to_be_enabled()

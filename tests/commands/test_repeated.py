@@ -17,7 +17,7 @@ from app.audit.database import NAME
 from app.audit.entry import as_json
 from app.audit.store import Store
 from app.audit.verify import verify
-from tests.bridge.test_calls_on_bridge import PANEL
+from tests.bridge import test_calls_on_bridge
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, Server, until
@@ -28,6 +28,7 @@ client = cyclone.client
 robots = cyclone.robots
 robot = cyclone.robot
 
+PANEL = test_calls_on_bridge.PANEL.replace("timeout_s = 1.0", "timeout_s = 30.0")  # of `slow`
 TEXT = "std_msgs/msg/String"
 SLOW = {"id": "slow-1", "inputs": {}}
 

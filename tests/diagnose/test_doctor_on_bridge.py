@@ -3,7 +3,7 @@ nothing else is."""
 
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +13,11 @@ import pytest
 import zenoh
 
 from app.cli.command import main
+from app.diagnose import link
 from app.diagnose.watch import Watched, watch
+from app.transport import bridge_graph_reader
+from app.transport.inbox import Changes
+from app.transport.zenoh_session import ZenohSession
 from tests.diagnose.setups import (
     BOOL,
     LONGEST_S,
@@ -29,7 +33,7 @@ from tests.diagnose.setups import (
     readout,
 )
 from tests.support.cyclone import Client
-from tests.support.parts import Bridge, RosNode, free_port, until
+from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, publish_until, until
 
 TRIGGER = "std_srvs/srv/Trigger"
 LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
@@ -80,7 +84,17 @@ def robot(shared: Bridge) -> Iterator[RosNode]:
 
 
 @pytest.fixture
-def setup(tmp_path: Path) -> Setup:
+def setup(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setup:
+    """Waits for a bridge that is slow on a busy machine."""
+    monkeypatch.setattr(link, "HANDSHAKE_S", ENOUGH_S)
+    monkeypatch.setattr(link, "ASK_S", ENOUGH_S)
+    monkeypatch.setattr(bridge_graph_reader, "ANNOUNCED_WITHIN_S", ENOUGH_S)
+    return Setup(tmp_path)
+
+
+@pytest.fixture
+def short_setup(tmp_path: Path) -> Setup:
+    """Waits no longer than the command does: nothing comes."""
     return Setup(tmp_path)
 
 
@@ -175,19 +189,35 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
 ]
 
 
+async def watch_all(
+    session: ZenohSession, topics: Mapping[str, str], _: Iterable[str], longest_s: float
+) -> Watched:
+    """Waits for messages on every topic."""
+    return await watch(session, topics, topics, longest_s)
+
+
 @pytest.mark.parametrize(("text", "expected"), [b[1:] for b in BROKEN], ids=[b[0] for b in BROKEN])
 def test_what_is_broken_is_named_and_nothing_else(
-    text: str, expected: list[tuple[str, str]], shared: Bridge, robot: RosNode, setup: Setup
+    text: str,
+    expected: list[tuple[str, str]],
+    shared: Bridge,
+    robot: RosNode,
+    setup: Setup,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    by_what_it_says = {"permission_not_latched", "permission_stale", "clock_differs", "simulated_time"}
-    listen_s = LONGEST_S if expected[0][0] in by_what_it_says else 0.2
+    listen_s = 0.2
+    if expected[0][0] in {"permission_not_latched", "permission_stale"}:
+        listen_s = LONGEST_S
+    elif expected[0][0] in {"clock_differs", "simulated_time"}:
+        listen_s = ENOUGH_S
+        monkeypatch.setattr("app.diagnose.robot.watch", watch_all)
     found = setup.findings(text, shared.endpoint, listen_s)
     assert named(found) == expected
     assert all(one.what and one.do for one in found)
 
 
 def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setup: Setup) -> None:
-    found = setup.diagnose(WELL, shared.endpoint)
+    found = setup.diagnose(WELL, shared.endpoint, listen_s=ENOUGH_S)
     assert found.report.findings == []
     facts = "\n".join(found.report.facts)
     assert f"domain {shared.domain}" in facts
@@ -196,12 +226,26 @@ def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setu
 
 
 def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
-    shared: Bridge, robot: RosNode, setup: Setup
+    shared: Bridge, robot: RosNode, setup: Setup, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = panel_of(interlock("/hasty"))
+    drain, heard = ZenohSession.drain, threading.Event()
+
+    def drained(session: ZenohSession) -> Changes:
+        changes = drain(session)
+        if changes.kept:
+            heard.set()
+        return changes
+
+    def publish() -> None:
+        robot.advertise("/hasty", BOOL)
+        publish_until(robot, "/hasty", {"data": True}, heard.is_set)
+        robot.withdraw("/hasty")
+
+    monkeypatch.setattr(ZenohSession, "drain", drained)
+    monkeypatch.setattr("app.diagnose.watch.ENOUGH", 1000)  # it waits for the end of the publisher
     with ThreadPoolExecutor() as pool:
-        published = pool.submit(robot.once, "/hasty", BOOL, {"data": True})
-        found = setup.findings(text, shared.endpoint, listen_s=15)
+        published = pool.submit(publish)
+        found = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
         published.result()
     assert named(found) == [("permission_ends", "/hasty")]
 
@@ -245,15 +289,15 @@ def test_a_name_that_is_unknown(setup: Setup) -> None:
     assert named(setup.findings(WELL, endpoint)) == [("host_unknown", endpoint)]
 
 
-def test_a_port_where_no_zenoh_speaks(setup: Setup) -> None:
+def test_a_port_where_no_zenoh_speaks(short_setup: Setup) -> None:
     with closing(socket.create_server(("127.0.0.1", 0))) as silent:
         endpoint = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
-        assert named(setup.findings(WELL, endpoint)) == [("not_zenoh", endpoint)]
+        assert named(short_setup.findings(WELL, endpoint)) == [("not_zenoh", endpoint)]
 
 
-def test_a_router_without_a_bridge(setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
+def test_a_router_without_a_bridge(short_setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
     endpoint, _ = peer
-    assert named(setup.findings(WELL, endpoint)) == [("no_bridge", endpoint)]
+    assert named(short_setup.findings(WELL, endpoint)) == [("no_bridge", endpoint)]
 
 
 def test_a_bridge_with_another_namespace(domain: int, setup: Setup) -> None:
@@ -275,10 +319,10 @@ def test_a_bridge_that_drops_in_silence(domain: int, setup: Setup) -> None:
         assert [one.code for one in found] == ["bridge_drops", "bridge_domain"]
 
 
-def test_a_frozen_bridge(domain: int, setup: Setup) -> None:
+def test_a_frozen_bridge(domain: int, short_setup: Setup) -> None:
     with started(Bridge(domain + 4)) as bridge:
         bridge.freeze()
-        assert named(setup.findings(WELL, bridge.endpoint)) == [("not_zenoh", bridge.endpoint)]
+        assert named(short_setup.findings(WELL, bridge.endpoint)) == [("not_zenoh", bridge.endpoint)]
 
 
 @pytest.mark.parametrize(("frozen_s", "expected"), [(2.0, "wrong_rmw"), (60.0, "bridge_silent")])

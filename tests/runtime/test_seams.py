@@ -24,6 +24,7 @@ from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_session import RobotSession, ServerParts
 from app.simulator.in_process import in_process
+from app.transport import bridge_liveness
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_config import config_to
 from app.view.kinds import Enabled
@@ -302,6 +303,8 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
 ) -> None:
     for module in (controller, lease):  # a busy machine misses heartbeats
         monkeypatch.setattr(module, "LEASE_S", ENOUGH_S)
+    for limit in ("STOOD_STILL_S", "SILENT_S"):  # and its loop stands still
+        monkeypatch.setattr(bridge_liveness, limit, ENOUGH_S)
 
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")

@@ -46,6 +46,10 @@ SCRIPTS: Final = {
         "hold_by_escape",
     ),
 }
+# Whether the script of a hold listens to its button: it lets no touch open a menu.
+LISTENS: Final = """
+    (button) => !button.dispatchEvent(new Event("touchstart", { cancelable: true }))
+"""
 
 
 class Touch:
@@ -84,6 +88,7 @@ class Finger:
         self.up()
         self.page.goto(self.server.url)
         expect(self.button).to_be_enabled()
+        until(lambda: self.button.evaluate(LISTENS), "the script of the hold is there")
         self._surface.scroll_into_view_if_needed()
         self.x, self.y = middle(self._surface)
 

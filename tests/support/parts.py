@@ -299,6 +299,11 @@ def arrives(server: "Server", node: RosNode) -> bool:
     return False
 
 
+def sends(server: "Server", text: str) -> bool:
+    """Whether a press is sent: a server that stood still for a moment refuses it."""
+    return bool(server.press("operation", text).json()["outcome"] == "published")
+
+
 def has_heard(node: RosNode, topic: str, count: int) -> bool:
     return len(node.heard(topic)) >= count
 
@@ -326,7 +331,9 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
 
 
 def http_client(url: str, timeout_s: float = ENOUGH_S, **more: Any) -> httpx.Client:
-    """An HTTP client for a test server, without TLS: reading the certificates takes 0.1 s."""
+    """An HTTP client for a test server, without TLS: reading the certificates takes 0.1 s. It leaves an
+    idle connection before the server does: a request may be lost on one that closes."""
+    more.setdefault("limits", httpx.Limits(keepalive_expiry=2))
     return httpx.Client(base_url=url, timeout=timeout_s, trust_env=False, verify=False, **more)
 
 
@@ -417,7 +424,7 @@ class Server:
         host = headers.pop("host", f"127.0.0.1:{self.port}")
         way = socket.create_connection(("127.0.0.1", self.port))
         url = f"ws://{host}{self.base}/presses"
-        with connect(url, sock=way, additional_headers=headers) as connection:
+        with connect(url, sock=way, additional_headers=headers, open_timeout=ENOUGH_S) as connection:
             yield PressSocket(connection)
 
     @contextmanager

@@ -145,6 +145,7 @@ def run(
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bridge_liveness, "EVERY_S", 0.02)
     monkeypatch.setattr(bridge_liveness, "SILENT_S", 0.1)
+    monkeypatch.setattr(bridge_liveness, "STOOD_STILL_S", 60.0)
 
 
 async def until(what: Callable[[], object]) -> None:

@@ -167,6 +167,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.real_time
 def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> None:
     """A peer that is frozen: the kernel's buffers fill, and then what is sent, and what is asked."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -235,12 +236,24 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
 ) -> None:
     _, session = peer
     link = linked(declared(["a", "b"], [], watched=["a"]))
-    until(lambda: link.drain().link_up, "a link")
+    ends: list[bytes] = []
+    link.look("end", "end", lambda payload: ends.append(bytes(payload)))
+    # What it declared before is known as well.
+    until(partial(matched, session.declare_publisher("end")), "it is subscribed")
+
+    def put(key: str, payload: bytes) -> None:
+        session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def put_end(end: bytes) -> None:
+        """A session's messages come in order: all others have come by then."""
+        put("end", end)
+        until(lambda: end in ends, "all came")
+
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
     for key in ("a", "b"):
         for payload in said:
-            session.put(key, payload)
-    time.sleep(0.5)
+            put(key, payload)
+    put_end(b"first")
     samples = link.drain().samples
     watched, other = samples["a"], samples["b"]
     assert bytes(watched.payload) == bytes(other.payload) == b"yes"
@@ -248,8 +261,8 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     assert [bytes(one.payload) for one in watched.skipped_payloads] == changes
     assert other.skipped_payloads == ()
     for payload in (b"yes", b"no", b"no", b"yes"):
-        session.put("a", payload)
-    time.sleep(0.5)
+        put("a", payload)
+    put_end(b"second")
     assert [bytes(one.payload) for one in link.drain().samples["a"].skipped_payloads] == [b"yes", b"no"]
 
 

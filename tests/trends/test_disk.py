@@ -20,6 +20,7 @@ from app.trends.disk import TrendDisk
 from app.trends.file import NAME, FieldName, TrendFile
 from app.trends.recorder import TrendRecorder
 from tests.support.builders import INTERFACES, Table, panel_of, robot_there
+from tests.support.parts import ENOUGH_S
 
 FLOAT: Final = "std_msgs/msg/Float64"
 PEN: Final[Table] = {"topic": "/speed", "type": FLOAT, "label": "Speed"}
@@ -128,6 +129,8 @@ async def settled(what: Any) -> None:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(disks, "WRITE_EVERY_S", 0.02)
+    for limit in ("LOAD_TIMEOUT_S", "STOP_TIMEOUT_S"):  # for a busy machine
+        monkeypatch.setattr(disks, limit, ENOUGH_S)
 
 
 def test_a_restart_finds_what_was_before(tmp_path: Path) -> None:
@@ -246,7 +249,6 @@ def test_a_disk_that_stands_still_does_not_keep_the_panel_from_its_start(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(disks, "LOAD_TIMEOUT_S", 0.05)
-    monkeypatch.setattr(disks, "STOP_TIMEOUT_S", 20.0)
     opened = TrendFile.__init__
     freed: list[bool] = []
 

@@ -107,13 +107,13 @@ def test_values_wait_for_the_frame_and_come_together() -> None:
         robot = there(SLOW)
         showing = showing_of(SLOW, robot)
         showing.now()
-        began, version = time.monotonic(), showing.publisher.version
+        due, version = showing.due, showing.publisher.version
         for number in range(100):
             says(robot, "/heard", str(number))
             showing.values({robot.key("/heard")})
         assert showing.publisher.version == version
         await newer(showing.publisher, version)
-        assert time.monotonic() - began >= 1 / SLOW.display_hz - 0.01
+        assert time.monotonic() >= due
         assert showing.publisher.version == version + 1
         assert showing.publisher.view["widgets"]["heard"]["text"] == "99"
         showing.stop()

@@ -15,10 +15,20 @@ from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 from app.web.routes.press_socket import MOST_AT_ONCE
 from tests.runtime.test_nothing_grows import MUTE, Robot, widget
 from tests.support.pages import HIDE
-from tests.support.parts import ROOT, PressSocket, Server, as_response, until, zenoh_file
+from tests.support.parts import (
+    ENOUGH_S,
+    ROOT,
+    PressSocket,
+    Server,
+    as_response,
+    until,
+    zenoh_file,
+)
 from tests.web.test_server import reads_nothing
 
-WAITS_S: Final = 1.5
+WAITS_S: Final = 3.0  # long enough to see a press that is under way
+LONG_S: Final = 2 * ENOUGH_S
+LONG_SHUTDOWN: Final = "tests.support.apps.long_shutdown:app"
 LATER_S: Final = 1.2  # than an ending server gives a client that reads nothing
 FREE: Final = """
     [[page.widget]]
@@ -38,14 +48,14 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 @contextmanager
-def slow(folder: Path, waits_s: float = WAITS_S) -> Iterator[Server]:
+def slow(folder: Path, waits_s: float = WAITS_S, app: str = "app.main:app") -> Iterator[Server]:
     """On a robot that answers no call."""
     robot = Robot()
     panel = folder / "slow.toml"
     calls = "".join(widget(name, waits_s) for name in MUTE)
     panel.write_text(f'title = "Slow"\nmode = "live"\n[[page]]\nid = "p"\ntitle = "P"\n{FREE}{calls}')
     zenoh = str(zenoh_file(folder, robot.endpoint))
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_ZENOH=zenoh)
+    mine = Server(ROOT, app=app, KIOSK_PANEL=str(panel), KIOSK_ZENOH=zenoh)
     until(lambda: all(w["enabled"] for w in mine.snapshot()["widgets"].values()), "all is offered")
     yield mine
     mine.end()
@@ -98,7 +108,7 @@ def test_who_leaves_before_the_answer_loses_only_that(kiosk: Server) -> None:
 
 
 def test_a_server_that_ends_reports_the_result_of_a_press_that_is_under_way(tmp_path: Path) -> None:
-    with slow(tmp_path) as mine, mine.socket() as socket:
+    with slow(tmp_path, app=LONG_SHUTDOWN) as mine, mine.socket() as socket:
         socket.say(press(MUTE[0], "late"))
         until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
         mine.process.send(signal.SIGTERM)
@@ -116,7 +126,7 @@ def stopping(socket: PressSocket) -> bool:
 @pytest.mark.parametrize("way", ["socket", "post"])
 def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str) -> None:
     with (
-        slow(tmp_path, waits_s=60) as mine,
+        slow(tmp_path, LONG_S) as mine,
         mine.socket() as socket,
         mine.socket() as other,
         ThreadPoolExecutor() as pool,
@@ -124,31 +134,35 @@ def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str
         began = time.monotonic()
         if way == "socket":
             socket.say(press(MUTE[0], "long"))
-            answered = pool.submit(socket.hear)
+            answered = pool.submit(socket.hear, ENOUGH_S)
         else:
             body = {"inputs": {}, "id": "long"}
             answered = pool.submit(lambda: mine.http.post(f"/widgets/{MUTE[0]}", json=body).json())
         until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
         mine.process.send(signal.SIGTERM)
         until(lambda: stopping(other), "nothing more is sent", every_s=0.05)
-        said = answered.result(10)
+        said = answered.result(ENOUGH_S)
         assert (said["id"], said["outcome"]) == ("long", "unknown")
         assert said["reason"] == "The panel server is shutting down. The result is unknown."
-        assert mine.process.wait(10) == -signal.SIGTERM  # which uvicorn raises again
-        assert time.monotonic() - began < 10
+        assert mine.process.wait(ENOUGH_S) == -signal.SIGTERM  # which uvicorn raises again
+        assert time.monotonic() - began < LONG_S
     assert said["reason"] in logged(mine, "long")
 
 
 def test_who_comes_while_it_ends_and_reads_nothing_holds_it_up_no_longer(tmp_path: Path) -> None:
-    with slow(tmp_path, waits_s=60) as mine, mine.socket() as socket, mine.socket() as other:
+    with (
+        slow(tmp_path, LONG_S, LONG_SHUTDOWN) as mine,
+        mine.socket() as socket,
+        mine.socket() as other,
+    ):
         socket.say(press(MUTE[0], "long"))
         until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
         mine.process.send(signal.SIGTERM)
         until(lambda: stopping(other), "nothing more is sent", every_s=0.05)
         time.sleep(LATER_S)
         with reads_nothing(mine):
-            assert socket.hear()["outcome"] == "unknown"
-            mine.process.wait(10)
+            assert socket.hear(ENOUGH_S)["outcome"] == "unknown"
+            mine.process.wait(ENOUGH_S)
 
 
 def test_what_is_no_press_gets_an_error(kiosk: Server) -> None:
@@ -223,7 +237,7 @@ def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, own_page: Pa
     sockets: list[WebSocket] = []
     page.on("websocket", lambda socket: sockets.append(socket))
     page.add_init_script(
-        "const real = setTimeout; setTimeout = (does, ms) => real(does, ms === 60_000 ? 1000 : ms);"
+        "const real = setTimeout; setTimeout = (does, ms) => real(does, ms === 60_000 ? 5000 : ms);"
     )
     page.goto(kiosk.url)
     expect(publish(page)).to_be_enabled()

@@ -20,6 +20,7 @@ import zenoh
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.support.parts import (
+    ENOUGH_S,
     ROOT,
     Bridge,
     Process,
@@ -28,6 +29,7 @@ from tests.support.parts import (
     free_port,
     http_client,
     live,
+    publish_until,
     until,
 )
 from tests.support.servers import ready
@@ -326,8 +328,8 @@ def test_it_ends_while_it_connects_to_what_says_nothing(tmp_path: Path) -> None:
 
 def test_it_leaves_what_stands_still_at_its_end_and_says_where() -> None:
     mine = Server(ROOT, app="tests.support.apps.standing:app")
-    assert mine.end(signal.SIGTERM, timeout_s=10) == 1
-    assert "Timeout (0:00:01)!" in mine.process.text
+    assert mine.end(signal.SIGTERM, timeout_s=ENOUGH_S) == 1
+    assert "Timeout (0:00:05)!" in mine.process.text
     assert "tests/support/apps/standing.py" in mine.process.text
 
 
@@ -471,8 +473,15 @@ def test_bytes_that_are_no_message_lock_and_are_counted(
 ) -> None:
     kiosk = servers(live(own_bridge.endpoint, tmp_path))
     until(kiosk.ready, "ready")
-    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
-    until(lambda: kiosk.widget("operation1")["enabled"], "permitted")
+
+    def permit() -> None:
+        """By a publisher that ends afterwards."""
+        topic, enabled = "/operation_enabled", {"data": True}
+        own_node.advertise(topic, "std_msgs/msg/Bool")
+        publish_until(own_node, topic, enabled, lambda: kiosk.widget("operation1")["enabled"])
+        own_node.withdraw(topic)
+
+    permit()
     with zenoh.open(client_of(own_bridge)) as peer:
 
         def locked() -> bool:
@@ -490,8 +499,7 @@ def test_bytes_that_are_no_message_lock_and_are_counted(
         'kiosk_undecodable_total{key="operation_enabled",robot=""}' in kiosk.http.get("/metrics").text
     )
     assert kiosk.process.text.count("[ERROR]") <= 2  # a line per topic and minute
-    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
-    until(lambda: kiosk.widget("operation1")["enabled"], "a message opens again")
+    permit()  # a message opens again
 
 
 def test_no_thread_or_task_is_left_behind_by_a_hundred_streams(demo: Server) -> None:

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from app.web.connections import FILES_WANTED
 from app.web.proxies import Proxies
 from app.web.serving import bounded, urls
 from tests.support.apps.small import CONNECTIONS
-from tests.support.parts import ROOT, Server, free_port, until
+from tests.support.parts import ENOUGH_S, ROOT, Server, free_port, http_client, until
 from tests.support.servers import ready
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -40,6 +40,21 @@ def plain() -> Iterator[Server]:
 @pytest.fixture(scope="module")
 def hasty() -> Iterator[Server]:
     with ready(Server(ROOT, app="tests.support.apps.hasty:app")) as mine:
+        yield mine
+
+
+@contextmanager
+def short_heads(within_s: float) -> Iterator[Server]:
+    """A server that closes a connection when the head of a request takes longer, and for nothing
+    else."""
+    app, options = "tests.support.apps.short_heads:app", ["--timeout-keep-alive=60"]
+    with Server(ROOT, app=app, options=options, HEAD_WITHIN_S=str(within_s)) as mine:
+        yield mine
+
+
+@pytest.fixture(scope="module")
+def shortest_heads() -> Iterator[Server]:
+    with short_heads(0.5) as mine:
         yield mine
 
 
@@ -124,8 +139,8 @@ def test_a_message_in_pieces_is_bounded_as_a_whole(plain: Server) -> None:
         pytest.param([HEAD + b"\r\n" + HEAD, *[b"X-A: b\r\n"] * 1000], id="a second head"),
     ],
 )
-def test_a_head_has_its_time(hasty: Server, said: list[bytes]) -> None:
-    with opened(hasty) as one:
+def test_a_head_has_its_time(shortest_heads: Server, said: list[bytes]) -> None:
+    with opened(shortest_heads) as one:
         left = iter(said)
 
         def closed() -> bool:
@@ -147,12 +162,18 @@ def test_a_head_has_its_size(plain: Server, piece: bytes) -> None:
     assert memory(plain) - before < 8 * MB
 
 
-def test_streams_sockets_and_kept_connections_have_no_such_time(hasty: Server) -> None:
-    with hasty.stream() as stream, hasty.socket() as press_socket:
-        for _ in range(4):  # two seconds
+def test_streams_sockets_and_kept_connections_have_no_such_time() -> None:
+    with (
+        short_heads(2.0) as mine,
+        http_client(mine.url, limits=httpx.Limits(keepalive_expiry=ENOUGH_S)) as kept,
+        mine.stream() as stream,
+        mine.socket() as press_socket,
+    ):
+        assert kept.get("/healthz").status_code == 200
+        for _ in range(6):  # three seconds
             stream.next("beat")
         assert press_socket.press(widget="nothing", inputs={}).status_code == 404
-        assert hasty.http.get("/healthz").status_code == 200
+        assert kept.get("/healthz").status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/widgets/operation", "/widgets/operation/cancel"])

@@ -12,6 +12,7 @@ from typing import Any
 from fastapi import Request
 
 from app.commands import press_limits, service_calls
+from app.i18n import text
 from app.main import app
 from app.rate_limit import Quota
 from app.web.app_state import site_of
@@ -27,6 +28,7 @@ async def sizes(request: Request) -> dict[str, int]:
     """The number of objects and tasks, and the length of all collections of the session and its
     parts."""
     kiosk = site_of(request).fleet.first
+    text._rendered.cache_clear()  # it grows to its limit
     gc.collect()
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
     wholes = (kiosk, kiosk._commands, kiosk.peer)

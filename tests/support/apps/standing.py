@@ -14,5 +14,5 @@ class Standing(ZenohSession):
 
 
 vars(robot_session)["ZenohSession"] = Standing
-vars(shutdown)["SHUTDOWN_TIMEOUT_S"] = 1.0
+vars(shutdown)["SHUTDOWN_TIMEOUT_S"] = 5.0
 app = main.app
