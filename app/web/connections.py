@@ -5,7 +5,7 @@ import asyncio
 import logging
 import math
 import resource
-from typing import ClassVar, Final
+from typing import ClassVar, Final, cast
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -28,8 +28,8 @@ class Connection(HttpToolsProtocol):
     _due: asyncio.TimerHandle | None = None  # while a head is waited for
     _head = 0
 
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as uvicorn's
-        super().connection_made(transport)
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(cast(asyncio.Transport, transport))
         if self._crowded():
             self._tell()
             transport.close()

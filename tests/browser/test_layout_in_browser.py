@@ -9,7 +9,7 @@ from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.test_pages import SIZES
 from tests.support.fonts import SETS
-from tests.support.pages import place
+from tests.support.pages import asked, place
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
@@ -153,13 +153,7 @@ def take_control(page: Page) -> None:
 def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
     expect(shown.locator("html[data-floor]")).to_be_attached()
     take_control(shown)
-    dialog = shown.locator("dialog[open]")
-
-    def asks() -> bool:  # as soon as the script of the question is there
-        shown.locator('[data-widget="allow"] > button').click()
-        return dialog.is_visible()
-
-    until(asks, "it asks", every_s=0.2)
+    dialog = asked(shown.locator('[data-widget="allow"] > button'))
     expect(dialog.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
     expect(dialog.locator("dd")).to_have_text("(empty)")
     yes, no = box(shown, "dialog[open] .yes"), box(shown, "dialog[open] .no")

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, Route, expect
 from tests.bridge.test_parameters_on_bridge import PANEL
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
-from tests.support.pages import place, widget
+from tests.support.pages import asked, place, widget
 from tests.support.parts import Bridge, Server, until
 from tests.support.servers import live_server
 from tests.support.touch import loaded
@@ -118,13 +118,7 @@ def test_what_a_dialog_shows_is_what_is_set(
         loaded(page, kiosk)
         entry = widget(page, "limit").get_by_role("spinbutton")
         expect(entry).to_have_value("20")
-        dialog = page.get_by_role("dialog")
-
-        def asks() -> bool:  # as soon as the script of the question is there
-            set_(page, "Limit")
-            return dialog.is_visible()
-
-        until(asks, "it asks", every_s=0.2)
+        dialog = asked(page.get_by_role("button", name="Set Limit", exact=True))
         expect(dialog.locator("dd")).to_have_text("20")
         robot.set_parameter(name="limit", value=21)
         expect(widget(page, "limit").locator(".value")).to_have_text("21")

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.support.browsers import ReusedPage
 from tests.support.finger import Touch
-from tests.support.pages import middle, place
+from tests.support.pages import asked, middle, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 # Each press as it leaves: in which event, how many buttons were busy by then, and how late the beat was
@@ -268,19 +268,6 @@ def test_a_key_that_is_held_down_is_one_press(opens: Opens, page: Page) -> None:
     until(lambda: pressed(mine) == 2, "a second press of the key is a second one")
 
 
-def asked(page: Page, number: int) -> Locator:
-    """The dialog that a button opens, as soon as its script is there."""
-    expect(page.locator("html[data-floor]")).to_be_attached()
-    dialog = page.get_by_role("dialog")
-
-    def asks() -> bool:
-        start(page, number).click()
-        return dialog.is_visible()
-
-    until(asks, "it asks", every_s=0.2)
-    return dialog
-
-
 def settled(page: Page) -> None:
     """What was tapped is over: the next tap is another one."""
     expect(page.locator("body:not([data-asks])")).to_be_attached()
@@ -294,7 +281,8 @@ def came_together(page: Page) -> bool:
 
 def over_a_button(page: Page, answer: str) -> tuple[float, float]:
     """Where the dialog has an answer, and the page a button."""
-    dialog = asked(page, 3)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    dialog = asked(start(page, 3))
     x, y = middle(dialog.locator(answer))
     dialog.locator(".no").click()
     settled(page)
@@ -347,12 +335,13 @@ def test_the_second_tap_of_an_answer_presses_nothing_below(
 
 def test_an_answer_that_opens_under_a_resting_finger_is_not_given(opens: Opens, page: Page) -> None:
     mine = opens(page, True)
+    expect(page.locator("html[data-floor]")).to_be_attached()
     yes = page.get_by_role("dialog").locator(".yes")
 
     def rests() -> bool:
         """Not where the machine stood still until the answer was open."""
         settled(page)
-        asked(page, 1)
+        asked(start(page, 1))
         yes.hover(force=True)
         page.mouse.down()
         if not page.evaluate("downs.at(-1).answers"):

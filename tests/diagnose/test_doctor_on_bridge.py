@@ -33,7 +33,7 @@ from tests.diagnose.setups import (
     readout,
 )
 from tests.support.cyclone import Client
-from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, publish_until, until
+from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, publish_and_go, until
 
 TRIGGER = "std_srvs/srv/Trigger"
 LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
@@ -236,15 +236,10 @@ def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
             heard.set()
         return changes
 
-    def publish() -> None:
-        robot.advertise("/hasty", BOOL)
-        publish_until(robot, "/hasty", {"data": True}, heard.is_set)
-        robot.withdraw("/hasty")
-
     monkeypatch.setattr(ZenohSession, "drain", drained)
     monkeypatch.setattr("app.diagnose.watch.ENOUGH", 1000)  # it waits for the end of the publisher
     with ThreadPoolExecutor() as pool:
-        published = pool.submit(publish)
+        published = pool.submit(publish_and_go, robot, "/hasty", BOOL, {"data": True}, heard.is_set)
         found = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
         published.result()
     assert named(found) == [("permission_ends", "/hasty")]

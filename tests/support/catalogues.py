@@ -1,8 +1,17 @@
 """Catalogues of sentences that a test writes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from fastapi import FastAPI
+
+from app.i18n.catalogue import catalogues_in
+
+KEPT: Final = ExitStack()  # until the process ends
 
 
 def write_catalogue(folder: Path, language: str, texts: Mapping[str, str]) -> None:
@@ -12,3 +21,14 @@ def write_catalogue(folder: Path, language: str, texts: Mapping[str, str]) -> No
         for code, text in texts.items()
     )
     (folder / f"{language}.po").write_text("\n".join(entries), encoding="utf-8")
+
+
+def app_with(write: Callable[[Path], None]) -> FastAPI:
+    """The application with the catalogues that are written into a folder, in place of the project's:
+    it reads them when it is imported."""
+    folder = Path(KEPT.enter_context(TemporaryDirectory()))
+    write(folder)
+    KEPT.enter_context(catalogues_in(folder))
+    from app.main import app
+
+    return app

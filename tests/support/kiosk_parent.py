@@ -15,7 +15,7 @@ import socket
 import sys
 import tempfile
 import time
-from functools import partialmethod
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Final
@@ -24,6 +24,7 @@ from jinja2 import Environment, FileSystemBytecodeCache
 
 from app.cli.command_table import COMMANDS
 from app.panel import load_panel
+from app.web import page_templates
 from tests.support.fork_parent import ForkParent
 from tests.support.operator_log import wait_for_the_disk
 
@@ -75,8 +76,8 @@ def prepare(templates: str) -> None:
     the folder `templates`, the others read them from there."""
     load_panel(PANEL)
     wait_for_the_disk()
-    keep = partialmethod(Environment.__init__, bytecode_cache=FileSystemBytecodeCache(templates))
-    setattr(Environment, "__init__", keep)  # noqa: B010 - mypy takes no assignment to a method
+    keeping = partial(Environment, bytecode_cache=FileSystemBytecodeCache(templates))
+    vars(page_templates)["Environment"] = keeping
 
 
 def bear_standstills() -> None:

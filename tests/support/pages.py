@@ -4,6 +4,8 @@ from typing import Final
 
 from playwright.sync_api import FloatRect, Locator, Page
 
+from tests.support.parts import until
+
 # Hides a page as another window in front of it does; with `false` it shows again.
 HIDE: Final = """(hidden) => {
   Object.defineProperty(document, "hidden", { value: hidden ?? true, configurable: true });
@@ -26,6 +28,18 @@ ROWS: Final = """(number) => {
 def widget(page: Page, name: str) -> Locator:
     """The element of a widget, by its id."""
     return page.locator(f'[data-widget="{name}"]')
+
+
+def asked(button: Locator) -> Locator:
+    """The question that a button asks, as soon as its script is there. The page's own scripts run."""
+    dialog = button.page.get_by_role("dialog")
+
+    def asks() -> bool:
+        button.click()
+        return dialog.is_visible()
+
+    until(asks, "it asks", every_s=0.2)
+    return dialog
 
 
 def place(found: Locator) -> FloatRect:

@@ -287,11 +287,20 @@ def publish_until(
     until(arrives, f"what is published on {topic} arrives", every_s=0.1)
 
 
+def publish_and_go(
+    node: RosNode, topic: str, type_name: str, fields: Mapping[str, Any], is_known: Callable[[], Any]
+) -> None:
+    """`publish_until` by a publisher that ends then."""
+    node.advertise(topic, type_name)
+    publish_until(node, topic, fields, is_known)
+    node.withdraw(topic)
+
+
 def arrives(server: "Server", node: RosNode) -> bool:
     """Whether a press gets to the node; nothing of it is on its way any more. What is sent
     before a Fast DDS node has discovered the bridge's writer never arrives."""
     text = f"there? {secrets.token_hex(4)}"
-    if server.press("operation", text).json()["outcome"] != "published":
+    if not sends(server, text):
         return False
     with suppress(AssertionError):
         until(lambda: text in node.heard_data("/operation"), "it arrives", ARRIVES_WITHIN_S)

@@ -29,7 +29,7 @@ from tests.support.parts import (
     free_port,
     http_client,
     live,
-    publish_until,
+    publish_and_go,
     until,
 )
 from tests.support.servers import ready
@@ -475,11 +475,8 @@ def test_bytes_that_are_no_message_lock_and_are_counted(
     until(kiosk.ready, "ready")
 
     def permit() -> None:
-        """By a publisher that ends afterwards."""
-        topic, enabled = "/operation_enabled", {"data": True}
-        own_node.advertise(topic, "std_msgs/msg/Bool")
-        publish_until(own_node, topic, enabled, lambda: kiosk.widget("operation1")["enabled"])
-        own_node.withdraw(topic)
+        topic, is_known = "/operation_enabled", lambda: kiosk.widget("operation1")["enabled"]
+        publish_and_go(own_node, topic, "std_msgs/msg/Bool", {"data": True}, is_known)
 
     permit()
     with zenoh.open(client_of(own_bridge)) as peer:

@@ -1,10 +1,8 @@
 """The application with short catalogues of German and Japanese, in place of those of the project."""
 
-import tempfile
 from pathlib import Path
 
-from app.i18n.catalogue import catalogues_in
-from tests.support.catalogues import write_catalogue
+from tests.support.catalogues import app_with, write_catalogue
 
 GERMAN = {
     "published": "Gesendet auf {topic} um {time}.",
@@ -37,12 +35,9 @@ JAPANESE = {
 }
 
 
-_folder = tempfile.TemporaryDirectory()
-write_catalogue(Path(_folder.name), "de", GERMAN)
-write_catalogue(Path(_folder.name), "ja", JAPANESE)
-_catalogues = catalogues_in(Path(_folder.name))
-_catalogues.__enter__()
+def written(folder: Path) -> None:
+    write_catalogue(folder, "de", GERMAN)
+    write_catalogue(folder, "ja", JAPANESE)
 
-from app.main import app  # noqa: E402 - it reads the catalogues above
 
-__all__ = ["app"]
+app = app_with(written)

@@ -1,11 +1,9 @@
 """The application with another language, "qps": every sentence of English in brackets."""
 
-import json
-import tempfile
 from pathlib import Path
 
 from app.i18n import ENGLISH, sentences
-from app.i18n.catalogue import catalogues_in
+from tests.support.catalogues import app_with, write_catalogue
 
 LANGUAGE = "qps"
 
@@ -16,18 +14,7 @@ def bracketed(folder: Path) -> None:
         code: text if code.startswith("between_") else f"⟦{text}⟧"
         for code, text in sentences(ENGLISH).items()
     }
-    entries = (
-        f"msgid {json.dumps(code)}\nmsgstr {json.dumps(text, ensure_ascii=False)}\n"
-        for code, text in texts.items()
-    )
-    (folder / f"{LANGUAGE}.po").write_text("\n".join(entries), encoding="utf-8")
+    write_catalogue(folder, LANGUAGE, texts)
 
 
-_folder = tempfile.TemporaryDirectory()
-bracketed(Path(_folder.name))
-_catalogues = catalogues_in(Path(_folder.name))
-_catalogues.__enter__()
-
-from app.main import app  # noqa: E402 - it reads the catalogues above
-
-__all__ = ["app"]
+app = app_with(bracketed)
