@@ -16,6 +16,7 @@ from tests.support.browsers import ReusedPage
 from tests.support.pages import place
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import ready
+from tests.support.signals import send_signal
 from tests.web.test_control_over_http import PROXY, control_panel
 
 IDLE_S = 4.0
@@ -236,7 +237,7 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     try:
         for pid in pids:
             with suppress(ProcessLookupError):  # one ends with the others
-                os.kill(pid, fault)
+                send_signal(pid, fault)
         expect(bar(second)).to_contain_text("No panel has control")
         assert time.monotonic() - began > 3
         locked_by(second, "No panel has control of the robot")

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.support.line import Line
 from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.signals import send_signal
 
 STOOD_STILL_S: Final = 5.0
 UPDATES_PER_S: Final = 50.0
@@ -45,7 +46,7 @@ def stopped(chromium: Browser) -> Iterator[None]:
     pages = [one["id"] for one in processes if one["type"] == "renderer"]
     assert pages
     for process in pages:
-        os.kill(process, signal.SIGSTOP)
+        send_signal(process, signal.SIGSTOP)
     try:
         yield
     finally:

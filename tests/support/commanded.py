@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tests.support.forked import Forked, as_here
+from tests.support.signals import send_signal
 
 ENDS_WITHIN_S: Final = 10.0
 
@@ -63,7 +64,7 @@ class Commanded:
         return answer["ok"]
 
     def freeze(self) -> None:
-        self._process.send_signal(signal.SIGSTOP)
+        send_signal(self.pid, signal.SIGSTOP)
 
     def thaw(self) -> None:
         self._process.send_signal(signal.SIGCONT)

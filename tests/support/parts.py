@@ -26,6 +26,7 @@ from websockets.sync.client import ClientConnection, connect
 from tests.support import domains
 from tests.support.commanded import Commanded
 from tests.support.forked import Forked, can_fork
+from tests.support.signals import send_signal
 
 # Without scripts, a press within 700 ms of its page counts as a second tap. Longer, for busy machines.
 TAP_AGAIN_MS = 1000
@@ -141,7 +142,8 @@ class Process:
         return "\n".join([f"{self.pid}, {state}: {self._process.args!r}", *self.lines[-lines:]])
 
     def send(self, number: signal.Signals) -> None:
-        self._process.send_signal(number)
+        if self.running:
+            send_signal(self.pid, number)
 
     def wait(self, timeout_s: float) -> int:
         return self._process.wait(timeout_s)

@@ -1,7 +1,6 @@
 """A kiosk's screen in tests: `operator-panel kiosk` with the real Chromium, without windows."""
 
 import json
-import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
@@ -15,6 +14,7 @@ from websockets.sync.client import connect
 
 from app.kiosk.page_script import LOOK
 from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client, until
+from tests.support.signals import send_signal
 
 WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
 HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)
@@ -103,7 +103,7 @@ class KioskScreen:
 
     def send(self, kind: str, number: signal.Signals) -> None:
         for pid in self.processes(kind):
-            os.kill(pid, number)
+            send_signal(pid, number)
 
     def end(self) -> None:
         if self.process.running:

@@ -28,6 +28,7 @@ from app.transport.zenoh_config import BLOCKED_MOST_US, config_from, config_to
 from app.transport.zenoh_session import ZenohSession
 from tests.support.builders import DIALECT
 from tests.support.parts import free_port, until
+from tests.support.signals import send_signal
 
 RENEWALS = 30
 BURST = 500
@@ -178,7 +179,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
         link = ZenohSession(config_to(endpoint), lambda urgent: None, DIALECT)
         link.start(declared([], ["b"]))
         until(lambda: link.has_reader("b"), "the subscriber is known")
-        peer.send_signal(signal.SIGSTOP)
+        send_signal(peer.pid, signal.SIGSTOP)
         took = []
         for _ in range(2000):
             began = time.monotonic()
