@@ -2,6 +2,7 @@
 
 import logging
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -45,7 +46,7 @@ class RecordingDirectory:
         clock was set back) count as the oldest."""
         latest = recording_name(time.time() + CLOCK_SKEW_S, "", "")
         files = sorted(self.path.glob(f"*{SUFFIX}"), key=lambda file: (file.name < latest, file.name))
-        sizes = [file.stat().st_size for file in files]
+        sizes = [_size(file) for file in files]
         total = sum(sizes)
         for file, bytes_ in zip(files, sizes, strict=True):
             if total + size <= self._max_bytes:
@@ -53,3 +54,10 @@ class RecordingDirectory:
             file.unlink(missing_ok=True)
             total -= bytes_
             log.info("removed %s: recordings take %.0f MB at most", file.name, self._max_bytes / 1e6)
+
+
+def _size(file: Path) -> int:
+    """In bytes; 0 if someone has just removed the file."""
+    with suppress(FileNotFoundError):
+        return file.stat().st_size
+    return 0

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import threading
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -196,6 +197,14 @@ def test_the_oldest_recordings_go_and_nothing_else(tmp_path: Path) -> None:
     assert kept == ["2026-7.mcap", "2026-8.mcap", "2026-9.mcap", "notes.txt"]
 
 
+def test_a_recording_that_someone_removes_at_the_same_time_counts_nothing(tmp_path: Path) -> None:
+    (tmp_path / "2026-1.mcap").symlink_to(tmp_path / "removed")
+    kept = tmp_path / "2026-2.mcap"
+    kept.write_bytes(bytes(MB))
+    RecordingDirectory(tmp_path, MB).make_room(0)
+    assert kept.exists()
+
+
 # Around presses.
 
 
@@ -233,6 +242,9 @@ class Cell:
         while len(list(self.folder.glob("*.mcap"))) < count:
             assert time.monotonic() < end, list(self.folder.glob("*"))
             await asyncio.sleep(0.01)
+        idle = threading.Event()  # the writer looks at the folder once more
+        self.recordings.enqueue(0, idle.set)
+        assert await asyncio.to_thread(idle.wait, 10)
 
     def end(self) -> None:
         self.recorder.stop()
@@ -375,10 +387,9 @@ def test_a_disk_that_takes_nothing_is_reported_and_a_press_tries_again(
         cell.press("p3")
         cell.recorder.stop()
         await cell.finished()
-        while cell.recordings.fault:
+        while cell.notified < 2:
             await asyncio.sleep(0.01)
-        await asyncio.sleep(0)
-        assert cell.notified == 2
+        assert (cell.recordings.fault, cell.notified) == ("", 2)
 
     run(test)
     assert "recording stopped, in " in caplog.text
