@@ -46,7 +46,7 @@ def test_the_panel_works_through_it_and_nothing_else_does(
     servers: Callable[[Server], Server],
 ) -> None:
     node = RosNode(bridge.domain)
-    robots(bridge.domain)
+    robots(bridge.domain).fibonacci(step_s=30)
     client = Client(bridge.endpoint)
     try:
         node.advertise("/operation_enabled", "std_msgs/msg/Bool")

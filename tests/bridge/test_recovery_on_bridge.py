@@ -77,6 +77,7 @@ def test_after_a_restart_a_goal_is_followed_to_its_end(
     until(lambda: "waiting for the robot" in again.widget("count")["reason"], "joined, and locked")
     assert again.widget("count")["stoppable"]
     assert press(again, "count", id="goal-2").status_code == 409
+    until(lambda: logged(tmp_path)[-1] == ("corrected", "accepted"), "logged")
     robot.fibonacci(step_s=0.05)
     until(lambda: again.widget("count")["outcome"] == "succeeded", "its end is shown")
     assert "[0, 1, 1, 2, 3, 5, 8]" in again.widget("count")["result"]

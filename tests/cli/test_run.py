@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import uvicorn
 
@@ -18,7 +17,7 @@ from app.settings import PACKAGE
 from app.web.serving import OPTIONS
 from tests.support import command
 from tests.support.command import COMMAND
-from tests.support.parts import ROOT, Process, free_port, until
+from tests.support.parts import ROOT, Process, free_port, http_client, until
 
 SHIPPED = PACKAGE / "panel.toml"
 
@@ -39,7 +38,8 @@ def test_a_panel_file_is_all_that_it_needs(tmp_path: Path) -> None:
     process = Process([sys.executable, "-m", COMMAND, "run", str(panel), *options], env, cwd=ROOT)
     try:
         until(lambda: f"the panel is at http://127.0.0.1:{port}" in process.text, "it listens", 30)
-        page = httpx.get(f"http://127.0.0.1:{port}/", headers={"host": "cell1.local"}, trust_env=False)
+        with http_client(f"http://127.0.0.1:{port}") as http:
+            page = http.get("/", headers={"host": "cell1.local"})
         assert (page.status_code, "My cell" in page.text) == (200, True)
         assert (tmp_path / "data").is_dir()
     finally:

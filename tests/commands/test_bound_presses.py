@@ -234,11 +234,12 @@ def test_a_press_in_a_page_that_stood_still_is_not_sent(
     session = page.context.new_cdp_session(page)
     page.evaluate(
         "() => addEventListener('pointerdown', () => void setTimeout(() => {"
-        " const end = performance.now() + 3000; while (performance.now() < end); }, 100))"
+        " console.log('busy'); const end = performance.now() + 3000;"
+        " while (performance.now() < end); }, 100))"
     )
     where = {"x": box["x"] + 20, "y": box["y"] + 20, "button": "left", "clickCount": 1}
-    session.send("Input.dispatchMouseEvent", {"type": "mousePressed", **where})
-    time.sleep(0.3)
+    with page.expect_console_message(lambda message: message.text == "busy"):
+        session.send("Input.dispatchMouseEvent", {"type": "mousePressed", **where})
     session.send("Input.dispatchMouseEvent", {"type": "mouseReleased", **where})
     expect(page.locator("#receipt-operation")).not_to_be_empty()
     assert "Sent" not in (page.locator("#receipt-operation").text_content() or "")

@@ -34,7 +34,7 @@ from tests.support.builders import (
     says,
 )
 from tests.support.builders import panel_of as panel_with
-from tests.support.pages import place
+from tests.support.pages import asked, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}
@@ -300,8 +300,7 @@ def test_a_press_is_confirmed_by_the_robot_in_every_browser(
     other.goto(asking.url)
     page.goto(asking.url)
     page.get_by_label("Message").fill("a <b>part</b>")
-    page.get_by_role("button", name="Start").click()
-    dialog = page.get_by_role("dialog")
+    dialog = asked(page.get_by_role("button", name="Start"))
     expect(dialog).to_contain_text("Start?")
     expect(dialog).to_contain_text("a <b>part</b>")
     for width, height in ((1280, 800), (1024, 600)):
@@ -345,8 +344,7 @@ def test_a_lock_takes_the_question_away(
     mine = servers(Server(ROOT, KIOSK_PANEL=str(path)))
     until(mine.ready, "ready")
     page.goto(mine.url)
-    page.get_by_role("button", name="Start").click()
-    expect(page.get_by_role("dialog")).to_be_visible()
+    asked(page.get_by_role("button", name="Start"))
     mine.process.kill()
     expect(page.get_by_role("dialog")).to_be_hidden()
     expect(page.get_by_role("button", name="Start")).to_be_disabled()

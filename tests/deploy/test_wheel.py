@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import httpx
 import pytest
 from ruamel.yaml import YAML
 
 from app.settings import PACKAGE
 from tests.support import locked
-from tests.support.parts import ROOT, Process, Server, free_port, sends, until
+from tests.support.parts import ROOT, Process, Server, free_port, http_client, sends, until
 from tests.support.shown_commands import commands_for
 
 SHIPPED: Final = PACKAGE / "panel.toml"
@@ -176,7 +175,8 @@ def test_a_panel_is_served_by_its_command_and_its_data_is_backed_up(machine: Mac
     )
     try:
         until(lambda: "the panel is at" in served.text, "it listens", within_s=30)
-        assert "Pick up" in httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).text
+        with http_client(f"http://127.0.0.1:{port}") as http:
+            assert "Pick up" in http.get("/").text
         for command in backups:
             done = machine.run(command)
             assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"

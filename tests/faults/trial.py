@@ -19,9 +19,9 @@ WELL: Final = 20  # presses that come through before and after
 @dataclass(frozen=True, slots=True)
 class Trial:
     """The result: `locked_s` from the fault to the first lock shown, `opened_s` from the repair to the
-    permission; `claimed` counts presses with the outcome `published` while the part was broken. While
-    it breaks (the command that takes a link down runs for some milliseconds), a press may still come
-    through."""
+    permission; `claimed` counts presses that were sent, and got the outcome `published`, while the part
+    was broken. While it breaks (the command that takes a link down runs for some milliseconds), a press
+    may still come through, and one that waits for the answer of a robot may after the repair."""
 
     locked_s: float
     opened_s: float
@@ -64,16 +64,31 @@ def try_fault(
         mends()
         watch.opened(interlock, limit(opens_within_s))
         opened_at = watch.now(interlock).at
+        heard_at = heard(rig, widget, presser, opened_at)
         presses_work(presser)
     presses = presser.end()
     watch.end()
 
     def whole(press: Press) -> bool:
-        return press.answered_at < broken_at - UNDER_WAY_S or press.at > opened_at
+        return press.answered_at < broken_at - UNDER_WAY_S or press.at > heard_at
 
     account = accounted(presses, lambda: rig.arrivals(widget), whole, limit(late_s))
-    claimed = sum(p.outcome == "published" and gone_at < p.at < mended_at for p in presses)
+    claimed = sum(
+        p.outcome == "published" and gone_at < p.at and p.answered_at < mended_at for p in presses
+    )
     return Trial(locked_s, opened_at - mended_at, account, claimed)
+
+
+def heard(rig: Rig, widget: str, presser: Presser, since: float) -> float:
+    """When the robot has heard the first press since a moment: a bridge that is new sends before it
+    knows of the robot's subscriber."""
+
+    def hears() -> bool:
+        sent = {press.text for press in presser.presses if press.at > since}
+        return any(text in sent for _, text in rig.arrivals(widget))
+
+    until(hears, "the robot hears presses")
+    return time.monotonic()
 
 
 def recorded(fault: str, trial: Trial) -> None:

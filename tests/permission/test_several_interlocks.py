@@ -266,6 +266,7 @@ def test_an_operator_with_gloves_reads_all_reasons(
     below = page.locator('[data-widget="below"]').bounding_box()
     reasons = f"Locked: waiting for /doors_closed.\n{NO_AIR}"
     if scripts:
+        expect(page.locator('[data-widget="several"] .more')).to_be_attached()
         page.locator('[data-widget="several"]').tap()
         expect(whole.get_by_role("heading")).to_have_text("Several")
         expect(whole.locator("p")).to_have_text(reasons, use_inner_text=True)
@@ -287,6 +288,7 @@ def test_a_page_without_its_server_shows_that_alone(
     page.goto(mine.url)
     why = page.locator("#why-several")
     expect(why).to_contain_text("+1 more")
+    expect(page.locator('[data-widget="several"] .more')).to_be_attached()  # its script is there
     page.locator('[data-widget="several"]').click()
     expect(page.locator("#whole p")).to_contain_text(NO_AIR)
     mine.process.send(signal.SIGSTOP)

@@ -234,7 +234,7 @@ def test_a_server_cancels_its_counts_and_is_refused_before_the_last_number(
     def refused() -> bool:
         """Its last number comes after half a second: a busy machine may be too late for that."""
         until(lambda: kiosk.widget("short")["enabled"], "the last one is over")
-        assert kiosk.http.post("/widgets/short", json={"inputs": {}}).json()["outcome"] == "accepted"
+        kiosk.http.post("/widgets/short", json={"inputs": {}})
         answer = kiosk.http.post("/widgets/short/cancel").json()
         return str(answer["reason"]).startswith("The robot refused to cancel at ")
 
