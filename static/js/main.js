@@ -130,14 +130,14 @@ source.load("./whole.js", () => {});
 // What is not there when these fail to load is the browser's own.
 const absent = () => {};
 const coarse = matchMedia("(pointer: coarse)");
-const openEntry = () => import("./touch-entry.js").catch(absent);
+const openEntry = () => import("./entry/touch-entry.js").catch(absent);
 if (document.querySelector("template:is(#keypad, #keyboard)")) {
   if (body.dataset.keyboard === "on" || coarse.matches) openEntry();
   else coarse.addEventListener("change", openEntry, { once: true });
 }
-if (document.querySelector("[data-scan]")) import("./scan.js").catch(absent);
+if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(absent);
 if (body.dataset.sounds === "on") import("./sound.js").catch(absent);
-import("./floor.js").catch(absent);
+import("./floor/floor.js").catch(absent);
 const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
 window.operatorPanel = { eventAgeMs: () => source.ageMs }; // for the watcher of a kiosk's screen
 source.start();

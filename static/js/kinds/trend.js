@@ -1,7 +1,7 @@
 // A trend: draws what the server keeps, follows it while the widget can be seen, and looks back.
-import { merged } from "../trend-columns.js";
-import { Cursor } from "../trend-cursor.js";
-import { duration, Plot } from "../trend-plot.js";
+import { merged } from "../trend/columns.js";
+import { Cursor } from "../trend/cursor.js";
+import { duration, Plot } from "../trend/plot.js";
 
 const LEAST_MS = 500; // between two requests
 const AGAIN_MS = 2000; // after one that failed

@@ -1,6 +1,6 @@
 // The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
 import { shield } from "./shield.js";
-import { bar, unbar } from "./show.js";
+import { bar, unbar } from "../show.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;

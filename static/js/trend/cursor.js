@@ -1,5 +1,5 @@
 // The cursor of a trend: a line that a finger or a keyboard sets, and the values there.
-import { written } from "./trend-plot.js";
+import { written } from "./plot.js";
 
 const NEAR = 0.02; // of the plot's width: how far from the cursor a value may be
 const STEP = 0.02; // of the plot's width, by a key

@@ -1,14 +1,14 @@
 // A sheet over the page in which something is entered: one at a time, and hold-to-run keys are locked.
-import { bar, unbar } from "./show.js";
+import { bar, unbar } from "../show.js";
 import { place } from "./place.js";
-import { TAP_AGAIN_MS } from "./press.js";
+import { TAP_AGAIN_MS } from "../press.js";
 
 const HOLDS = '[data-kind="hold"]';
 
 // The styles of sheets come with the first one.
 await new Promise((resolve, reject) => {
   const link = Object.assign(document.createElement("link"), { rel: "stylesheet", onload: resolve, onerror: reject });
-  link.href = new URL("keypad.css", import.meta.url).href;
+  link.href = new URL("../keypad.css", import.meta.url).href;
   document.head.append(link);
 });
 

@@ -1,7 +1,7 @@
 // The keypad: a number is entered beside its field and goes there with Set, if the limits permit.
 import { Draft, isWhole, judged } from "./draft.js";
 import { Sheet } from "./sheet.js";
-import { setText } from "./show.js";
+import { setText } from "../show.js";
 
 const SHAPES = ["tall", "wide", "narrow"];
 const SCANNED_MS = 50; // a bar code reader types faster: its Enter confirms nothing

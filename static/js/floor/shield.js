@@ -1,5 +1,5 @@
 // Takes every touch and key away from the page: while it is cleaned, and where a touch only wakes it.
-import { TAP_AGAIN_MS } from "./press.js";
+import { TAP_AGAIN_MS } from "../press.js";
 
 const POINTERS = ["pointerdown", "pointerup", "pointercancel", "pointermove"];
 const OTHERS = [

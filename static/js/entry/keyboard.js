@@ -1,5 +1,5 @@
 // The keyboard: types into its text field, in which the caret is seen. Cancel gives back what was there.
-import { isTouched, releaseEntry } from "./entries.js";
+import { isTouched, releaseEntry } from "../entries.js";
 import { capital, layoutOf, SIGNS } from "./layouts.js";
 import { Sheet } from "./sheet.js";
 
