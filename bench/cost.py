@@ -11,7 +11,7 @@ from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Peer, Running
 from bench.rig import Rig, scratch
 from bench.unattended import Unattended
-from tests.support.commanded import Commanded
+from tests.support.processes.commanded import Commanded
 
 RATES: Final = (0, 100, 1000)
 TOPIC: Final = "/t0"

@@ -10,7 +10,7 @@ from bench.kiosk import Kiosk, Robot
 from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Running
 from bench.rig import Rig
-from tests.support.commanded import Commanded
+from tests.support.processes.commanded import Commanded
 
 HZ: Final = 20.0
 SIZE: Final = 32

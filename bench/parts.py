@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from tests.support.commanded import Commanded
 from tests.support.parts import CYCLONE_ON_LOOPBACK, ROOT
+from tests.support.processes.commanded import Commanded
 
 CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
 KIOSK_PYTHON: Final = CACHE / "kiosk/bin/python"

@@ -23,8 +23,8 @@ from playwright.sync_api import Page, sync_playwright
 
 from bench.kiosk import BUTTON, HEAD, PAGE, READOUT
 from bench.parts import COMMAND, ENABLED, Meter, family, pss_mib, rss_mib
+from tests.support.browser.screen import KioskScreen
 from tests.support.parts import Bridge, RosNode, free_port, live, until
-from tests.support.screen import KioskScreen
 
 QUICK: Final = bool(os.environ.get("QUICK"))
 DOMAIN: Final = 98

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
 from tests.support import domains, holds
-from tests.support.browsers import BROWSERS, FAILED, Browsers, ReusedPage
+from tests.support.browser.browsers import BROWSERS, FAILED, Browsers, ReusedPage
 from tests.support.operator_log import wait_for_the_disk
 from tests.support.parts import (
     BRIDGE,

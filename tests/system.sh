@@ -35,7 +35,7 @@ need wtype test -e /usr/bin/wtype
 need swayidle test -e /usr/bin/swayidle
 need systemd systemd-analyze --version
 need iproute2 ip -V
-# Pages are laid out with each of these alone, see tests/support/fonts.py.
+# Pages are laid out with each of these alone, see tests/support/browser/fonts.py.
 need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"
 need fonts-noto-core test -e "$FONTS/noto/NotoSans-Regular.ttf"
 need fonts-noto-cjk test -e "${FONTS%/*}/opentype/noto/NotoSansCJK-Regular.ttc"

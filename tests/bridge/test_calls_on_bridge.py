@@ -16,8 +16,8 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.commands.service_calls import MAX_UNANSWERED
+from tests.support.browser.pages import widget
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
-from tests.support.pages import widget
 from tests.support.parts import Bridge, Server, Stream, http_client, until
 from tests.support.servers import live_server
 

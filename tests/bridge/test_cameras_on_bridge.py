@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 from websockets.sync.client import ClientConnection, connect
 
 from app.simulator.values.clock_picture import SIZE, grey_pixels, png
-from tests.support.pages import HIDE, widget
+from tests.support.browser.pages import HIDE, widget
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 

@@ -17,10 +17,11 @@ from app.interfaces.definitions import Definitions
 from app.interfaces.parsing import parse_definition
 from app.interfaces.type_hash import _describe_structure, type_hash
 from app.panel import check_panel
-from tests.support import command, cyclone
-from tests.support.command import COMMAND
+from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, until
+from tests.support.processes import command
+from tests.support.processes.command import COMMAND
 
 BOOL = "std_msgs/msg/Bool"
 GRIPPER = "gripper_msgs/msg/Gripper"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.pages import HIDE, widget
+from tests.support.browser.pages import HIDE, widget
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.pages import place
+from tests.support.browser.pages import place
 from tests.support.parts import Bridge, RosNode, Server, has_heard, until
 from tests.support.servers import live_server
 

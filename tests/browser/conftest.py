@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.support.browsers import ReusedPage
-from tests.support.finger import Finger
+from tests.support.browser.browsers import ReusedPage
+from tests.support.browser.finger import Finger
+from tests.support.browser.touch import permit, touched, touched_server
 from tests.support.parts import Server
-from tests.support.touch import permit, touched, touched_server
 
 
 @pytest.fixture(scope="module")

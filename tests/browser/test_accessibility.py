@@ -14,9 +14,9 @@ from app.panel import load_panel
 from app.settings import PACKAGE
 from app.web.display_choice import CHOICES, COOKIE
 from app.web.language import COOKIE as LANGUAGE
-from tests.support.browsers import ReusedPage
-from tests.support.line import Line
-from tests.support.pages import DRAWN, place
+from tests.support.browser.browsers import ReusedPage
+from tests.support.browser.line import Line
+from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 

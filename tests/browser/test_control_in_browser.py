@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Error, Page, TimeoutError, expect
 
-from tests.support.browsers import ReusedPage
-from tests.support.pages import place
+from tests.support.browser.browsers import ReusedPage
+from tests.support.browser.pages import place
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.processes.signals import send_signal
 from tests.support.servers import ready
-from tests.support.signals import send_signal
 from tests.web.test_control_over_http import PROXY, control_panel
 
 IDLE_S = 4.0

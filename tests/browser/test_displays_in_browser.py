@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.support.pages import widget
+from tests.support.browser.pages import widget
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 

@@ -7,9 +7,8 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.pages import middle
-from tests.support.parts import Server, until
-from tests.support.touch import (
+from tests.support.browser.pages import middle
+from tests.support.browser.touch import (
     HALT,
     HEARD,
     SIZES,
@@ -20,6 +19,7 @@ from tests.support.touch import (
     touched,
     touched_server,
 )
+from tests.support.parts import Server, until
 
 DIM_S: Final = 1.0
 COUNTS: Final = """() => {

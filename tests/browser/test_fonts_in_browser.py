@@ -19,8 +19,8 @@ from tests.browser.test_control_in_browser import (
 )
 from tests.browser.test_pages import SIZES
 from tests.runtime.test_several_robots import MANY, heard, ten
-from tests.support.fonts import SETS
-from tests.support.pages import DRAWN, place
+from tests.support.browser.fonts import SETS
+from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import Server
 
 __all__ = ["kiosk", "opens", "reused_pages", "ten"]  # fixtures

@@ -9,7 +9,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from tests.support.finger import Finger, jogged
+from tests.support.browser.finger import Finger, jogged
 from tests.support.holds import PATIENT, TOPIC, TRIES, codes, ended, has_ended, jogging
 from tests.support.parts import Bridge, RosNode, Server, has_heard, until
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.support.finger import SCRIPTS, Finger, ended_by, jogged, own_chromium
+from tests.support.browser.finger import SCRIPTS, Finger, ended_by, jogged, own_chromium
 from tests.support.holds import (
     QUIET_S,
     TOPIC,

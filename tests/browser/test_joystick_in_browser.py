@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support import holds
-from tests.support.finger import SCRIPTS, Finger, begun, ended_by
+from tests.support.browser.finger import SCRIPTS, Finger, begun, ended_by
+from tests.support.browser.pages import place, widget
 from tests.support.holds import QUIET_S, codes
-from tests.support.pages import place, widget
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import kept_running, live_server
 

@@ -5,8 +5,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.parts import Server
-from tests.support.touch import (
+from tests.support.browser.touch import (
     HEARD,
     HUMAN_S,
     READER_S,
@@ -18,6 +17,7 @@ from tests.support.touch import (
     settled,
     touched,
 )
+from tests.support.parts import Server
 
 FIELDS: Final = ("#input-order", "#input-note")
 BOXES: Final = """(keys) => keys.map((key) => {

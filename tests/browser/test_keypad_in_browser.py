@@ -7,9 +7,8 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.support.pages import place
-from tests.support.parts import Server, until
-from tests.support.touch import (
+from tests.support.browser.pages import place
+from tests.support.browser.touch import (
     HALT,
     HEARD,
     HUMAN_S,
@@ -24,6 +23,7 @@ from tests.support.touch import (
     touched,
     touched_server,
 )
+from tests.support.parts import Server, until
 
 FIELDS: Final = ("#input-speed", "[data-widget=height] output", "#input-belt", "#input-offset")
 

@@ -11,7 +11,7 @@ from app.i18n.catalogue import files
 from app.web.language import COOKIE
 from tests.browser.test_layout_in_browser import PANEL
 from tests.browser.test_screen_in_browser import CUT, OVERFLOWS
-from tests.support.pages import DRAWN
+from tests.support.browser.pages import DRAWN
 from tests.support.parts import Server
 from tests.support.servers import demo_server
 

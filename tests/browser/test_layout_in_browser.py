@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.test_pages import SIZES
-from tests.support.fonts import SETS
-from tests.support.pages import asked, place
+from tests.support.browser.fonts import SETS
+from tests.support.browser.pages import asked, place
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.support.pages import place
+from tests.support.browser.pages import place
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, live
 from tests.support.servers import ready
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from app.printable import printable
 from tests.support import holds
-from tests.support.pages import HIDE, place
+from tests.support.browser.pages import HIDE, place
 from tests.support.parts import (
     TAP_AGAIN_MS,
     Bridge,

@@ -8,11 +8,11 @@ from playwright.sync_api import Page, Route, expect
 
 from tests.bridge.test_parameters_on_bridge import PANEL
 from tests.support import cyclone
+from tests.support.browser.pages import asked, place, widget
+from tests.support.browser.touch import loaded
 from tests.support.cyclone import CycloneRobot
-from tests.support.pages import asked, place, widget
 from tests.support.parts import Bridge, Server, until
 from tests.support.servers import live_server
-from tests.support.touch import loaded
 
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client

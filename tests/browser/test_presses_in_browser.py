@@ -12,9 +12,9 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from tests.support.browsers import ReusedPage
-from tests.support.finger import Touch
-from tests.support.pages import asked, middle, place
+from tests.support.browser.browsers import ReusedPage
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import asked, middle, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 # Each press as it leaves: in which event, how many buttons were busy by then, and how late the beat was

@@ -10,8 +10,8 @@ from playwright.sync_api import CDPSession, Locator, Page, expect
 
 from app.i18n import sentences
 from tests.browser.test_layout_in_browser import PANEL
-from tests.support.browsers import sized
-from tests.support.pages import DRAWN, place
+from tests.support.browser.browsers import sized
+from tests.support.browser.pages import DRAWN, place
 from tests.support.panel_text import MAIN, START
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready

@@ -11,9 +11,9 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.line import Line
+from tests.support.browser.line import Line
 from tests.support.parts import Bridge, RosNode, Server, live, until
-from tests.support.signals import send_signal
+from tests.support.processes.signals import send_signal
 
 STOOD_STILL_S: Final = 5.0
 UPDATES_PER_S: Final = 50.0

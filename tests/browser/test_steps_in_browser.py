@@ -7,7 +7,8 @@ from typing import Final
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.pages import place
+from tests.support.browser.pages import place
+from tests.support.browser.touch import loaded
 from tests.support.parts import (
     TAP_AGAIN_MS,
     Bridge,
@@ -18,7 +19,6 @@ from tests.support.parts import (
     until,
 )
 from tests.support.servers import live_server
-from tests.support.touch import loaded
 
 PANEL: Final = """
 title = "Cell"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Response, expect
 
-from tests.support.pages import HIDE, place
+from tests.support.browser.pages import HIDE, place
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 

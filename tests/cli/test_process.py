@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from app.settings import PACKAGE
-from tests.support import command
-from tests.support.command import COMMAND, Started
 from tests.support.parts import free_port
+from tests.support.processes import command
+from tests.support.processes.command import COMMAND, Started
 
 Start = Callable[..., Started]
 

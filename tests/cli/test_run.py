@@ -15,9 +15,9 @@ from app.cli.arguments import environment
 from app.cli.command import main
 from app.settings import PACKAGE
 from app.web.serving import OPTIONS
-from tests.support import command
-from tests.support.command import COMMAND
 from tests.support.parts import ROOT, Process, free_port, http_client, until
+from tests.support.processes import command
+from tests.support.processes.command import COMMAND
 
 SHIPPED = PACKAGE / "panel.toml"
 

@@ -19,6 +19,7 @@ from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.commands.test_presses import Way
+from tests.support.browser.pages import asked, place
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -34,7 +35,6 @@ from tests.support.builders import (
     says,
 )
 from tests.support.builders import panel_of as panel_with
-from tests.support.pages import asked, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}

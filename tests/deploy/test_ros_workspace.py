@@ -29,7 +29,7 @@ from tests.support.parts import (
     until,
     zenoh_file,
 )
-from tests.support.shell import NOT_LINKED
+from tests.support.processes.shell import NOT_LINKED
 
 PACKAGE: Final = "operator_panel"
 PANEL: Final = f'title = "Robot cell 1"\n{MAIN}{START}'

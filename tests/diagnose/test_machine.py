@@ -16,7 +16,7 @@ from app.diagnose.machine import MB, check_data, check_port
 from app.diagnose.screen import check_screens, displays
 from app.panel import load_panel
 from tests.diagnose.setups import Setup, named, panel_of, readout
-from tests.support.fonts import fonts_file
+from tests.support.browser.fonts import fonts_file
 from tests.support.parts import ROOT, Server, free_port
 
 NO_ROUTER = "tcp/127.0.0.1:9"  # the discard port: nothing listens

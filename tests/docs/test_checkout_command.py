@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.parts import ROOT
-from tests.support.shell import Shell
+from tests.support.processes.shell import Shell
 from tests.support.shown_commands import commands_for
 
 INSTALLS = "tests/docs/test_checkout_command.py::test_the_command_of_a_checkout_installs_its_wheel"

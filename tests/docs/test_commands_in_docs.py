@@ -10,7 +10,7 @@ import pytest
 from tests.docs.test_tutorial import STEPS
 from tests.simulator.test_replay import mcap_file
 from tests.support.parts import ROOT, Process, until
-from tests.support.shell import Shell
+from tests.support.processes.shell import Shell
 from tests.support.shown_commands import TABLE, Row, Shown, beside, commands_of, row_of, rows, shown
 
 RECORDING: Final = "cell1-2026-05-04.mcap"

@@ -9,8 +9,8 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
-from tests.support import command
 from tests.support.parts import ROOT, Server
+from tests.support.processes import command
 
 DOCS: Final = ROOT / "docs"
 OWN: Final = '# interfaces = ["cell_msgs"]'

@@ -11,8 +11,8 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
-from tests.support import command
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
+from tests.support.processes import command
 
 TEXT: Final = (ROOT / "docs/tutorial.md").read_text()
 BLOCKS: Final = re.findall(r"^```toml\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)

@@ -17,9 +17,9 @@ import zenoh
 from app.dialect import bridge_dialect
 from tests.faults.rig import kiosk
 from tests.support import domains
-from tests.support.commanded import Commanded
 from tests.support.cyclone import CYCLONE
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, Server, until
+from tests.support.processes.commanded import Commanded
 
 Vendor = Literal["fast", "cyclone"]
 Outcome = Literal["heard", "locked", "unnoticed"]

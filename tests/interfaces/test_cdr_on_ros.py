@@ -15,9 +15,9 @@ import pytest
 from app.interfaces import load_interfaces, to_plain
 from app.interfaces.cdr import codec
 from app.interfaces.packages import read_folders
-from tests.support.commanded import Commanded
 from tests.support.form import several
 from tests.support.parts import ROS_PYTHON, TESTS
+from tests.support.processes.commanded import Commanded
 from tests.support.samples import Edge, Samples
 
 SHARE: Final = ROS_PYTHON.parent.parent / "share"

@@ -9,8 +9,8 @@ from typing import Final
 
 import pytest
 
+from tests.support.browser.screen import WITHOUT_GPU, KioskScreen
 from tests.support.parts import ROOT, Server, until
-from tests.support.screen import WITHOUT_GPU, KioskScreen
 
 # The compositor does not run as root.
 NO_ROOT: Final = ("unshare", "--user", "--map-user=1000", "--map-group=1000")

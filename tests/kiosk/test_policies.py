@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.browser.screen import KioskScreen
 from tests.support.parts import ROOT, Server, until
-from tests.support.screen import KioskScreen
 
 # Chromium reads the policies of /etc/chromium only.
 MOUNT = (

@@ -17,9 +17,9 @@ from typing import Any, Final
 import pytest
 
 from app.i18n import render, say
+from tests.support.browser.screen import KioskScreen
 from tests.support.form import LONG
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, live, until
-from tests.support.screen import KioskScreen
 from tests.support.servers import ready
 
 BACK_WITHIN_S: Final = 10.0

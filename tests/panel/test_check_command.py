@@ -9,8 +9,8 @@ from app.cli.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE
-from tests.support import command
 from tests.support.parts import TESTS
+from tests.support.processes import command
 
 SHIPPED = PACKAGE / "panel.toml"
 NO_TITLE = re.sub(r"^title = .*\n", "", SHIPPED.read_text(), count=1, flags=re.MULTILINE)

@@ -1,6 +1,7 @@
 """Commands as JSON lines: `{"do": name, …}` in, `{"ok": …}` or `{"error": …}` out, until stdin ends.
 
-Who asks is `tests/support/commanded.py`. This side runs in environments that have nothing of the kiosk.
+Who asks is `tests/support/processes/commanded.py`. This side runs in environments that have nothing of
+the kiosk.
 """
 
 import json

@@ -14,8 +14,8 @@ import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.support import domains
-from tests.support.commanded import Commanded
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
+from tests.support.processes.commanded import Commanded
 
 NODE = "cyclone_robot"
 

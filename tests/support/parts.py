@@ -24,9 +24,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from tests.support import domains
-from tests.support.commanded import Commanded
-from tests.support.forked import Forked, can_fork
-from tests.support.signals import send_signal
+from tests.support.processes.commanded import Commanded
+from tests.support.processes.forked import Forked, can_fork
+from tests.support.processes.signals import send_signal
 
 # Without scripts, a press within 700 ms of its page counts as a second tap. Longer, for busy machines.
 TAP_AGAIN_MS = 1000

@@ -29,7 +29,7 @@ from app.transport.zenoh_config import BLOCKED_MOST_US, config_from, config_to
 from app.transport.zenoh_session import ZenohSession
 from tests.support.builders import DIALECT
 from tests.support.parts import free_port, until
-from tests.support.signals import send_signal
+from tests.support.processes.signals import send_signal
 
 RENEWALS = 30
 BURST = 500

@@ -14,7 +14,7 @@ from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 
 from app.web.routes.press_socket import MOST_AT_ONCE
 from tests.runtime.test_nothing_grows import MUTE, Robot, widget
-from tests.support.pages import HIDE
+from tests.support.browser.pages import HIDE
 from tests.support.parts import (
     ENOUGH_S,
     ROOT,

@@ -21,7 +21,7 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
-from tests.support.fonts import fonts_file
+from tests.support.browser.fonts import fonts_file
 from tests.support.parts import CHROMIUM_FLAGS, ENOUGH_S, HEADLESS
 
 SIZE: Final = (1280, 800)

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 from playwright.sync_api import Browser, Error, Locator, Page, expect
 
+from tests.support.browser.pages import HIDE, middle
 from tests.support.holds import QUIET_S, TOPIC, TRIES, codes, has_ended
-from tests.support.pages import HIDE, middle
 from tests.support.parts import (
     CHROMIUM,
     CHROMIUM_FLAGS,

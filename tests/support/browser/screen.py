@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from app.kiosk.page_script import LOOK
 from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client, until
-from tests.support.signals import send_signal
+from tests.support.processes.signals import send_signal
 
 WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
 HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from playwright.sync_api import BrowserContext, Page, expect
 
-from tests.support.browsers import SIZE, sized
-from tests.support.pages import place
+from tests.support.browser.browsers import SIZE, sized
+from tests.support.browser.pages import place
 from tests.support.parts import ENOUGH_S, Server, until
 from tests.support.servers import demo_server
 

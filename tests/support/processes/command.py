@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
-from tests.support.forked import ROOT, Forked, as_here
+from tests.support.processes.forked import ROOT, Forked, as_here
 
 COMMAND: Final = "app.cli"  # `operator-panel`
 ENDS_WITHIN_S: Final = 80.0  # on a busy machine

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from tests.support.forked import Forked, as_here
-from tests.support.signals import send_signal
+from tests.support.processes.forked import Forked, as_here
+from tests.support.processes.signals import send_signal
 
 ENDS_WITHIN_S: Final = 10.0
 

@@ -15,8 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Final, Literal
 
-ROOT: Final = Path(__file__).resolve().parent.parent.parent
-KIOSK_PARENT: Final = "tests.support.kiosk_parent"
+ROOT: Final = Path(__file__).resolve().parents[3]
+KIOSK_PARENT: Final = "tests.support.processes.kiosk_parent"
+ROS_PARENT: Final = "tests.support.processes.ros_parent"
 # Variables that take effect only at the start of a process.
 AT_BEGIN: Final = ("LD_", "MALLOC", "PYTHON")
 NETWORK: Final = Path("/proc/thread-self/ns/net")  # a test may have moved its thread into another one
@@ -105,9 +106,7 @@ class Forked:
     @classmethod
     def ros_program(cls, command: Sequence[str], env: Mapping[str, str]) -> "Forked":
         """A program of `tests/ros` that is controlled by stdin and stdout."""
-        return cls(
-            _parent(command[0], "tests.support.ros_parent"), command[1:], env, ["stdin", "stdout"]
-        )
+        return cls(_parent(command[0], ROS_PARENT), command[1:], env, ["stdin", "stdout"])
 
     def _line(self, timeout_s: float | None) -> bytes | None:
         """The next line of the status pipe (the pid, then the exit code); None at the timeout."""

@@ -1,8 +1,8 @@
 """A process that imports the server's libraries once, and forks kiosk servers and commands: importing
 them takes a second per server. Message types, the panel's models and templates are prepared once, too.
 
-Run as `python -m tests.support.kiosk_parent FD` in the project's folder, see `fork_parent`. A child's
-arguments are its folder, a module, and the arguments of that.
+Run as `python -m tests.support.processes.kiosk_parent FD` in the project's folder, see `fork_parent`. A
+child's arguments are its folder, a module, and the arguments of that.
 """
 
 import ast
@@ -25,8 +25,8 @@ from jinja2 import Environment, FileSystemBytecodeCache
 from app.cli.command_table import COMMANDS
 from app.panel import load_panel
 from app.web import page_templates
-from tests.support.fork_parent import ForkParent
 from tests.support.operator_log import wait_for_the_disk
+from tests.support.processes.fork_parent import ForkParent
 
 MAIN: Final = Path("app/main.py")
 PANEL: Final = Path("app/panel.toml")

@@ -1,8 +1,8 @@
 """A process that imports once what nodes need, and forks the programs of `tests/ros`: importing takes a
 node longer than all else of its start.
 
-ROS 2's Python runs it, as `python -m tests.support.ros_parent FD` in the project's folder; see
-`fork_parent`. A child's arguments are a program and its own arguments. rclpy itself is left to the
+ROS 2's Python runs it, as `python -m tests.support.processes.ros_parent FD` in the project's folder;
+see `fork_parent`. A child's arguments are a program and its own arguments. rclpy itself is left to the
 children: with it comes Fast DDS, which starts threads, and these do not survive a fork.
 """
 
@@ -14,9 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from tests.support.fork_parent import ForkParent
+from tests.support.processes.fork_parent import ForkParent
 
-PROGRAMS: Final = Path(__file__).resolve().parent.parent / "ros"
+PROGRAMS: Final = Path(__file__).resolve().parents[2] / "ros"
 LIBRARIES: Final = (
     "asyncio",
     "numpy",
