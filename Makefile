@@ -1,14 +1,14 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000
 # make test  everything, on the real bridge, real ROS 2 nodes and a real browser
-# make check types and style
-# make docs  the documentation as a site, in build/docs; a dead link fails
-# make faults every fault in its long form, and what was measured as a table in docs/reliability.md
+# make check  types and style
+# make docs  the documentation as a site, in build/docs; a dead link is an error
+# make faults  every fault in its long form; writes the results as a table into docs/reliability.md
 # make screenshots  every page at every size, theme and language, in build/screenshots; the README's pictures
-# make soak  an ordinary day for SOAK_S seconds (an hour)
+# make soak  normal operation for SOAK_S seconds (default: an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
-# make bench-setup  what the benchmark's rivals need, into the cache
+# make bench-setup  installs what the benchmark's rivals need into the cache
 # make release  wheel, sdist, SBOM and documentation, checked in a clean environment, in dist/release
-# make dev   the panel, which starts again with every change that is saved
+# make dev   the panel; restarts whenever a file is saved
 
 PYTHON ?= python3
 CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
@@ -31,19 +31,19 @@ WATCHED += $(patsubst %,'--reload-include=*.%',toml json5 html css js po msg srv
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 
-# Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
-# pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
-# without them.
+# All tests: WORKERS processes in parallel, then the tests of real time alone. ARGS are options of pytest:
+# `ARGS="-k robot" make test` runs these tests in one process, and builds or installs only the real parts
+# (bridge, ROS, browser) that they use. Tests without real parts need no set-up.
 WORKERS ?= 7
-# What is read of the tests is kept, wherever else nothing of Python's is, and is read once before the
-# workers begin: each of them would take 4 s to prepare it.
+# Bytecode of the tests is cached, even if PYTHONDONTWRITEBYTECODE is set, and is compiled once before
+# the workers start. Otherwise each worker would spend 4 s on it.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(if $(ARGS),.venv/test,test-parts)
 ifdef ARGS
 	$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS))
 	.venv/bin/pytest $(ARGS)
 else
-	.venv/bin/pytest --collect-only -qq > /dev/null || true  # the workers show why
+	.venv/bin/pytest --collect-only -qq > /dev/null || true  # the workers report errors
 	.venv/bin/pytest --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; first=$$?; \
 	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && exit $$first
 endif
@@ -55,13 +55,13 @@ check: .venv/test
 	.venv/bin/python -m app.i18n
 	.venv/bin/python -m docs._generate --check
 
-# Warnings are errors. What the pages take from the code is written first.
+# Warnings are errors. The generated parts of the pages are written first.
 docs: .venv-docs/ready
 	.venv-docs/bin/python -m docs._generate
 	.venv-docs/bin/sphinx-build -W -n -E -a --keep-going --quiet --doctree-dir build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
-# FORM=short: as in `make test`.
+# FORM=short: the short form, as in `make test`.
 FORM ?= long
 FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
 	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py \
@@ -86,7 +86,7 @@ soak: test-parts
 wheel: .venv/build .venv/bin/operator-panel
 	.venv/bin/python -m hatchling build --target wheel --directory dist
 
-# Of a tag: `make release TAG=v0.2.0` also checks that version and changelog are those of the tag.
+# `make release TAG=v0.2.0` also checks that the version and the changelog match the tag.
 release: docs .venv-release/ready
 	.venv-release/bin/hadolint deploy/Containerfile
 	.venv-release/bin/python deploy/release.py dist/release $(if $(TAG),--tag $(TAG))
@@ -116,7 +116,7 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@
 
-# The command of this checkout, wherever it is called from. -P: not of an `app` in the current folder.
+# The command of this checkout, from any folder. -P: Python does not import an `app` of the current folder.
 .venv/bin/operator-panel: Makefile | .venv/bin/python
 	@printf '%s\n' '#!/bin/sh' 'here=$$(dirname "$$(readlink -f "$$0")")' \
 		'PYTHONPATH="$$here/../.." exec "$$here/python" -P -m app.cli "$$@"' >$@
@@ -146,15 +146,15 @@ FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3
 	.venv-ros/bin/python $(PIP_INSTALL) $<
 	touch $@
 
-# ARGS: phases and peers, such as `ARGS="down up --peers plain"`. A quick run leaves the last whole one's
-# results as they are.
+# ARGS: phases and peers, such as `ARGS="down up --peers plain"`. A quick run does not overwrite the
+# results of the last full run.
 bench: .venv/test bridge $(BENCH)/kiosk/ready
 	rm -rf $(BENCH)/kiosk/dist
 	.venv/bin/python -m build --wheel --no-isolation --outdir $(BENCH)/kiosk/dist >/dev/null
 	$(BENCH)/kiosk/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --force-reinstall $(BENCH)/kiosk/dist/*.whl
 	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--page docs/benchmark.md) $(ARGS)
 
-# This panel, the robot, then the rivals: each in an environment of its own. See bench/README.md.
+# This panel, the robot, and the rivals, each in a separate environment. See bench/README.md.
 bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,kiosk/ready robot/ready rosbridge/ready nicegui/ready pages/ready router)
 
 $(BENCH)/kiosk/ready: deploy/requirements.lock
@@ -195,7 +195,7 @@ $(BENCH)/pages/ready: bench/peers/package.json bench/peers/package-lock.json ben
 $(BENCH)/router: system
 	nice cargo build --quiet --release --locked --manifest-path bench/peers/router/Cargo.toml --target-dir $@
 
-# The locked versions, anew: needs uv.
+# Renews the locked versions. Needs uv.
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group build -o deploy/build.lock
