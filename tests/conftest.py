@@ -1,4 +1,4 @@
-"""Fixtures: real parts, started once where they can be shared and ended whatever happens."""
+"""Fixtures: real parts. They are shared where possible, and always ended."""
 
 import gc
 import shutil
@@ -48,7 +48,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Nothing of what is collected is garbage: it is never looked at for it, in each worker."""
+    """Without garbage collection: collected tests are no garbage, and scanning them costs time."""
     gc.disable()
     try:
         return (yield)
@@ -58,9 +58,9 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests of real time are tried once more where they fail, and no others. Files that begin with a
-    browser are first, since they share it, then those with the most tests on real parts: none of them
-    is left at the end, and what only computes fills the rest."""
+    """Repeats failed tests of real time once, and no others. Sorts the files: first those that begin
+    with a browser, because they share it, then those with the most tests on real parts. So no slow file
+    starts last; files without real parts fill the rest."""
     wanted = config.getoption("--real-time")
     for item in items:
         assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
@@ -78,7 +78,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Nothing is skipped: where a part is missing that a test needs, nothing is tested."""
+    """No test is skipped: if a real part is missing that a test needs, the run ends."""
     missing = [str(p) for p in (BRIDGE, ROS_PYTHON, CHROMIUM, HEADLESS) if not Path(p).exists()]
     if missing and needs_parts(session) and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
@@ -89,7 +89,7 @@ def pytest_runtest_makereport(
     item: pytest.Item,
     call: pytest.CallInfo[None],
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """A failure shows what the processes said last that run, or began about with the test."""
+    """Adds to a failure the last output of processes that run, or that started with the test."""
     report = yield
     if report.failed:
         item.stash[FAILED] = True
@@ -101,7 +101,7 @@ def pytest_runtest_makereport(
 
 @pytest.fixture(scope="session", autouse=True)
 def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Where tests and their processes have their temporary files: what a killed one leaves goes too."""
+    """The folder for temporary files of tests and their processes; removed at the end."""
     folder = tmp_path_factory.mktemp("tmp", numbered=False)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", str(folder))
@@ -112,7 +112,7 @@ def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def patient_log() -> None:
-    """In this process; forked servers have the same."""
+    """Longer waits for the disk in this process, as in forked servers."""
     wait_for_the_disk()
 
 
@@ -123,7 +123,7 @@ def domain() -> int:
 
 @pytest.fixture(scope="session")
 def bridge(domain: int) -> Iterator[Bridge]:
-    """The bridge that tests share; who ends a bridge takes `own_bridge`."""
+    """The bridge that tests share. A test that ends its bridge uses `own_bridge`."""
     shared = Bridge(domain)
     shared.start()
     yield shared
@@ -132,7 +132,7 @@ def bridge(domain: int) -> Iterator[Bridge]:
 
 @pytest.fixture(scope="session")
 def node(domain: int, bridge: Bridge) -> Iterator[RosNode]:
-    """The robot's system_controller: listens to the panel's topics."""
+    """The robot's system_controller: subscribes to the panel's topics."""
     shared = RosNode(domain)
     for topic in ("/operation", "/operation1", "/operation2"):
         shared.subscribe(topic, "std_msgs/msg/String")
@@ -143,7 +143,7 @@ def node(domain: int, bridge: Bridge) -> Iterator[RosNode]:
 
 @pytest.fixture(scope="module")
 def jogger(node: RosNode) -> Iterator[RosNode]:
-    """The node of a robot that is jogged: it listens, and says whether operation is permitted."""
+    """The node of a robot that is jogged: subscribes to the commands and publishes the permission."""
     node.subscribe(holds.TOPIC, "geometry_msgs/msg/Point", depth=1000)
     node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     yield node
@@ -152,7 +152,7 @@ def jogger(node: RosNode) -> Iterator[RosNode]:
 
 @pytest.fixture
 def own_bridge(domain: int) -> Iterator[Bridge]:
-    """A bridge on a domain of its own, to be ended, frozen and started at will."""
+    """A bridge on a separate domain, which a test may end, freeze and start again."""
     mine = Bridge(domain + 1)
     mine.start()
     yield mine
@@ -169,7 +169,7 @@ def own_node(own_bridge: Bridge) -> Iterator[RosNode]:
 
 @pytest.fixture
 def servers() -> Iterator[Callable[[Server], Server]]:
-    """Ends what is given to it, when the test is over."""
+    """Ends the servers that are given to it after the test."""
     with ExitStack() as stack:
 
         def kept(server: Server) -> Server:
@@ -181,13 +181,13 @@ def servers() -> Iterator[Callable[[Server], Server]]:
 
 @pytest.fixture(params=["post", "socket"])
 def way(request: pytest.FixtureRequest) -> str:
-    """How presses come."""
+    """How presses are sent: by POST or by WebSocket."""
     return str(request.param)
 
 
 @pytest.fixture
 def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
-    """A kiosk of the test's own on the shared bridge."""
+    """A server for one test, on the shared bridge."""
     mine = live(bridge.endpoint, tmp_path)
     yield mine
     mine.end()
@@ -195,7 +195,7 @@ def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def demo() -> Iterator[Server]:
-    """A kiosk with the shipped panel, on the robot that it simulates."""
+    """A server with the shipped panel and its simulated robot."""
     with ready(Server(ROOT)) as mine:
         yield mine
 
@@ -214,7 +214,7 @@ def peer() -> Iterator[tuple[str, zenoh.Session]]:
 
 @pytest.fixture
 def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The server's zone is UTC."""
+    """The server's time zone is UTC."""
     monkeypatch.setenv("TZ", "UTC")
     time.tzset()
     yield
@@ -224,7 +224,7 @@ def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def fonts() -> str:
-    """Which fonts the browser has; a module that lays pages out has a fixture of its own."""
+    """The browser's set of fonts. A module that tests layout overrides this fixture."""
     return "noto"
 
 
@@ -236,8 +236,8 @@ def browsers() -> Iterator[Browsers]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
-    """Browsers run on if the next module begins with one, and else end: while Playwright runs, so does
-    an event loop of its own in this thread, and other tests run theirs."""
+    """Keeps browsers if the next module begins with one, else closes them: while Playwright runs, its
+    event loop runs in this thread, and other tests need their own."""
     yield
     if nextitem is not None and item.path != nextitem.path and not takes_browser(nextitem):
         BROWSERS.close()
@@ -261,14 +261,14 @@ def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
 
 @pytest.fixture
 def page(reused_page: ReusedPage, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page like a new one, which the tests of a module share; an error on its console fails one."""
+    """A page that the tests of a module share, reset for each. An error on its console fails a test."""
     with reused_page.taken(request.node) as page:
         yield page
 
 
 @pytest.fixture
 def own_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page of the test's own, for what cannot be taken back, such as an init script."""
+    """A page for one test, for changes that cannot be reset, such as an init script."""
     mine = ReusedPage(chromium)
     with mine.taken(request.node) as page:
         yield page
@@ -286,6 +286,6 @@ def reused_page_without_scripts(chromium: Browser) -> Iterator[ReusedPage]:
 def without_scripts(
     reused_page_without_scripts: ReusedPage, request: pytest.FixtureRequest
 ) -> Iterator[Page]:
-    """A page in a browser that runs no scripts, which the tests of a module share."""
+    """A page with scripts off, which the tests of a module share."""
     with reused_page_without_scripts.taken(request.node) as page:
         yield page

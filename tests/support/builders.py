@@ -85,7 +85,7 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
 
 
 def robot_there(panel: Panel) -> RobotState:
-    """A robot that commands can reach: link and bridge are up. It has not published anything yet."""
+    """A robot that commands can reach: link and bridge are up. It has not published yet."""
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.link_up = True
     robot.settled_at = 0.0

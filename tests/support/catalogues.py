@@ -24,8 +24,8 @@ def write_catalogue(folder: Path, language: str, texts: Mapping[str, str]) -> No
 
 
 def app_with(write: Callable[[Path], None]) -> FastAPI:
-    """The application with the catalogues that are written into a folder, in place of the project's:
-    it reads them when it is imported."""
+    """The application with the catalogues of a folder instead of the project's; it reads them when it
+    is imported."""
     folder = Path(KEPT.enter_context(TemporaryDirectory()))
     write(folder)
     KEPT.enter_context(catalogues_in(folder))

@@ -1,4 +1,4 @@
-"""The two forms of the tests that try something often: short in `make test`, long in `make faults`."""
+"""The two forms of tests with many repetitions: short in `make test`, long in `make faults`."""
 
 import os
 from typing import Final
@@ -7,5 +7,5 @@ LONG: Final = os.environ.get("FAULTS") == "long"
 
 
 def several(short: int, long: int) -> int:
-    """A count or a time, by the form."""
+    """A count or a time, depending on the form."""
     return long if LONG else short

@@ -1,4 +1,4 @@
-"""A panel with a hold, the robot that permits it, and how holds ended by the server's log."""
+"""A panel with a hold, the robot that permits it, and the ends of holds in the server's log."""
 
 import re
 from pathlib import Path
@@ -40,7 +40,7 @@ ENDED: Final = re.compile(r"hold \w+ of \w+ by .* ended after .* \((\w+)\): (.*)
 
 
 def jogging(bridge: Bridge, node: RosNode, folder: Path, app: str = "app.main:app") -> Server:
-    """A server with this panel, whose robot permits."""
+    """A server with this panel and a robot that permits."""
     mine = live_server(bridge, folder, PANEL, app=app)
     permit(mine, node, True)
     return mine
@@ -69,7 +69,7 @@ def ended(server: Server) -> list[tuple[str, str]]:
 
 
 def codes(server: Server, after: int = 0) -> list[str]:
-    """The codes of the ends that came after so many."""
+    """The codes of the ends after the given number of ends."""
     return [code for code, _ in ended(server)[after:]]
 
 

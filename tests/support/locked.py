@@ -1,6 +1,6 @@
 """Environments with the panel's locked dependencies, copied from the tests' own: pip takes 20 s.
-They are the same: `tests/requirements.lock` has each of them with the same version and hashes, and pip
-has checked these. `make release` installs them by pip."""
+`tests/requirements.lock` has each of them with the same version and hashes, and pip has checked
+these. `make release` installs them by pip."""
 
 import re
 import shlex
@@ -39,7 +39,7 @@ def add_dependencies(environment: Path) -> None:
 
 
 def add_pip(environment: Path) -> None:
-    """Writes `bin/pip`, which is that of the tests."""
+    """Writes `bin/pip`, which runs the pip of the tests."""
     python = shlex.quote(str(environment / "bin/python"))
     pip = environment / "bin/pip"
     pip.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m pip --python {python} "$@"\n')

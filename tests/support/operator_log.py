@@ -1,4 +1,4 @@
-"""An operator's log in an event loop of the test's own."""
+"""An operator's log in a separate event loop of the test."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -12,15 +12,15 @@ DISK_WITHIN_S: Final = 8.0
 
 
 def wait_for_the_disk() -> None:
-    """Presses in this process wait longer for their entries: the disk of a machine that runs tests may
-    stand still for some seconds. Tests of that wait set a time of their own."""
+    """Lets presses in this process wait longer for their entries: the disk of a machine that runs tests
+    may stall for some seconds. Tests of that wait set another time."""
     vars(audit_log).update(PRESSED_WITHIN_S=DISK_WITHIN_S, CLOSED_WITHIN_S=DISK_WITHIN_S)
 
 
 def run(
     folder: Path, work: Callable[[OperatorLog], Awaitable[object]], limits: Limits = LIMITS
 ) -> None:
-    """Works with a log that is started, and stopped whatever happens."""
+    """Runs with a log that is started before and always stopped afterwards."""
 
     async def opened() -> None:
         log = OperatorLog(folder, limits)

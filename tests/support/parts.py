@@ -1,4 +1,4 @@
-"""The real parts of tests: bridge, ROS 2 nodes, kiosk servers. Each is a process on loopback, and is
+"""The real parts of tests: bridge, ROS 2 nodes, servers. Each is a process on loopback, and is
 ended by the test or fixture that started it."""
 
 import json
@@ -62,19 +62,19 @@ MOST_MEMORY = 2 << 30  # bytes of a node
 STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
 
 
-# Even on a busy machine, anything immediate happens within this time.
+# Even on a busy machine, an immediate effect happens within this time.
 ENOUGH_S = 40.0
 ARRIVES_WITHIN_S = 2.0
-SOONEST_S, LATEST_S = 0.01, 0.1  # until the next look at a condition
-GROWS = 0.05  # per second that it was waited for
+SOONEST_S, LATEST_S = 0.01, 0.1  # until the next check of a condition
+GROWS = 0.05  # per second of waiting
 
 
 def until(
     what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float | None = None
 ) -> Any:
-    """Waits for a condition and returns its value; fails with `why` when time is up. Where `every_s`
-    does not say how often it looks, it looks less often the longer it waits: a look may be a request,
-    and takes CPU time from what it waits for."""
+    """Waits for a condition and returns its value; fails with `why` at the timeout. Without `every_s`
+    the interval between checks grows with the waiting time: a check may be a request, which takes CPU
+    time from the process that it waits for."""
     began = time.monotonic()
     while True:
         if found := what():
@@ -173,7 +173,7 @@ class Bridge:
     """The real bridge with the shipped configuration, on a port and a domain of this test."""
 
     def __init__(self, domain: int, namespace: str = "/", options: Sequence[str] = ()) -> None:
-        """`options` are further places of its configuration, as `path=json5`."""
+        """`options` are further settings of its configuration, as `path=json5`."""
         self.domain = domain
         self.port = free_port()
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
@@ -186,7 +186,7 @@ class Bridge:
         self._process: Process | None = None
 
     def configure(self, file: Path) -> None:
-        """Another configuration from the next start on; it has the bridge's endpoint and domain."""
+        """Sets another configuration for the next start; it has the bridge's endpoint and domain."""
         self._file = file
 
     def _configuration(self) -> list[str]:
@@ -279,8 +279,8 @@ class RosNode(Commanded):
 def publish_until(
     node: RosNode, topic: str, fields: Mapping[str, Any], is_known: Callable[[], Any]
 ) -> None:
-    """Publishes until it has arrived: what a publisher of Fast DDS says just after it appeared may
-    never reach the bridge, though both know of each other."""
+    """Publishes until the message has arrived: a message of a new publisher on Fast DDS may never
+    reach the bridge, even if both have discovered each other."""
 
     def arrives() -> Any:
         node.publish(topic, fields)
@@ -292,14 +292,14 @@ def publish_until(
 def publish_and_go(
     node: RosNode, topic: str, type_name: str, fields: Mapping[str, Any], is_known: Callable[[], Any]
 ) -> None:
-    """`publish_until` by a publisher that ends then."""
+    """`publish_until` by a publisher that ends afterwards."""
     node.advertise(topic, type_name)
     publish_until(node, topic, fields, is_known)
     node.withdraw(topic)
 
 
 def arrives(server: "Server", node: RosNode) -> bool:
-    """Whether a press gets to the node; nothing of it is on its way any more. What is sent
+    """Whether a press arrives at the node; afterwards none of it is in flight. A message that is sent
     before a Fast DDS node has discovered the bridge's writer never arrives."""
     text = f"there? {secrets.token_hex(4)}"
     if not sends(server, text):
@@ -311,7 +311,7 @@ def arrives(server: "Server", node: RosNode) -> bool:
 
 
 def sends(server: "Server", text: str) -> bool:
-    """Whether a press is sent: a server that stood still for a moment refuses it."""
+    """Whether a press is sent: a server that has just stalled refuses it."""
     return bool(server.press("operation", text).json()["outcome"] == "published")
 
 
@@ -349,7 +349,7 @@ def http_client(url: str, timeout_s: float = ENOUGH_S, **more: Any) -> httpx.Cli
 
 
 class Server:
-    """The kiosk under uvicorn, as users start it."""
+    """The server under uvicorn, as users start it."""
 
     def __init__(
         self,
@@ -527,6 +527,6 @@ def zenoh_file(folder: Path, endpoint: str) -> Path:
 
 
 def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
-    """A kiosk server with the shipped panel, in live mode behind a bridge."""
+    """A server with the shipped panel, in live mode behind a bridge."""
     zenoh = str(zenoh_file(folder, endpoint))
     return Server(ROOT, port, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

@@ -1,4 +1,4 @@
-"""Servers with a panel of the test's own, ready when they are given."""
+"""Servers with a panel of the test, which are ready when they are returned."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from tests.support.parts import ROOT, Bridge, Server, live, until
 
 
 def demo_server(folder: Path, panel: str, **more: Any) -> Server:
-    """A server with a panel, by its text, and the robot that it simulates. `more` is for `Server`."""
+    """A server with a panel, by its text, and its simulated robot. `more` is for `Server`."""
     path = str(panel_file(folder, panel))
     return ready(Server(ROOT, KIOSK_PANEL=path, KIOSK_MODE="demo", **more))
 
@@ -21,7 +21,7 @@ def live_server(bridge: Bridge, folder: Path, panel: str, **more: Any) -> Server
 
 
 def ready(server: Server) -> Server:
-    """The server, once it is ready; one that does not get so is ended."""
+    """The server when it is ready; a server that does not get ready is ended."""
     try:
         until(server.ready, "ready")
     except BaseException:
@@ -32,7 +32,7 @@ def ready(server: Server) -> Server:
 
 @contextmanager
 def kept_running(start: Callable[[], Server]) -> Iterator[Callable[[], Server]]:
-    """Gives a server that runs: another one where a test has ended the one before."""
+    """Returns a running server: a new one if a test has ended the one before."""
     servers: list[Server] = []
 
     def running() -> Server:

@@ -1,4 +1,4 @@
-"""The shell commands that README and documentation show, and how each is tested."""
+"""The shell commands of README and documentation, and how each is tested."""
 
 import re
 import tomllib
@@ -51,8 +51,8 @@ def pages() -> list[Path]:
 
 
 def commands_of(text: str) -> Iterator[tuple[int, str]]:
-    """Of a page's blocks: line number and command, without comments. A line that ends with a backslash
-    goes on with the next one."""
+    """The commands in a page's blocks: line number and command, without comments. A line that ends
+    with a backslash continues in the next one."""
     for block in FENCE.finditer(text):
         first = text.count("\n", 0, block.start()) + 2
         lines = enumerate(block[2].splitlines(), first)
@@ -76,7 +76,7 @@ def shown() -> tuple[Shown, ...]:
 
 @cache
 def rows() -> tuple[Row, ...]:
-    """In the file's order, whatever their kinds."""
+    """The rows of all kinds in the order of the file."""
     text = TABLE.read_text(encoding="utf-8")
     tables = tomllib.loads(text)
     kinds = re.findall(r"^\[\[(\w+)\]\]$", text, re.MULTILINE)
@@ -96,7 +96,7 @@ def row_of(command: str) -> Row | None:
 
 
 def commands_for(test: str) -> list[str]:
-    """The commands that are run by a test elsewhere, each once, as pages show them."""
+    """The commands that another test runs, each once, as pages show them."""
     mine = (one.command for one in shown() if (row := row_of(one.command)) and row.text("test") == test)
     return list(dict.fromkeys(mine))
 

@@ -1,7 +1,7 @@
-"""Chromium in tests: started once for many modules, and pages that tests take one after the other.
+"""Chromium in tests: started once for many modules, and pages that tests use one after the other.
 
-A page in a browser context of its own takes 0.5 CPU seconds to load: most of it is the start of its
-renderer process. A page that is loaded again takes 0.2.
+A page in a new browser context takes 0.5 CPU seconds to load: most of it is the start of its renderer
+process. A page that is loaded again takes 0.2.
 """
 
 import os
@@ -64,9 +64,9 @@ def sized(page: Page, width: int, height: int) -> Page:
 
 
 class ReusedPage:
-    """A page that tests take one after the other. Each finds it in a window of 1280x800, with nothing
-    of the tests before: no cookies, no storage, no routes, no other page in its context. What cannot be
-    taken back, such as an init script, needs a page of its own."""
+    """A page that tests use one after the other. It is reset before each test: a window of 1280x800,
+    no cookies, no storage, no routes, no other page in its context. Changes that cannot be reset, such
+    as an init script, need a separate page."""
 
     def __init__(self, browser: Browser, script: str = "", **options: Any) -> None:
         """`script` runs in each page before its own, `options` are those of the browser context."""
@@ -102,7 +102,7 @@ class ReusedPage:
 
 
 def opened(browser: Browser, **options: Any) -> BrowserContext:
-    """A browser context with this project's patience, in a window of 1280x800."""
+    """A browser context with this project's timeouts, in a window of 1280x800."""
     width, height = SIZE
     context = browser.new_context(**{"viewport": {"width": width, "height": height}, **options})
     context.set_default_timeout(1000 * ENOUGH_S)
@@ -110,8 +110,8 @@ def opened(browser: Browser, **options: Any) -> BrowserContext:
 
 
 def emptied(page: Page) -> bool:
-    """Makes the page like a new one, but for what its process keeps in memory. Closes it where that
-    fails, as when its server has ended."""
+    """Resets the page, except for the memory of its process. Closes it if that fails, as when a server
+    has ended."""
     context = page.context
     with suppress(Error):
         for other in context.pages:

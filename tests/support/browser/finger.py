@@ -1,4 +1,4 @@
-"""A finger that holds on a touched screen, and each way in which its page can go."""
+"""A finger that holds a control on a touch screen, and each way in which its page can go away."""
 
 import os
 import signal
@@ -53,13 +53,13 @@ LISTENS: Final = """
 
 
 class Touch:
-    """Touches of a page's screen, as its browser gets them."""
+    """Touches on the screen of a page, as its browser receives them."""
 
     def __init__(self, page: Page) -> None:
         self._session = page.context.new_cdp_session(page)
 
     def send(self, kind: str, *points: tuple[float, float]) -> None:
-        """An event, such as "touchStart", with all fingers that are on the screen."""
+        """Sends an event, such as "touchStart", with all fingers that are on the screen."""
         touches = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
         self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
@@ -84,7 +84,7 @@ class Finger:
         self.opens()
 
     def opens(self) -> None:
-        """The page again: a cause that was tried before, like a hidden page, is over."""
+        """Opens the page again, to undo an earlier cause, such as a hidden page."""
         self.up()
         self.page.goto(self.server.url)
         expect(self.button).to_be_enabled()
@@ -97,7 +97,7 @@ class Finger:
         self._touches = True
 
     def hold(self) -> None:
-        """What has to be done for the robot to move."""
+        """Makes the robot move."""
         self.down()
 
     def up(self) -> None:
@@ -131,7 +131,7 @@ def jogged(finger: Finger, node: RosNode) -> tuple[int, int]:
 def begun(
     finger: Finger, node: RosNode, topic: str, moves: Callable[[RosNode, int], bool]
 ) -> tuple[int, int]:
-    """Holds until the robot moves: how much was heard before that, and how many holds had ended."""
+    """Holds until the robot moves. Returns how much was received before, and how many holds ended."""
     for _ in range(TRIES):
         before, ends = len(node.heard(topic)), len(codes(finger.server))
         finger.hold()
@@ -150,7 +150,7 @@ def ended_by(
     lift: bool = True,
     stopped: Callable[[], bool] = lambda: True,
 ) -> tuple[int, float]:
-    """Holds and lets the cause happen, until that is what ended the hold. Gives how much was heard
+    """Holds and triggers the cause, until this cause ended the hold. Returns how much was received
     before that hold, and when (`time.monotonic`) the cause began."""
     for attempt in range(TRIES):
         if attempt:
@@ -170,7 +170,7 @@ def ended_by(
 
 @contextmanager
 def own_chromium(chromium: Browser, folder: Path) -> Iterator[tuple[Browser, int]]:
-    """A browser of the test's own, in a process group of its own: (browser, its group)."""
+    """A browser for one test, in a separate process group: (browser, its group)."""
     port = free_port()
     process = subprocess.Popen(
         [CHROMIUM, *CHROMIUM_FLAGS, "--headless=new", f"--remote-debugging-port={port}",

@@ -1,4 +1,4 @@
-"""A slow way between a browser and a server."""
+"""A slow connection between a browser and a server."""
 
 import socket
 import threading
@@ -10,7 +10,7 @@ TICK_S: Final = 0.1
 
 
 class Line:
-    """A relay to a server. While it is `slow`, what the server sends passes at a limited speed, of each
+    """A relay to a server. While it is `slow`, it limits the speed of the server's data on each
     connection."""
 
     def __init__(self, port: int, bytes_per_s: int) -> None:

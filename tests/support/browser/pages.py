@@ -1,4 +1,4 @@
-"""What tests do with any page."""
+"""Functions for any page in tests."""
 
 from typing import Final
 
@@ -43,7 +43,7 @@ def asked(button: Locator) -> Locator:
 
 
 def place(found: Locator) -> FloatRect:
-    """Where a visible element is, in px of the window."""
+    """The position of a visible element, in px of the window."""
     box = found.bounding_box()
     assert box is not None, f"{found} is not visible"
     return box

@@ -37,7 +37,7 @@ PRESS_ON = f"""(name) => {{
 
 
 class KioskScreen:
-    """The watcher and its browser. The test has a DevTools port beside the watcher's pipe."""
+    """The watcher and its browser. The test has a DevTools port in addition to the watcher's pipe."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class KioskScreen:
         return ((self.call("Runtime.evaluate", **given) or {}).get("result") or {}).get("value")
 
     def lives(self) -> bool:
-        """Whether one page is shown, of the panel, whose events are young and which draws."""
+        """Whether exactly one page is shown, is the panel's, receives events and draws."""
         if len(self.pages()) != 1:
             return False
         page = self.evaluate(LOOK)
@@ -88,7 +88,7 @@ class KioskScreen:
         return bool(runs and page["drawn"] and page["age_s"] < ALIVE_WITHIN_S)
 
     def press_on(self, name: str) -> None:
-        """Presses ten times a second; each press has a text of its own."""
+        """Presses ten times a second; each press has a different text."""
         until(lambda: self.evaluate(f"({PRESS_ON})({json.dumps(name)})"), "the page presses")
 
     def stop_presses(self) -> None:
@@ -96,7 +96,7 @@ class KioskScreen:
         until(lambda: self.evaluate(stop), "the page presses no more")
 
     def processes(self, kind: str) -> list[int]:
-        """Those of a kind: "browser", "renderer" or "GPU"."""
+        """The processes of a kind: "browser", "renderer" or "GPU"."""
         browser = self._devtools("version")["webSocketDebuggerUrl"]
         found = _called(browser, "SystemInfo.getProcessInfo", {}) or {}
         return [one["id"] for one in found["processInfo"] if one["type"] == kind]

@@ -1,4 +1,4 @@
-"""A panel with every input, and pages on screens that are touched."""
+"""A panel with every input, and pages on touch screens."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -179,14 +179,14 @@ def opened(context: BrowserContext, server: Server, path: str = "/") -> Iterator
 
 
 def loaded(page: Page, server: Server, path: str = "/") -> Page:
-    """The page with a page of the server and its scripts."""
+    """Loads a page of the server, with its scripts."""
     page.goto(server.url + path)
     expect(page.locator("html[data-floor]")).to_be_attached()
     return page
 
 
 def touched(page: Page, server: Server, size: tuple[int, int] = SIZE) -> Page:
-    """The page, on a screen that is touched, with the server's first page and its scripts."""
+    """The server's first page with its scripts, on a touch screen."""
     loaded(sized(page, *size), server)
     if page.locator("template:is(#keypad, #keyboard)").count():
         expect(page.locator("body[data-touch-entry]")).to_be_attached()
@@ -194,7 +194,7 @@ def touched(page: Page, server: Server, size: tuple[int, int] = SIZE) -> Page:
 
 
 class Keys:
-    """A keyboard, or a bar code reader, whose keys come as far apart as `apart_s` says."""
+    """A keyboard, or a bar code reader, with `apart_s` seconds between its keys."""
 
     def __init__(self, page: Page, apart_s: float) -> None:
         self._session = page.context.new_cdp_session(page)
@@ -230,5 +230,5 @@ def overlap(page: Page, one: str, other: str) -> bool:
 
 
 def settled(page: Page) -> None:
-    """What lies below a sheet can be pressed again."""
+    """Waits until elements below a sheet can be pressed again."""
     expect(page.locator("body:not([data-settling])")).to_be_attached()

@@ -1,5 +1,5 @@
-"""The project's commands as processes of their own. They are forked from one that has imported what
-they need, see `kiosk_parent`: importing takes longer than what most commands do."""
+"""The project's commands as separate processes. They are forked from a process with the imported
+libraries, see `kiosk_parent`: importing takes longer than most commands."""
 
 import os
 import signal
@@ -31,7 +31,7 @@ def start(
 def start_new(
     module: str, *words: str, folder: Path = ROOT, env: Mapping[str, str] | None = None
 ) -> Started:
-    """The same, not forked."""
+    """The same as `start`, not forked."""
     return subprocess.Popen(
         [sys.executable, "-m", module, *words],
         cwd=folder,
@@ -47,7 +47,7 @@ def start_new(
 def run(
     module: str, *words: str, folder: Path = ROOT, env: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """The same as `start`, to its end."""
+    """The same as `start`; waits for its end."""
     return finished(start(module, *words, folder=folder, env=env))
 
 

@@ -1,6 +1,6 @@
-"""A process that has imported what many short-lived ones need, and forks these on order.
+"""A process that has imported the libraries of many short-lived processes, and forks these on order.
 
-Only the standard library is imported here: ROS 2's Python runs it, too.
+Imports only the standard library, because ROS 2's Python runs it too.
 
 Orders come on a socket: each message is an order in JSON, `{"arguments": […], "env": {…}}`, with four
 files: the child's stdin, stdout and stderr, and a pipe for its pid and then its exit code. The process

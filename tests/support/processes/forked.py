@@ -1,5 +1,5 @@
-"""Processes forked from one that has imported what they need, with the interface of `Popen`: kiosk
-servers, see `kiosk_parent`, and ROS 2 nodes, see `ros_parent`."""
+"""Processes forked from a process with the imported libraries, with the interface of `Popen`: servers,
+see `kiosk_parent`, and ROS 2 nodes, see `ros_parent`."""
 
 import atexit
 import json
@@ -27,7 +27,7 @@ FORKED_TOO: Final = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": ""}
 
 
 def as_here() -> bool:
-    """Whether a child of a parent that was started before is as one that is started here and now."""
+    """Whether a child of an existing parent equals a process that is started here and now."""
     return NETWORK.stat().st_ino == OURS and os.environ.get("FAULTS") != "long"
 
 
@@ -93,7 +93,7 @@ class Forked:
 
     @classmethod
     def server(cls, command: Sequence[str], env: Mapping[str, str]) -> "Forked":
-        """A kiosk server whose stderr is read."""
+        """A server whose stderr is read."""
         parent = _parent(sys.executable, KIOSK_PARENT)
         return cls(parent, [str(ROOT), *command[2:]], {**os.environ, **env}, ["stderr"])
 

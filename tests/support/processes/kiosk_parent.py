@@ -1,4 +1,4 @@
-"""A process that imports the server's libraries once, and forks kiosk servers and commands: importing
+"""A process that imports the server's libraries once, and forks servers and commands: importing
 them takes a second per server. Message types, the panel's models and templates are prepared once, too.
 
 Run as `python -m tests.support.processes.kiosk_parent FD` in the project's folder, see `fork_parent`. A
@@ -81,8 +81,8 @@ def prepare(templates: str) -> None:
 
 
 def bear_standstills() -> None:
-    """Beside other tests a server or a bridge may stand still for a second; here that locks nothing and
-    refuses no press. A test of what comes of it starts its server with `EXACT_LIVENESS=1`."""
+    """Tolerates stalls: beside other tests a server or a bridge may stall for a second, which locks
+    nothing here and refuses no press. A test of stalls starts its server with `EXACT_LIVENESS=1`."""
     from app.transport import bridge_liveness, bridge_peer, readiness
 
     vars(bridge_liveness).update(STOOD_STILL_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
@@ -108,6 +108,6 @@ if __name__ == "__main__":
     parent = ForkParent(socket.socket(fileno=int(sys.argv[1])), become, read_libraries())
     compiled = tempfile.mkdtemp(prefix="templates-")
     prepare(compiled)
-    gc.freeze()  # a child does not look at all of this at its end: it would take 0.3 s
+    gc.freeze()  # a child does not scan these objects at its end: it would take 0.3 s
     parent.run()  # in a forked server, it ends by SystemExit
     shutil.rmtree(compiled, ignore_errors=True)

@@ -1,9 +1,10 @@
-"""A process that imports once what nodes need, and forks the programs of `tests/ros`: importing takes a
-node longer than all else of its start.
+"""A process that imports the libraries of nodes once, and forks the programs of `tests/ros`: imports
+take most of a node's start time.
 
 ROS 2's Python runs it, as `python -m tests.support.processes.ros_parent FD` in the project's folder;
-see `fork_parent`. A child's arguments are a program and its own arguments. rclpy itself is left to the
-children: with it comes Fast DDS, which starts threads, and these do not survive a fork.
+see `fork_parent`. A child's arguments are a program and its own arguments. The
+children import rclpy themselves: it loads Fast DDS, which starts threads, and these do not survive a
+fork.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A shell in a checkout on a network of its own: what a page shows is run there as a reader runs it."""
+"""A shell in a checkout with its own network namespace, for the commands that pages show."""
 
 import os
 import shlex
@@ -19,7 +19,7 @@ PROGRAMS: Final = {
 
 
 class Shell:
-    """Ports there are free, and seen by its commands only. `close` ends what still runs."""
+    """Its ports are free and visible to its commands only. `close` ends running commands."""
 
     def __init__(self, folder: Path) -> None:
         """Makes the checkout in `folder`."""
@@ -51,7 +51,7 @@ class Shell:
         self._running: list[Process] = []
 
     def _link_checkout(self) -> None:
-        """The files of the checkout, and `.venv` with what the tests have, as `make run` sets it up."""
+        """Links the checkout's files, and a `.venv` with the tests' packages, as after `make run`."""
         environment = self.checkout / ".venv"
         environment.mkdir(parents=True)
         for path in ROOT.iterdir():

@@ -1,5 +1,5 @@
-"""Signals whose effect is waited for. After SIGSTOP was sent, threads of a process still run until the
-one that got the signal has run: on a busy machine some milliseconds, in which it answers a query."""
+"""Signals, with a wait for their effect. After SIGSTOP, the threads of a process still run until the
+thread that gets the signal has run: on a busy machine some milliseconds, in which it may answer."""
 
 import os
 import signal
@@ -26,7 +26,7 @@ def send_signal(pid: int, number: signal.Signals) -> None:
 
 
 def _states(pid: int) -> Iterator[str]:
-    """Of each thread, as in proc(5): it follows the name, which may have brackets in it."""
+    """The state of each thread, as in proc(5): it follows the name, which may have brackets in it."""
     for thread in Path(f"/proc/{pid}/task").iterdir():
         with suppress(FileNotFoundError, ProcessLookupError):  # one that has ended
             yield (thread / "stat").read_text().rpartition(")")[2].split()[0]
