@@ -18,18 +18,18 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from bench import latency
-from bench.cost import cost
-from bench.growth import Growth
 from bench.kiosk import Kiosk
 from bench.peer import Peer
 from bench.peers import PEERS
 from bench.peers.check import fault_of
-from bench.report import write
+from bench.phases import latency
+from bench.phases.cost import cost
+from bench.phases.growth import Growth
+from bench.phases.stalled import stalled
+from bench.phases.start import start
+from bench.report.store import Store
+from bench.report.tables import write
 from bench.rig import QUICK, Rig, Sizes
-from bench.stalled import stalled
-from bench.start import start
-from bench.store import Store
 from tests.support.parts import ROOT
 
 KIOSK: Final = Kiosk()

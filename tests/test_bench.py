@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from app.panel import load_panel
-from bench.figures import (
+from bench.kiosk import Robot, panel
+from bench.report.figures import (
     percentile,
     presses_matched,
     ratio,
@@ -16,11 +17,10 @@ from bench.figures import (
     slope,
     toggles_matched,
 )
-from bench.kiosk import Robot, panel
-from bench.picture import picture
-from bench.report import BEGIN, END, whole, write
-from bench.store import Store, figure
-from bench.targets import Target, best_rival, grown, targets
+from bench.report.picture import picture
+from bench.report.store import Store, figure
+from bench.report.tables import BEGIN, END, whole, write
+from bench.report.targets import Target, best_rival, grown, targets
 
 MS = 1e6  # in ns
 TITLES = {"kiosk": "this panel", "floor": "the floor", "plain": "plain <way>", "nicegui": "NiceGUI"}

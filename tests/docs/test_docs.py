@@ -13,7 +13,7 @@ import pytest
 from app.panel import load_panel
 from app.settings import PREFIX, VARIABLES
 from app.web.serving import OPTIONS
-from bench.report import BEGIN, END
+from bench.report.tables import BEGIN, END
 from tests.support.parts import ROOT, Server, as_response, until
 from tests.support.processes import command
 from tests.support.servers import ready

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Final
 
-from bench.store import Results, figure
+from bench.report.store import Results, figure
 
 WIDTH: Final = 860
 LEFT: Final = 250  # width of the titles

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 from typing import Any, Final
 
 from bench.browser import Watched
-from bench.figures import percentile, shown_after, toggles_matched
 from bench.parts import family, rss_mib
 from bench.peer import Peer
+from bench.report.figures import percentile, shown_after, toggles_matched
 from bench.rig import Rig
 
 LARGE: Final = "/t0"

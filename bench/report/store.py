@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bench.figures import median
+from bench.report.figures import median
 from tests.support.parts import ROOT
 
 Results = dict[str, Any]

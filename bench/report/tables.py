@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from bench.figures import ratio
-from bench.picture import picture
-from bench.store import Results, figure
-from bench.targets import FLOOR, FLOOR_AGAIN, Grown, grown, targets
+from bench.report.figures import ratio
+from bench.report.picture import picture
+from bench.report.store import Results, figure
+from bench.report.targets import FLOOR, FLOOR_AGAIN, Grown, grown, targets
 
 BEGIN: Final = "<!-- bench -->"
 END: Final = "<!-- /bench -->"

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from bench.figures import Slope, ratio, slope
-from bench.store import Results, figure
+from bench.report.figures import Slope, ratio, slope
+from bench.report.store import Results, figure
 
 KIOSK: Final = "kiosk"
 FLOOR: Final = "floor"

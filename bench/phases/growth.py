@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final
 
-from bench.cost import join
 from bench.kiosk import Kiosk, Robot
 from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Running
+from bench.phases.cost import join
 from bench.rig import Rig
 from tests.support.processes.commanded import Commanded
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from bench.browser import Watched
-from bench.figures import Matched, percentile, presses_matched, toggles_matched
 from bench.peer import Peer
+from bench.report.figures import Matched, percentile, presses_matched, toggles_matched
 from bench.rig import Rig
 
 GAP_S: Final = (0.015, 0.025)  # random, so that it does not synchronise with a peer's timers

@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from bench.figures import percentile
 from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Peer, Running
+from bench.report.figures import percentile
 from bench.rig import Rig, scratch
 from bench.unattended import Unattended
 from tests.support.processes.commanded import Commanded
