@@ -171,9 +171,8 @@ async def _app_state(
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
-        metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
-            metrics.follow(fleet)
+            metrics = Metrics(fleet, lambda: oplog.left_out, lambda: limits.refused)
             made = PageTemplates(templates, panel.templates)
             yield AppState(fleet, assets, made, metrics, oplog, limits)
 

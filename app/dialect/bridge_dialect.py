@@ -20,7 +20,7 @@ from app.interfaces.names import (
     valid_type,
 )
 
-TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
+TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and panel server
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
 CONFIG: Final = "@/*/ros2/config"  # a bridge's configuration: JSON with its `namespace`

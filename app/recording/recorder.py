@@ -58,7 +58,7 @@ class Recorder:
 
     @property
     def keys(self) -> frozenset[str]:
-        """The key expressions of the recorded topics."""
+        """The keys of the recorded topics."""
         return frozenset(self._channels)
 
     def record_sample(self, key: str, sample: Sample) -> None:

@@ -74,7 +74,7 @@ class Recordings:
     def begin(
         self, name: str, channels: Mapping[str, Channel], about: Mapping[str, str]
     ) -> "Recording":
-        """A new recording; `channels` are by key expression."""
+        """A new recording; `channels` are by key."""
         return Recording(self, name, channels, about)
 
     # Below: on the thread.

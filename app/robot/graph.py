@@ -1,6 +1,6 @@
 """The robot's ROS graph, from the bridges' liveliness tokens and admin space.
 
-Endpoints are indexed by key expression, so that a query costs the same for any size of graph.
+Endpoints are indexed by key, so that a query costs the same for any size of graph.
 """
 
 import math

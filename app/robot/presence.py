@@ -25,7 +25,7 @@ class EndpointPresence:
     """The bridges behind which each required endpoint was last seen."""
 
     def __init__(self, needed: Mapping[RequiredEndpoint, RequiredEndpoint]) -> None:
-        """`needed`: (role, ROS name) → (role, key expression)."""
+        """`needed`: (role, ROS name) → (role, key)."""
         self.required = needed
         self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
 

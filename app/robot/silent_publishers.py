@@ -33,7 +33,7 @@ class SilentPublishers:
     received them."""
 
     def __init__(self, topics: Collection[str]) -> None:
-        """`topics` are the key expressions of the interlocks' topics; all others are ignored."""
+        """`topics` are the keys of the interlocks' topics; all others are ignored."""
         self._topics = frozenset(topics)
         self._last_messages: dict[tuple[str, str | None], _LastMessage] = {}
         self._last_changes: dict[

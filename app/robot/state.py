@@ -63,7 +63,7 @@ class RobotState:
         self.link_up = False
         self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them
         self.settled_at = math.inf  # monotonic seconds: then a new bridge has set up its routes
-        self._keys: dict[str, str] = {}  # ROS name → key expression
+        self._keys: dict[str, str] = {}  # ROS name → key
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
         named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
@@ -174,7 +174,7 @@ class RobotState:
         return self.reading_by_key(self.key(topic))
 
     def reading_by_key(self, key: str) -> Reading:
-        """The same by the topic's key expression."""
+        """The same by the topic's key."""
         known = self._topics[key]
         found, sample = known.reading(), known.sample
         if sample is None or sample.source is None or sample.source in self.graph.bridges:

@@ -23,7 +23,7 @@ from app.transport.peer import RobotContext
 log = logging.getLogger("kiosk.joining")
 
 FAILED: Final = "joining the robot's topics failed"
-FRESH_S: Final = 1.0  # waited for a bridge that came while the kiosk ran
+FRESH_S: Final = 1.0  # waited for a bridge that appeared while the panel server ran
 FOUND_WITHIN_S: Final = 1.0  # then it was there before: its answers come after all its tokens
 SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
 SETTLE_MOST_S: Final = 2.0  # a listener not reached by then shows in a press's receipt

@@ -78,7 +78,7 @@ class BridgeLiveness:
         changed: Callable[[], None],
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`changed` is called when the robot's `answers` has changed."""
+        """`changed` is called when the robot's `is_responding` or `is_caught_up` has changed."""
         self._robot = robot
         self._link = link
         self._changed = changed

@@ -1,4 +1,4 @@
-"""The liveliness tokens that a kiosk wants for its panel, by what the graph shows.
+"""The liveliness tokens that the panel server holds for its panel, by what the graph shows.
 
 Who creates a route first fixes its type and QoS for all: a topic whose type differs gets no token, and
 what the panel listens to gets one when its publisher is first seen, with that publisher's durability.

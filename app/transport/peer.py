@@ -12,9 +12,9 @@ from app.transport.zenoh_session import ZenohSession
 
 
 class Peer(Protocol):
-    """Whether the peer that a robot is reached by is there, answers and is ready. It sets the robot's
-    `settled_at`, `answers` and `caught_up`, by which permission is judged. Used on the event loop only.
-    """
+    """Whether the peer that a robot is reached by exists, responds and is ready. It sets the robot's
+    `settled_at`, `is_responding` and `is_caught_up`, by which permission is judged. Used on the event
+    loop only."""
 
     def start(self) -> None:
         """Begins to watch it, once the session has declared everything."""

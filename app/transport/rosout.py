@@ -1,4 +1,4 @@
-"""The kiosk's own log on a robot's /rosout, so that ROS tools show it."""
+"""The panel server's own log on a robot's /rosout, so that ROS tools show it."""
 
 import asyncio
 import logging
@@ -23,8 +23,8 @@ class Putter(Protocol):
 
 
 class Rosout:
-    """Publishes each log record of the kiosk's between `start` and `stop`: not what its libraries say,
-    such as uvicorn of its connections."""
+    """Publishes each log record of the panel server between `start` and `stop`; not those of its
+    libraries, such as uvicorn's of connections."""
 
     def __init__(
         self,

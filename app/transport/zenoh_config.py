@@ -1,4 +1,4 @@
-"""Zenoh configurations: a file's, or of one endpoint, with what a kiosk needs of any."""
+"""Zenoh configurations: a file's, or of one endpoint, with the settings that the panel server needs."""
 
 import json
 import re

@@ -70,8 +70,8 @@ class ZenohSession:
 
         Zenoh would take up the old one by itself. But then the bridge may end for this session
         what it had just begun again, when it notices late that the old connection is lost: it
-        would show the kiosk as a subscriber and read nothing for it. And a subscriber drops what
-        it has seen before, also when what it saw was cut off in between.
+        would show the panel server as a subscriber and read nothing for it. And a subscriber drops
+        what it has seen before, also when what it saw was cut off in between.
         """
         held, self._held = self._held, None
         self._inbox.renew()

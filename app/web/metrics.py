@@ -32,22 +32,22 @@ class Open:
 
 
 class Metrics:
-    """Counts of one application, however often its panel is reloaded."""
+    """Counts of one application since its start."""
 
     def __init__(
-        self, left_out: Callable[[], int] = lambda: 0, limited: Callable[[], int] = lambda: 0
+        self,
+        fleet: Fleet | None = None,
+        left_out: Callable[[], int] = lambda: 0,
+        limited: Callable[[], int] = lambda: 0,
     ) -> None:
-        """`left_out` is how many refusals the operator's log only counts, `limited` how many presses,
-        holds and cancels were more than their limit."""
+        """Reports the links and topics of the fleet's robots. `left_out` is how many refusals the
+        operator's log only counts, `limited` how many presses, holds and cancels were more than their
+        limit."""
+        self.fleet = fleet
         self.left_out = left_out
         self.limited = limited
         self.presses: dict[str, Count] = {}  # by outcome
         self.streams = Open()
-        self.fleet: Fleet | None = None
-
-    def follow(self, fleet: Fleet) -> None:
-        """Reports these robots' links and topics from now on."""
-        self.fleet = fleet
 
     def pressed(self, outcome: str) -> None:
         """The outcome of a press or a hold."""

@@ -79,7 +79,7 @@ def test_the_kiosk_fills_in_deadline_and_count(tmp_path: Path) -> None:
         ({**JOG, "rate_hz": 0.5}, "rate_hz", "must be 1 or more, not 0.5"),
         ({**JOG, "rate_hz": 101}, "rate_hz", "must be 100 or less, not 101"),
         ({**JOG, "rate": 10}, "rate", 'did you mean "rate_hz"?'),
-        ({**JOG, "topic": "/rosout"}, "topic", "/rosout is where the kiosk's own log goes"),
+        ({**JOG, "topic": "/rosout"}, "topic", "/rosout is where the panel server's own log goes"),
         ({**JOG, "type": "geometry_msgs/msg/Twits"}, "type", "did you mean geometry_msgs/msg/Twist"),
         ({**JOG, "release": {"lineal": ZERO}}, "release.lineal", "unknown field"),
         ({**JOG, "message": {"linear": {"y": "1"}}}, "message.linear.y", "must be a number (float64)"),
@@ -99,7 +99,7 @@ def test_the_kiosk_fills_in_deadline_and_count(tmp_path: Path) -> None:
         (
             {**FLAGS, "message": {**FLAGS["message"], "width": 3}},
             "message.width",
-            "is filled in by the kiosk: it is the counter_field",
+            "is filled in by the panel server: it is the counter_field",
         ),
     ],
 )

@@ -51,7 +51,7 @@ def test_a_message_of_its_own_stops_with_zeros_or_with_its_release(tmp_path: Pat
         ({"y_axis": {"max": 300.0}, "type": "std_msgs/msg/Int8", "message": {"data": "{y}"}},
          "message.data", "must be"),
         ({"deadline_field": "linear.x", "message": {"linear": {"x": "{y}"}}},
-         "message.linear.x", "filled in by the kiosk"),
+         "message.linear.x", "filled in by the panel server"),
         ({"dead_zone": 1.0}, "dead_zone", ""),
         ({"shape": "star"}, "shape", ""),
     ],

@@ -39,8 +39,7 @@ def of_kiosk(change: Callable[[RobotSession], None]) -> Samples:
     async def followed() -> Samples:
         fleet = nowhere()
         try:
-            metrics = Metrics()
-            metrics.follow(fleet)
+            metrics = Metrics(fleet)
             change(fleet.first)
             return read(metrics)
         finally:
@@ -91,22 +90,6 @@ def test_open_streams_are_counted() -> None:
     with metrics.streams.another(), metrics.streams.another():
         assert read(metrics)["kiosk_streams", ()] == 2
     assert read(metrics)["kiosk_streams", ()] == 0
-
-
-def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
-    async def followed() -> Samples:
-        metrics = Metrics()
-        for _ in range(2):
-            fleet = nowhere()
-            metrics.follow(fleet)
-            metrics.pressed("published")
-            await fleet.stop()
-        fleet.first.robot.link_up = True
-        return read(metrics)
-
-    samples = asyncio.run(followed())
-    assert samples["kiosk_presses_total", ("published",)] == 2
-    assert samples["kiosk_link_up", ("",)] == 1
 
 
 def test_two_applications_count_for_themselves() -> None:

@@ -288,6 +288,6 @@ class PublishCommand(TopicWidget, Command):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.topic == "/rosout":
-            what = "/rosout is where the kiosk's own log goes: choose another"
+            what = "/rosout is where the panel server's own log goes: choose another"
             yield Fault(f"{place}.topic", what)
         yield from super().faults(place, checking)

@@ -151,7 +151,7 @@ def _own_field_faults(place: str, hold: HoldCommand, interfaces: Interfaces) -> 
             continue
         for part, template in hold.checked:
             if _has_field(template, path):
-                what = f"is filled in by the kiosk: it is the {key}"
+                what = f"is filled in by the panel server: it is the {key}"
                 yield Fault(f"{place}.{part}.{path}", what, cause=f"own {place} {key}")
     if hold.counter_field is not None and hold.counter_field == hold.deadline_field:
         yield Fault(f"{place}.counter_field", f'"{hold.counter_field}" is the deadline_field already')
