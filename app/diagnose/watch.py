@@ -51,7 +51,7 @@ async def watch(
     """Listens to the topics (key → key expression): until each of `wanted` has come often enough, or
     for `longest_s`."""
     found = Watched(began=time.monotonic())
-    session.start(Declarations(subscribe=topics, whole=topics.keys()))
+    session.start(Declarations(subscribe=topics, recorded=topics.keys()))
     waited_for = set(wanted)
     end = found.began + longest_s
     while (now := time.monotonic()) < end:

@@ -24,7 +24,7 @@ class Sample(NamedTuple):
     `source` is the zid of the bridge that sent it (from its timestamp), None if unknown. `seq` orders
     samples and losses of bridges as this session received them. `sent` is the timestamp of the sender's
     clock, in seconds since the epoch. `skipped` is the number of messages just before it that were not
-    read; for watched topics `skipped_payloads` are their payloads, and `overrun` is true if there were
+    read; for lossless topics `skipped_payloads` are their payloads, and `overrun` is true if there were
     even more. `cached`: it is from a cache, published at an unknown time.
     """
 

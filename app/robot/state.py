@@ -101,13 +101,13 @@ class RobotState:
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
         """(key, topic) of each topic that the panel subscribes to."""
         fields = panel.subscribed_fields()
-        watched = {one.topic for one in panel.interlocks} | {one.topic for one in panel.confirmations()}
+        lossless = {one.topic for one in (*panel.interlocks, *panel.confirmations())}
         for topic, type_name in panel.subscriptions().items():
             key = self.key(topic)
             made = Topic(
                 self._interfaces.field_reader(type_name, fields.get(topic, ())),
                 self.slices,
-                watched=topic in watched,
+                lossless=topic in lossless,
                 on_unreadable=partial(self.count_unreadable, key),
                 on_late_reading=partial(self._notify_late_reading, key),
             )

@@ -15,7 +15,9 @@ from app.interfaces import FieldReader, Fields, Walk
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 
-MAX_UNREAD: Final = 16  # undecoded messages of a watched topic; of other topics only the newest is kept
+MAX_UNREAD: Final = (
+    16  # undecoded messages of a lossless topic; of other topics only the newest is kept
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +54,17 @@ class Topic:
         reader: FieldReader,
         slices: Slices,
         *,
-        watched: bool,
+        lossless: bool,
         on_unreadable: Callable[[Sample, DecodeError], None],
         on_late_reading: Callable[[Reading], None],
     ) -> None:
-        """Of a `watched` topic each message counts. `on_late_reading` takes a reading that needed more
+        """Of a `lossless` topic each message counts. `on_late_reading` takes a reading that needed more
         than one turn; `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
         self._on_unreadable = on_unreadable
         self._on_late_reading = on_late_reading
-        self._watched = watched
+        self._lossless = lossless
         self._unread: deque[Sample] = deque(maxlen=MAX_UNREAD)
         self._walk: _PendingRead | None = None  # before the unread
         self._deferred = False
@@ -73,7 +75,7 @@ class Topic:
     def update(self, sample: Sample) -> None:
         """Adds a newer message."""
         self.sample = sample
-        if self._walk is None or not self._watched:
+        if self._walk is None or not self._lossless:
             self._unread.clear()
         self._unread.append(sample)
 

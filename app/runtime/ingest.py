@@ -90,13 +90,15 @@ class Ingest:
         sources = (source for widget in panel.commands for source in widget.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
-        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
-        self.prompt = self.watched | self._status.keys() | {self._events}
+        self.lossless = self._interlocks.keys() | {
+            robot.key(one.topic) for one in panel.confirmations()
+        }
+        self.immediate = self.lossless | self._status.keys() | {self._events}
         self._by_key: dict[str, list[SampleListener]] = {}
         for listener in listeners:
             for key in listener.keys:
                 self._by_key.setdefault(key, []).append(listener)
-        self.whole = frozenset(self._by_key)
+        self.recorded = frozenset(self._by_key)
 
     def steps(self, changes: Changes) -> Iterator[Updates]:
         """Ingests changes step by step: yields after each intermediate value that changed a permission,

@@ -49,7 +49,7 @@ class RobotCommands:
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             reached=peer.flushed,
         )
-        arrivals = Arrivals(ingest, lambda: link.hurried)
+        arrivals = Arrivals(ingest, lambda: link.has_immediate)
         judge = PressJudge(panel, robot, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(

@@ -81,7 +81,7 @@ class RobotSession:
         self._operators_log = operators_log
         self._listeners = ExitStack()
         self.interfaces = load_interfaces(panel.distro, panel.interfaces)
-        self.link = ZenohSession(config, lambda prompt: self._turn.wake(prompt), access.dialect)
+        self.link = ZenohSession(config, lambda immediate: self._turn.wake(immediate), access.dialect)
         zid = self.link.zid
         self.robot = RobotState(panel, self.interfaces, access.dialect, zid, entry, server.slices)
         self.robot.endpoints = self.link.endpoints
@@ -150,9 +150,14 @@ class RobotSession:
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
         declared = declarations(self.panel, self.interfaces, self.robot)
-        inbox = self._ingest
+        ingest = self._ingest
         self.link.start(
-            replace(declared, prompt=inbox.prompt, watched=inbox.watched, whole=inbox.whole)
+            replace(
+                declared,
+                immediate=ingest.immediate,
+                lossless=ingest.lossless,
+                recorded=ingest.recorded,
+            )
         )
         self._rosout.start()
         self.peer.start()

@@ -49,10 +49,10 @@ class Turn:
         self._stopped = True
         self._cancel_frame()
 
-    def wake(self, prompt: bool) -> None:
-        """Called on Zenoh's threads. Data that is not `prompt` waits for the next frame."""
+    def wake(self, immediate: bool) -> None:
+        """Called on Zenoh's threads. Data that is not `immediate` waits for the next frame."""
         with suppress(RuntimeError):  # the loop is closed: the process ends
-            self._loop.call_soon_threadsafe(self.run if prompt else self._run_by_frame)
+            self._loop.call_soon_threadsafe(self.run if immediate else self._run_by_frame)
 
     def _run_by_frame(self) -> None:
         if self._refresher.due <= self._loop.time():

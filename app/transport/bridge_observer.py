@@ -70,7 +70,7 @@ class BridgeObserver:
         """
         expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
         self._session.start(
-            Declarations(subscribe=expressions, whole=set(expressions), prompt=set(expressions))
+            Declarations(subscribe=expressions, recorded=set(expressions), immediate=set(expressions))
         )
         if hold:
             self._session.hold(self._dialect.own_tokens(self.zid, topics))

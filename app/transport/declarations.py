@@ -19,21 +19,21 @@ Named = Iterator[tuple[str, str]]  # (key, type)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Declarations:
     """Key → key expression of each topic that is subscribed to or published, and of each service that
-    is queried. What is `prompt`, `watched` and `whole` of the topics, the inbox says."""
+    is queried. `immediate`, `lossless` and `recorded` are the keys of topics for `Inbox.expect`."""
 
     subscribe: Mapping[str, str] = field(default_factory=dict)
     publish: Mapping[str, str] = field(default_factory=dict)
     query: Mapping[str, str] = field(default_factory=dict)
-    prompt: Collection[str] = NO_KEYS
-    watched: Collection[str] = NO_KEYS
-    whole: Collection[str] = NO_KEYS
+    immediate: Collection[str] = NO_KEYS
+    lossless: Collection[str] = NO_KEYS
+    recorded: Collection[str] = NO_KEYS
 
 
 NOTHING: Final = Declarations()
 
 
 def declarations(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Declarations:
-    """All that a panel has to do with on one robot."""
+    """The topics and services of one robot that a panel uses."""
     topic, service = robot.dialect.topic, robot.dialect.service
     return Declarations(
         subscribe={key: topic(key, name) for key, name in _subscribed(panel, interfaces, robot)},

@@ -1,7 +1,7 @@
-"""What comes in by a link, kept as latest values: never a queue that grows.
+"""The samples and tokens that a link has received, as latest values: never a queue that grows.
 
-The link's threads put it in under a lock, and do no more than replace what was there; the event loop
-is woken once, until it drains. Knows nothing of Zenoh.
+The link's threads only replace values, under a lock. The event loop is woken once, until it drains the
+inbox. Knows nothing of Zenoh.
 """
 
 import itertools
@@ -14,16 +14,16 @@ from typing import Any, Final, Protocol
 
 from app.robot.state import Buffer, Sample, SkippedPayload
 
-BETWEEN_MOST: Final = 256  # changes of a watched topic that are kept from one drain to the next
-BETWEEN_BYTES: Final = 1_000_000  # and their bytes
-KEPT_MOST: Final = 4_000  # samples that are kept whole from one drain to the next, of all topics
+UNSEEN_MOST: Final = 256  # changes of a lossless topic that are kept from one drain to the next
+UNSEEN_BYTES: Final = 1_000_000  # and their bytes
+KEPT_MOST: Final = 4_000  # samples of all recorded topics that are kept from one drain to the next
 KEPT_BYTES: Final = 32_000_000  # and their bytes
 
 NO_KEYS: Final[frozenset[str]] = frozenset()
 
 
 class Stamp(Protocol):
-    """When a sample was sent, by the clock of who sent it."""
+    """When a sample was sent, by the sender's clock, and the sender's id."""
 
     def get_id(self) -> Any: ...
     def get_time(self) -> Any: ...
@@ -31,10 +31,10 @@ class Stamp(Protocol):
 
 @dataclass(slots=True)
 class Token:
-    """What became of a liveliness token since the last drain.
+    """The changes of a liveliness token since the last drain.
 
-    `lost_seq` and `came_seq` order its last loss and its last appearance among the samples, 0 where
-    there was none; `came_at` (monotonic seconds) is when it appeared, `lost_before` the loss before.
+    `lost_seq` and `came_seq` order its last loss and its last appearance among the samples; 0 means
+    none. `came_at` (monotonic seconds) is when it appeared, `lost_before` the `lost_seq` before that.
     """
 
     alive: bool = False
@@ -46,8 +46,9 @@ class Token:
 
 @dataclass(slots=True)
 class Changes:
-    """All that came since the last drain; `kept` has each sample of the topics that are kept whole,
-    `caches` are (topic, token) of the publishers that keep their last message for late subscribers."""
+    """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
+    `kept` has every sample of the recorded topics. `caches` are (key, token) of the publishers that
+    keep their last message for late subscribers."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
@@ -56,9 +57,9 @@ class Changes:
     caches: Collection[tuple[str, str]] = ()
 
 
-class _Between:
-    """The messages of a topic before the newest that were not read, each change once; of too many the
-    newest."""
+class _Unseen:
+    """The messages of a topic since the last drain, without the newest: each change once. If there are
+    too many, the newest of them."""
 
     __slots__ = ("_bytes", "overrun", "values")
 
@@ -70,14 +71,14 @@ class _Between:
     def add(self, one: "_Arrived") -> None:
         self.values.append(SkippedPayload(one.payload, one.at, one.wall))
         self._bytes += len(one.payload)
-        while len(self.values) > BETWEEN_MOST or (self._bytes > BETWEEN_BYTES and len(self.values) > 1):
+        while len(self.values) > UNSEEN_MOST or (self._bytes > UNSEEN_BYTES and len(self.values) > 1):
             self._bytes -= len(self.values.popleft().payload)
             self.overrun = True
 
 
 @dataclass(slots=True)
 class _Arrived:
-    """A sample as it came; what it says of its source is read when it is drained."""
+    """A sample as received. Its stamp is read when it is drained."""
 
     payload: Buffer
     stamp: Stamp | None
@@ -85,37 +86,37 @@ class _Arrived:
     at: float
     wall: float
     skipped: int = 0
-    between: _Between | None = None
+    unseen: _Unseen | None = None
     cached: bool = False
 
     def sample(self, kept: bool = False) -> Sample:
-        """When it was sent is for what is kept only: to ask a stamp takes its time."""
+        """`sent` is set for kept samples only: reading a stamp's time is slow."""
         source = None if self.stamp is None else str(self.stamp.get_id())
         sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
         sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
         if self.cached:
             sample = sample._replace(cached=True)
-        if self.between is None:
+        if self.unseen is None:
             return sample
-        between = self.between
-        return sample._replace(skipped_payloads=tuple(between.values), overrun=between.overrun)
+        return sample._replace(skipped_payloads=tuple(self.unseen.values), overrun=self.unseen.overrun)
 
 
 class Inbox:
-    """What came by the newest session of a link; of the sessions before it, nothing comes in."""
+    """Samples and tokens received by the current session of a link. Those of earlier sessions are
+    dropped."""
 
     def __init__(self, wake: Callable[[bool], None]) -> None:
-        """`wake` is called on the link's threads, under the lock: once after a drain, and once more
-        with True when something came that is not to wait for the next frame."""
+        """`wake` is called on the link's threads, under the lock: with False for the first data after a
+        drain, with True for the first immediate data, which must not wait for the next frame."""
         self._wake_loop = wake
         self._lock = threading.Lock()
         self._seq = itertools.count(1)
         self._session = 0
-        self._prompt = self._watched = self._whole = NO_KEYS
+        self._immediate = self._lossless = self._recorded = NO_KEYS
         self._forget()
 
     def _forget(self) -> None:
-        self._woken = self._hurried = False
+        self._woken = self._has_immediate = False
         self._samples: dict[str, _Arrived] = {}
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
@@ -124,20 +125,26 @@ class Inbox:
         self._kept: deque[tuple[str, _Arrived]] = deque()
         self._kept_bytes = 0
 
-    def expect(self, prompt: Collection[str], watched: Collection[str], whole: Collection[str]) -> None:
-        """What comes of `prompt` topics wakes the loop at once. Of `watched` ones, which are prompt
-        too, a value that came and went between two drains is kept, and of `whole` ones all."""
-        self._prompt, self._watched = frozenset(prompt) | frozenset(watched), frozenset(watched)
-        self._whole = frozenset(whole)
+    def expect(
+        self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
+    ) -> None:
+        """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
+        loop at once. `lossless` topics are immediate, and values that were replaced between two drains
+        are kept. Every sample of a `recorded` topic is kept."""
+        self._immediate, self._lossless = (
+            frozenset(immediate) | frozenset(lossless),
+            frozenset(lossless),
+        )
+        self._recorded = frozenset(recorded)
 
     def renew(self) -> None:
-        """Forgets all: what comes next is of another session."""
+        """Begins a new session, with an empty inbox."""
         with self._lock:
             self._session += 1
             self._forget()
 
     def guarded(self, function: Callable[[Any], None]) -> Callable[[Any], None]:
-        """The same, under the lock; it does nothing any more once there is another session."""
+        """`function`, called under the lock. It does nothing once the session has been renewed."""
         session = self._session
 
         def handle(what: Any) -> None:
@@ -148,14 +155,14 @@ class Inbox:
         return handle
 
     def respond(self) -> None:
-        """Returns when the lock does not stand still."""
+        """Returns when the lock is free. Blocks while a callback holds it."""
         with self._lock:
             pass
 
     def drain(self) -> Changes:
-        """Takes all that came since the last call."""
+        """Returns and removes everything received since the last call."""
         with self._lock:
-            self._woken = self._hurried = False
+            self._woken = self._has_immediate = False
             samples, self._samples = self._samples, {}
             tokens, self._tokens = self._tokens, {}
             caches, self._caches = self._caches, []
@@ -170,19 +177,20 @@ class Inbox:
         )
 
     @property
-    def hurried(self) -> bool:
-        """Whether something came since the last drain that is not to wait for the next frame."""
-        return self._hurried
+    def has_immediate(self) -> bool:
+        """Whether immediate data has been received since the last drain."""
+        return self._has_immediate
 
     # Below: on the link's threads, under the lock. No work here, and nothing may raise.
 
     def put(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
-        """A sample of a topic, as it is published. Its stamp does not order it: clocks may be wrong."""
+        """A sample of a topic. Samples are in the order of reception, not of stamps: clocks may be
+        wrong."""
         self._live[key] = stamp
         self._add(key, payload, stamp)
 
     def put_cached(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
-        """A sample that was published before, unless its source has published since."""
+        """A sample from a publisher's cache; ignored if the publisher has published since."""
         if key in self._live:
             last = self._live[key]
             if last is None or stamp is None or last.get_id() == stamp.get_id():
@@ -193,15 +201,15 @@ class Inbox:
         arrived = _Arrived(
             payload, stamp, next(self._seq), time.monotonic(), time.time(), cached=cached
         )
-        unseen = self._samples.get(key)
-        if unseen is not None:
-            arrived.skipped = unseen.skipped + 1
-            if key in self._watched:
-                arrived.between = _between(unseen, payload)
+        replaced = self._samples.get(key)
+        if replaced is not None:
+            arrived.skipped = replaced.skipped + 1
+            if key in self._lossless:
+                arrived.unseen = _unseen(replaced, payload)
         self._samples[key] = arrived
-        if key in self._whole:
+        if key in self._recorded:
             self._keep(key, arrived)
-        self._wake(key in self._prompt)
+        self._wake(key in self._immediate)
 
     def _keep(self, key: str, arrived: _Arrived) -> None:
         self._kept.append((key, arrived))
@@ -211,7 +219,7 @@ class Inbox:
             self._kept_bytes -= len(oldest.payload)
 
     def token(self, key: str, alive: bool) -> None:
-        """A liveliness token came or ended."""
+        """A liveliness token appeared or was lost."""
         seq = next(self._seq)
         token = self._tokens.setdefault(key, Token())
         token.alive = alive
@@ -222,31 +230,31 @@ class Inbox:
         self._wake(True)
 
     def cache(self, key: str, token: str) -> None:
-        """The token of the cache of a topic's publisher came."""
+        """The token of a cache of a topic's publisher appeared."""
         self._caches.append((key, token))
         self._wake(True)
 
     def transport(self, zid: str, up: bool) -> None:
-        """A connection came or ended."""
+        """A connection was opened or closed."""
         if up:
             self._transports.add(zid)
         else:
             self._transports.discard(zid)
         self._wake(True)
 
-    def _wake(self, prompt: bool) -> None:
-        if prompt and not self._hurried:
-            self._hurried = self._woken = True
+    def _wake(self, immediate: bool) -> None:
+        if immediate and not self._has_immediate:
+            self._has_immediate = self._woken = True
             self._wake_loop(True)
         elif not self._woken:
             self._woken = True
             self._wake_loop(False)
 
 
-def _between(unseen: _Arrived, newest: Buffer) -> _Between | None:
-    """What is between the last that was looked at and the newest."""
-    between = unseen.between
-    if bytes(unseen.payload) != bytes(newest):
-        between = between or _Between()
-        between.add(unseen)
-    return between
+def _unseen(replaced: _Arrived, newest: Buffer) -> _Unseen | None:
+    """The messages before `newest` that have not been drained."""
+    unseen = replaced.unseen
+    if bytes(replaced.payload) != bytes(newest):
+        unseen = unseen or _Unseen()
+        unseen.add(replaced)
+    return unseen

@@ -61,7 +61,7 @@ class ZenohSession:
 
     def start(self, declared: Declarations) -> None:
         """Declares everything, once in a session."""
-        self._inbox.expect(declared.prompt, declared.watched, declared.whole)
+        self._inbox.expect(declared.immediate, declared.lossless, declared.recorded)
         self._declared = declared
         self._declare()
 
@@ -272,9 +272,9 @@ class ZenohSession:
         return changes
 
     @property
-    def hurried(self) -> bool:
-        """Whether something came since the last drain that may change what is permitted."""
-        return self._inbox.hurried
+    def has_immediate(self) -> bool:
+        """Whether data that may change a permission has been received since the last drain."""
+        return self._inbox.has_immediate
 
     def close(self) -> None:
         """Takes everything down; blocks for up to some tenths of a second."""

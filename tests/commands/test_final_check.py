@@ -141,7 +141,7 @@ class Recorded:
         def looked(link: ZenohSession) -> bool:
             self._looked_at = time.monotonic()
             asyncio.get_running_loop().call_soon(self._end_step)
-            return link._inbox.hurried
+            return link._inbox.has_immediate
 
         def was_put(link: ZenohSession, key: str, payload: bytes) -> None:
             if key == "guarded":
@@ -150,7 +150,7 @@ class Recorded:
 
         monkeypatch.setattr(Inbox, "put", added)
         monkeypatch.setattr(ZenohSession, "put", was_put)
-        monkeypatch.setattr(ZenohSession, "hurried", property(looked))
+        monkeypatch.setattr(ZenohSession, "has_immediate", property(looked))
 
     def _end_step(self) -> None:
         self._looked_at = None

@@ -21,8 +21,8 @@ from tests.support.parts import ROOT, Process, Server, free_port, http_client, l
 INTERVAL_S = 1.0
 WATCHED = {"WATCHDOG_USEC": str(int(INTERVAL_S * 1e6))}
 
-# A Zenoh callback that never comes back, and has the link's lock: what the watchdog is for. Not at a
-# prompt wake: before it a look at the inbox may be due, at which the event loop would stand still, too.
+# A Zenoh callback that never returns, and holds the inbox's lock: what the watchdog is for. Not at an
+# immediate wake: before it the inbox may be drained, at which the event loop would stall, too.
 STANDS_STILL = """
 import signal, sys, threading, time, uvicorn
 from app.main import app
@@ -30,7 +30,7 @@ from app.main import app
 def link_stands_still(*_):
     inbox = app.state.app_state.fleet.first.link._inbox
     wake = inbox._wake_loop
-    inbox._wake_loop = lambda prompt: wake(True) if prompt else threading.Event().wait()
+    inbox._wake_loop = lambda immediate: wake(True) if immediate else threading.Event().wait()
 
 def loop_stands_still(*_):
     time.sleep(60)

@@ -177,7 +177,7 @@ def test_a_readout_shows_what_was_said_before_until_the_newest_is_read() -> None
     run(test)
 
 
-def test_of_a_watched_topic_each_is_read_in_its_order() -> None:
+def test_of_a_lossless_topic_each_is_read_in_its_order() -> None:
     async def test() -> None:
         cell = Cell(MESSAGE, {**FREE, "confirm": CONFIRM})
         for level in range(5):

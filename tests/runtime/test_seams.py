@@ -178,7 +178,7 @@ def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
     assert taken(intake.steps(changes), page).urgent
 
 
-def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
+def test_each_sample_of_a_recorded_topic_is_recorded_and_no_other() -> None:
     class Tape(Deaf):
         keys = frozenset({"heard"})
         heard: ClassVar[list[bytes]] = []
@@ -191,7 +191,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
     deaf: Any = Deaf()
     robot = robot_there(panel)
     intake = Ingest(panel, robot, deaf, deaf, deaf, [tape])
-    assert intake.whole == tape.keys
+    assert intake.recorded == tape.keys
     kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
     page = Page(panel, robot)
     taken(intake.steps(Changes({"heard": kept[-1][1]}, {}, True, kept)), page)

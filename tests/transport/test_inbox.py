@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from app.transport.inbox import BETWEEN_BYTES, BETWEEN_MOST, KEPT_BYTES, KEPT_MOST, Inbox
+from app.transport.inbox import KEPT_BYTES, KEPT_MOST, UNSEEN_BYTES, UNSEEN_MOST, Inbox
 
 
 class Sent:
@@ -28,7 +28,7 @@ def woken() -> list[bool]:
 
 @pytest.fixture
 def inbox(woken: list[bool]) -> Inbox:
-    """`permit` is watched, `status` prompt, and `taped` is kept whole."""
+    """`permit` is lossless, `status` immediate, and `taped` recorded."""
     mine = Inbox(woken.append)
     mine.expect(["status"], ["permit"], ["taped"])
     return mine
@@ -60,7 +60,7 @@ def test_values_wake_the_loop_once_until_they_are_taken(inbox: Inbox, woken: lis
 
 
 @pytest.mark.parametrize("key", ["permit", "status"])
-def test_what_is_prompt_waits_for_no_value(inbox: Inbox, woken: list[bool], key: str) -> None:
+def test_immediate_data_waits_for_no_value(inbox: Inbox, woken: list[bool], key: str) -> None:
     inbox.put("heard", b"", None)
     inbox.put(key, b"", None)
     inbox.put(key, b"", None)
@@ -68,7 +68,7 @@ def test_what_is_prompt_waits_for_no_value(inbox: Inbox, woken: list[bool], key:
     assert woken == [False, True]
 
 
-def test_the_graph_and_the_link_are_prompt(inbox: Inbox, woken: list[bool]) -> None:
+def test_the_graph_and_the_link_are_immediate(inbox: Inbox, woken: list[bool]) -> None:
     inbox.put("heard", b"", None)
     inbox.token("t", True)
     inbox.drain()
@@ -124,7 +124,7 @@ def test_a_cache_is_delivered_once_and_at_once(inbox: Inbox, woken: list[bool]) 
     assert inbox.drain().caches == []
 
 
-def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None:
+def test_of_a_lossless_topic_each_change_in_between_is_kept(inbox: Inbox) -> None:
     for said in (b"yes", b"no", b"no", b"yes"):
         inbox.put("permit", said, None)
     sample = inbox.drain().samples["permit"]
@@ -139,23 +139,23 @@ def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None
 
 
 def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) -> None:
-    for number in range(BETWEEN_MOST + 1):
+    for number in range(UNSEEN_MOST + 1):
         inbox.put("permit", b"%d" % number, None)
     assert not inbox.drain().samples["permit"].overrun
-    for number in range(BETWEEN_MOST + 2):
+    for number in range(UNSEEN_MOST + 2):
         inbox.put("permit", b"%d" % number, None)
     sample = inbox.drain().samples["permit"]
     assert [one.payload for one in sample.skipped_payloads] == [
-        b"%d" % n for n in range(1, BETWEEN_MOST + 1)
+        b"%d" % n for n in range(1, UNSEEN_MOST + 1)
     ]
     assert sample.overrun
     for number in range(5):
-        inbox.put("permit", b"%d" % number * (BETWEEN_BYTES // 2), None)
+        inbox.put("permit", b"%d" % number * (UNSEEN_BYTES // 2), None)
     sample = inbox.drain().samples["permit"]
     assert (len(sample.skipped_payloads), sample.overrun) == (2, True)
 
 
-def test_what_is_kept_whole_has_every_sample_in_order(inbox: Inbox) -> None:
+def test_of_a_recorded_topic_every_sample_is_kept_in_order(inbox: Inbox) -> None:
     for number in range(3):
         inbox.put("taped", b"%d" % number, None)
         inbox.put("heard", b"x", None)
@@ -168,7 +168,7 @@ def test_what_is_kept_whole_has_every_sample_in_order(inbox: Inbox) -> None:
     assert list(inbox.drain().kept) == []
 
 
-def test_what_is_kept_whole_is_bounded_by_its_number_and_its_bytes(inbox: Inbox) -> None:
+def test_what_is_kept_of_recorded_topics_is_bounded_by_its_number_and_its_bytes(inbox: Inbox) -> None:
     for number in range(KEPT_MOST + 10):
         inbox.put("taped", b"%d" % number, None)
     kept = list(inbox.drain().kept)

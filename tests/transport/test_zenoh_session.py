@@ -236,11 +236,11 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     until(lambda: found() == set(wanted), "the tokens of the new session are there")
 
 
-def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
+def test_of_a_lossless_topic_what_came_and_went_between_two_drains_is_kept(
     peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
     _, session = peer
-    link = linked(declared(["a", "b"], [], watched=["a"]))
+    link = linked(declared(["a", "b"], [], lossless=["a"]))
     ends: list[bytes] = []
     link.look("end", "end", lambda payload: ends.append(bytes(payload)))
     # What it declared before is known as well.
@@ -260,10 +260,10 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
             put(key, payload)
     put_end(b"first")
     samples = link.drain().samples
-    watched, other = samples["a"], samples["b"]
-    assert bytes(watched.payload) == bytes(other.payload) == b"yes"
+    lossless, other = samples["a"], samples["b"]
+    assert bytes(lossless.payload) == bytes(other.payload) == b"yes"
     changes = [b"yes", b"no", b"yes", *(b"%d" % n for n in range(100))]
-    assert [bytes(one.payload) for one in watched.skipped_payloads] == changes
+    assert [bytes(one.payload) for one in lossless.skipped_payloads] == changes
     assert other.skipped_payloads == ()
     for payload in (b"yes", b"no", b"no", b"yes"):
         put("a", payload)
@@ -275,7 +275,7 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
     peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
     _, session = peer
-    link = linked(declared(["a"], [], watched=["a"]))
+    link = linked(declared(["a"], [], lossless=["a"]))
     until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
     own = session.new_timestamp().get_id()
     now = datetime.now(UTC)

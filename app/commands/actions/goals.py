@@ -183,7 +183,7 @@ class GoalTracker:
             self._feedback[widget.id] = Topic(
                 self._interfaces.field_reader(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
                 self._robot.slices,
-                watched=False,
+                lossless=False,
                 on_unreadable=partial(
                     self._robot.count_unreadable,
                     names.feedback(self._robot.key(widget.action)),
