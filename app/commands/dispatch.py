@@ -33,7 +33,7 @@ class Transport(Protocol):
     def has_reader(self, key: str) -> bool: ...
 
 
-async def assume_reached() -> bool:
+async def assume_flushed() -> bool:
     """For transports that cannot tell whether the bridge received a message."""
     return True
 
@@ -70,10 +70,10 @@ class Dispatcher:
         transport: Transport,
         trackers: Trackers,
         monotonic: Callable[[], float] = time.monotonic,
-        reached: Callable[[], Awaitable[bool]] = assume_reached,
+        flushed: Callable[[], Awaitable[bool]] = assume_flushed,
     ) -> None:
-        """`reached` returns whether everything sent so far has reached the bridge."""
-        self._reached = reached
+        """`flushed` returns whether everything sent so far has reached the bridge."""
+        self._flushed = flushed
         self._widgets = {w.id: w for w in panel.widgets()}
         self._input_ids = {
             id: input_ids(w) for id, w in self._widgets.items() if isinstance(w, PressCommand)
@@ -174,7 +174,7 @@ class Dispatcher:
 
     async def _publish(self, widget: PublishPress, going: Outgoing) -> Outcome:
         if widget.confirm is None:
-            return await self._until_reached(widget, self._put(widget, going.fields, going.final_check))
+            return await self._until_flushed(widget, self._put(widget, going.fields, going.final_check))
         equals = fill(widget.confirm.equals, going.values)
         since = self._monotonic()
         answer = self._put(widget, going.fields, going.final_check)
@@ -216,10 +216,10 @@ class Dispatcher:
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Outcome("published" if has_reader else "unknown", text)
 
-    async def _until_reached(self, widget: PublishPress, answer: Outcome) -> Outcome:
+    async def _until_flushed(self, widget: PublishPress, answer: Outcome) -> Outcome:
         """Waits for the bridge's response: until then a published message may still be lost."""
         at = format_time(time.time())
-        if answer.outcome != "published" or await self._reached():
+        if answer.outcome != "published" or await self._flushed():
             return answer
         return Outcome("unknown", say("sent_unanswered", topic=widget.topic, time=at))
 

@@ -144,7 +144,7 @@ class Feed:
             self._leaving = None
         if self._robot.looked_at.pop(self._key, None) is not None:
             with suppress(LinkError):
-                self._link.look_away(self._key)
+                self._link.unsubscribe(self._key)
             self._tokens()
             self._newest = self._made = None
 
@@ -160,7 +160,7 @@ class Feed:
         expression = self._robot.dialect.topic(self._key, self._type)
         self._tokens()
         with suppress(LinkError):  # the next session has it
-            self._link.look(self._key, expression, self._take)
+            self._link.subscribe_on_demand(self._key, expression, self._take)
         self._changed()
 
     def _take(self, payload: Buffer) -> None:

@@ -47,7 +47,7 @@ class RobotCommands:
             robot,
             link,
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
-            reached=peer.flushed,
+            flushed=peer.flushed,
         )
         arrivals = Arrivals(ingest, lambda: link.has_immediate)
         judge = PressJudge(panel, robot, arrivals)

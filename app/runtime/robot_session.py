@@ -137,7 +137,7 @@ class RobotSession:
             self.interfaces,
             self.link,
             self.show,
-            lambda: self.peer.follow(False),
+            lambda: self.peer.on_graph_change(False),
         )
         self._rosout = Rosout(
             self.robot, self.interfaces, self.link, asyncio.get_running_loop(), self._own_line

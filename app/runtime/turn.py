@@ -65,7 +65,7 @@ class Turn:
         self._cancel_frame()
         if self._stopped:
             return
-        self._peer.look()
+        self._peer.check_stall()
         changes = self._link.drain()
         came_up = not self._robot.link_up and changes.link_up
         if self._robot.link_up and not changes.link_up:
@@ -98,11 +98,11 @@ class Turn:
         with self._turn():
             self._apply(Updates(urgent=True))
 
-    def on_graph_change(self, came: bool) -> None:
-        """Updates everything after a change of the graph; `came`: there was no peer before."""
+    def on_graph_change(self, peer_appeared: bool) -> None:
+        """Updates everything after a change of the graph; `peer_appeared`: there was no peer before."""
         self._robot.update_publishers()
         self._commands.on_graph_change()
-        self._peer.follow(came)
+        self._peer.on_graph_change(peer_appeared)
 
     def _apply(self, updates: Updates) -> None:
         """Updates holds, then confirmations, then the view, from the robot's current state."""

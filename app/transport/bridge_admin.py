@@ -1,5 +1,4 @@
-"""What a robot's bridges say of themselves in their admin space: that they run, their routes and
-nodes, the namespace of the robot they belong to."""
+"""Queries the admin space of a robot's bridges: their versions, routes, nodes and namespaces."""
 
 import asyncio
 import json
@@ -16,18 +15,18 @@ MISSES_ALLOWED: Final = 1
 
 
 class AdminSpace(Protocol):
-    """What is needed of the link: (key, payload) of each answer to a query."""
+    """The part of the Zenoh session that queries of the admin space need."""
 
-    async def ask(self, selector: str, within_s: float = ...) -> list[tuple[str, bytes]]: ...
+    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
 
 
 class BridgeAdmin:
-    """Asks the bridges of one robot; what they say goes into its graph."""
+    """Queries the bridges of one robot and updates its graph."""
 
     def __init__(self, robot: RobotState, link: AdminSpace) -> None:
         self._robot = robot
         self._link = link
-        self.missed = 0  # askings in a row that a bridge did not answer
+        self.missed = 0  # queries in a row that a bridge did not answer
 
     async def answered(self, within_s: float) -> bool:
         """Whether all of the bridges answer a query of their version; LinkError without a link."""
@@ -35,7 +34,7 @@ class BridgeAdmin:
         return self._robot.graph.bridges <= {bridge_dialect.zid_of(key) for key, _ in answers}
 
     async def ask(self) -> None:
-        """Asks how they are, and of their routes and nodes. LinkError without a link."""
+        """Queries versions, namespaces, routes and nodes. LinkError without a link."""
         graph = self._robot.graph
         answers, namespaces = await asyncio.gather(
             self._link.ask(bridge_dialect.VERSION), self._namespaces()
@@ -48,7 +47,7 @@ class BridgeAdmin:
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
             graph.update_versions(versions)
         if self.missed:
-            return  # it would answer nothing else either, and each question takes its time
+            return  # it would answer nothing else either, and each query would wait for its timeout
         routes = [
             r
             for key, answer in await self._ask_json(bridge_dialect.ROUTES)
@@ -62,7 +61,7 @@ class BridgeAdmin:
         graph.update_routes(routes, nodes)
 
     async def _namespaces(self) -> dict[str, str]:
-        """The namespace of each bridge that says it, "" for none."""
+        """The namespace in each bridge's configuration, by zid; "" for none."""
         return {
             bridge_dialect.zid_of(key): answer["namespace"].rstrip("/")
             for key, answer in await self._ask_json(bridge_dialect.CONFIG)
@@ -70,7 +69,7 @@ class BridgeAdmin:
         }
 
     async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
-        """(key, answer) of each answer that is JSON; others are passed over."""
+        """(key, answer) of each answer that is JSON; others are ignored."""
         found = []
         for key, answer in await self._link.ask(selector):
             with suppress(ValueError):
@@ -79,7 +78,7 @@ class BridgeAdmin:
 
 
 def _route(key: str, answer: Any) -> Route | None:
-    """What a bridge says of a route; None for what is none."""
+    """The route that an answer describes; None if it describes none."""
     place = bridge_dialect.route_of(key)
     if place is None or not isinstance(answer, dict) or not isinstance(answer.get("ros2_type"), str):
         return None

@@ -1,9 +1,9 @@
-"""Joining the ROS graph of a bridge: with liveliness tokens, after asking what is there already.
+"""Joins the ROS graph of a bridge: queries what it has, then declares liveliness tokens.
 
-A token makes the bridge create the DDS reader or writer. Those of what the panel publishes are held
-as soon as a bridge is there, so that a topic is known before its first message and none is lost.
-Who creates a route first fixes its type and QoS for all: so a bridge that has just come gets time to
-discover the robot's nodes.
+A token makes the bridge create a DDS reader or writer. The tokens of what the panel publishes are held
+as long as there is a bridge, so that a topic is known before its first message and no message is lost.
+The first to create a route fixes its type and QoS for all. So a bridge that has just appeared gets time
+to discover the robot's nodes.
 """
 
 import asyncio
@@ -24,16 +24,16 @@ log = logging.getLogger("kiosk.joining")
 
 FAILED: Final = "joining the robot's topics failed"
 FRESH_S: Final = 1.0  # waited for a bridge that appeared while the panel server ran
-FOUND_WITHIN_S: Final = 1.0  # then it was there before: its answers come after all its tokens
+FOUND_WITHIN_S: Final = 1.0  # then it was there before: its replies arrive after all its tokens
 SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
-SETTLE_MOST_S: Final = 2.0  # a listener not reached by then shows in a press's receipt
+SETTLE_MOST_S: Final = 2.0  # a press's receipt says if a subscriber is not matched by then
 ASK_EVERY_S: Final = 5.0
 ASK_AGAIN_S: Final = 0.5
-UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
+UNROUTED_ALLOWED: Final = 3  # queries in a row that find a subscribed topic without a route
 
 
 class GraphMembership:
-    """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
+    """Holds the panel's tokens while there is a bridge, and queries the bridges' admin space."""
 
     def __init__(self, context: RobotContext) -> None:
         self._context = context
@@ -43,7 +43,7 @@ class GraphMembership:
         self._link = context.link
         self._bridges = BridgeAdmin(self._robot, self._link)
         self._tokens = LivelinessTokens(self._panel, context.interfaces, self._robot)
-        self._unheard = 0
+        self._unrouted = 0
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
         self._asking: asyncio.Task[None] | None = None
@@ -53,25 +53,25 @@ class GraphMembership:
         self._asking = spawn_logged(self._ask_regularly(), self._log, FAILED)
 
     async def stop(self) -> None:
-        """Ends its tasks; the tokens go with the session."""
+        """Ends its tasks. The tokens end with the session."""
         tasks = [task for task in (self._joining, self._asking) if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def follow(self, came: bool) -> None:
-        """After every change of the graph; `came`: there is a bridge where there was none."""
-        if came or not self._robot.graph.bridges:
+    def on_graph_change(self, bridge_appeared: bool) -> None:
+        """Joins, updates its tokens, or leaves. `bridge_appeared`: there was no bridge before."""
+        if bridge_appeared or not self._robot.graph.bridges:
             self._leave()
-        if came:
+        if bridge_appeared:
             self._joining = spawn_logged(self._join(), self._log, FAILED)
         if self._joined:
             self._hold()
             self._changed.set()
 
     async def answered(self, within_s: float) -> bool:
-        """Asks this robot's bridges whether they run; where one does not answer, all that is known
-        of them is asked for again soon."""
+        """Whether all of this robot's bridges answer a query within `within_s`. If not, all their data
+        is queried again soon."""
         if await self._bridges.answered(within_s):
             return True
         self._changed.set()
@@ -112,26 +112,27 @@ class GraphMembership:
         self._context.changed()
 
     async def _settle(self) -> None:
-        """Until the routes carry the first message: whom the graph shows as a listener is heard of."""
+        """Waits until every subscriber in the graph is matched: then the routes carry the first
+        message."""
         graph = self._robot.graph
-        listened = [
+        subscribed = [
             key
             for key in map(self._robot.key, self._panel.publications())
             if graph.has_endpoint("MS", key)
         ]
         end = time.monotonic() + SETTLE_MOST_S
         await asyncio.sleep(SETTLE_S)
-        while time.monotonic() < end and not all(map(self._heard, listened)):
+        while time.monotonic() < end and not all(map(self._is_matched, subscribed)):
             await asyncio.sleep(SETTLE_S)
 
-    def _heard(self, key: str) -> bool:
+    def _is_matched(self, key: str) -> bool:
         try:
             return self._link.has_reader(key)
         except LinkError:
             return False
 
     async def _ask_until_answered(self) -> None:
-        """What the bridges do not tell is a doubt: nothing is joined on it."""
+        """Queries until every bridge has answered. Joins nothing before."""
         while True:
             try:
                 await self._bridges.ask()
@@ -143,15 +144,15 @@ class GraphMembership:
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _ask_regularly(self) -> None:
-        """Queries the bridges at intervals; an answer of any kind, or an error, ends nothing."""
+        """Queries the bridges at intervals; sooner after a missing reply or a change of the graph."""
         while True:
-            await self._pause(ASK_AGAIN_S if self._bridges.missed or self._unheard else ASK_EVERY_S)
+            await self._pause(ASK_AGAIN_S if self._bridges.missed or self._unrouted else ASK_EVERY_S)
             if self._joined:
                 try:
                     await self._bridges.ask()
                     if not self._robot.graph.bridges:
                         self._leave()
-                    elif self._joined:  # still
+                    elif self._joined:  # it may have left during the query
                         self._hold()
                         self._reopen_session()
                 except LinkError as error:
@@ -159,17 +160,19 @@ class GraphMembership:
                 self._context.changed()
 
     def _reopen_session(self) -> None:
-        """A bridge that does not read a topic for this session does so for a new one."""
-        listened = (self._robot.key(topic) for topic in self._panel.subscriptions())
-        lost = [key for key in listened if self._robot.graph.is_unrouted(key)]
-        self._unheard = self._unheard + 1 if lost else 0
-        if self._unheard >= UNHEARD_ALLOWED:
-            self._unheard = 0
+        """Opens a new session if a bridge has no route for a subscribed topic: it makes one for the new
+        session."""
+        subscribed = (self._robot.key(topic) for topic in self._panel.subscriptions())
+        lost = [key for key in subscribed if self._robot.graph.is_unrouted(key)]
+        self._unrouted = self._unrouted + 1 if lost else 0
+        if self._unrouted >= UNROUTED_ALLOWED:
+            self._unrouted = 0
             self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
             self._context.reopen()
 
     async def _pause(self, longest_s: float) -> None:
-        """Until it is time to ask, or a moment after the graph has changed."""
+        """Waits until the next query is due: after `longest_s`, or shortly after a change of the
+        graph."""
         with suppress(TimeoutError):
             async with asyncio.timeout(longest_s):
                 await self._changed.wait()

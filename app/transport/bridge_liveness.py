@@ -1,9 +1,10 @@
-"""Whether a robot's bridges answer queries at short intervals: a cut cable and a frozen bridge are seen
-by their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
+"""Queries a robot's bridges at short intervals. A cut cable or a frozen bridge is detected by its
+silence, long before Zenoh's lease expires and independent of the lease that the bridge is configured
+with.
 
-A question goes the way of a command, behind all that was sent before: its answer shows that this
-reached the bridge. And it comes behind all that the bridge had sent: after a standstill of the event
-loop it shows that what the robot published in the meantime is taken in.
+Zenoh keeps the order. A query follows everything that was sent before it, so its reply shows that this
+has reached the bridge. The reply follows everything that the bridge sent before it, so after a stall of
+the event loop it shows that what the robot published in the meantime has been received.
 """
 
 import asyncio
@@ -23,53 +24,55 @@ from app.transport.bridge_admin import AdminSpace
 
 log = logging.getLogger("kiosk.pulse")
 
-EVERY_S: Final = 0.2
-SILENT_S: Final = 0.4  # without an answer, beside the time that the network takes
-TURN_S: Final = 0.02  # given to an answer that came while the loop stood still
-STOOD_STILL_S: Final = 0.4  # a query so late: messages from the meantime are still on their way
-GOOD: Final = 2  # answers in time to queries sent after a silence: the bridge's news came before
-LOOKED_AT: Final = 10  # answers
-LONGEST_S: Final = 2.5  # a question is not waited for any longer
+EVERY_S: Final = 0.2  # from one query to the next
+SILENT_S: Final = 0.4  # without a reply, in addition to the network's delay
+TURN_S: Final = 0.02  # for a reply that arrived while the event loop stalled
+STALLED_S: Final = 0.4  # a query this late: messages published in the meantime are not received yet
+GOOD: Final = 2  # replies in time, to queries sent after a silence: the bridge's data came before them
+DELAYS_KEPT: Final = 10
+LONGEST_S: Final = 2.5  # timeout of a query
 
 
 class LivenessDetector:
-    """Questions and answers → whether there is silence; times in monotonic seconds. Pure."""
+    """Detects silence from the times of queries and replies, in monotonic seconds. Pure."""
 
     def __init__(self) -> None:
         self.silent = False
         self._unanswered: deque[float] = deque(maxlen=int(LONGEST_S / EVERY_S) * 10)
-        self._took: deque[float] = deque(maxlen=LOOKED_AT)
-        self._heard_at = math.inf  # the first answer after a silence began
+        self._delays: deque[float] = deque(maxlen=DELAYS_KEPT)
+        self._replied_at = math.inf  # the first reply after a silence began
         self._good = 0
 
     @property
     def limit(self) -> float:
-        """How long an answer may take, by the longest that one took lately."""
-        return SILENT_S + max(self._took, default=0.0)
+        """The longest time for a reply in seconds, by the longest of the last delays."""
+        return SILENT_S + max(self._delays, default=0.0)
 
-    def ask(self, now: float) -> None:
+    def on_query(self, now: float) -> None:
+        """A query was sent."""
         self._unanswered.append(now)
 
-    def hear(self, sent_at: float, now: float) -> None:
-        """An answer; earlier queries without an answer do not count any more."""
+    def on_reply(self, sent_at: float, now: float) -> None:
+        """The query sent at `sent_at` was answered. Earlier queries without a reply no longer count."""
         while self._unanswered and self._unanswered[0] <= sent_at:
             self._unanswered.popleft()
         in_time = now - sent_at <= self.limit
-        # In time, or known to be late: else the loop stood still, which says nothing of the network.
+        # In time, or known to be late: else the event loop stalled, which says nothing of the network.
         if in_time or self.silent:
-            self._took.append(now - sent_at)
+            self._delays.append(now - sent_at)
         if self.silent:
-            self._good = self._good + 1 if in_time and sent_at > self._heard_at else 0
-            self._heard_at = min(self._heard_at, now)
+            self._good = self._good + 1 if in_time and sent_at > self._replied_at else 0
+            self._replied_at = min(self._replied_at, now)
             self.silent = self._good < GOOD
 
     def judge(self, now: float) -> None:
+        """Sets `silent` if the oldest query has had no reply within the limit."""
         if not self.silent and self._unanswered and now - self._unanswered[0] >= self.limit:
-            self.silent, self._heard_at, self._good = True, math.inf, 0
+            self.silent, self._replied_at, self._good = True, math.inf, 0
 
 
 class BridgeLiveness:
-    """Of one robot; used on the event loop only."""
+    """Detects whether one robot's bridges respond. Used on the event loop only."""
 
     def __init__(
         self,
@@ -84,121 +87,121 @@ class BridgeLiveness:
         self._changed = changed
         self._monotonic = monotonic
         self._log = RobotLog(log, robot.name)
-        self._silence = LivenessDetector()
+        self._detector = LivenessDetector()
         self._bridges: frozenset[str] = frozenset()
-        self._questions: set[asyncio.Task[bool]] = set()
-        self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
+        self._queries: set[asyncio.Task[bool]] = set()
+        self._awaited: set[asyncio.Task[bool]] = set()  # by callers of `flushed`
         self._silenced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._asking: asyncio.Task[None] | None = None
+        self._querying: asyncio.Task[None] | None = None
         self._last_sent_at = math.inf
-        self._behind = 0  # answers, to queries sent after `_behind_since`, until all is taken in
+        self._behind = 0  # replies, to queries sent after `_behind_since`, until it is caught up
         self._behind_since = 0.0
 
     def start(self) -> None:
-        self._asking = spawn_logged(self._ask_regularly(), self._log, "asking the bridges failed")
+        self._querying = spawn_logged(self._query_regularly(), self._log, "querying the bridges failed")
 
     async def stop(self) -> None:
-        """Ends its tasks; what was sent to the end gets the time for an answer."""
+        """Ends its tasks. Waits for the replies that callers of `flushed` wait for."""
         if self._awaited:
-            await asyncio.wait(self._awaited, timeout=self._silence.limit)
-        tasks: list[asyncio.Task[Any]] = [*self._questions]
-        if self._asking is not None:
-            tasks.append(self._asking)
+            await asyncio.wait(self._awaited, timeout=self._detector.limit)
+        tasks: list[asyncio.Task[Any]] = [*self._queries]
+        if self._querying is not None:
+            tasks.append(self._querying)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     async def flushed(self) -> bool:
-        """Whether all that was sent until now has reached the bridges: they answer a query that is sent
-        after it, and there is no silence before. It takes one round trip."""
-        question = self._ask()
-        self._awaited.add(question)
-        question.add_done_callback(self._awaited.discard)
-        ends: set[asyncio.Future[Any]] = {question, self._silenced}
+        """Whether everything sent so far has reached the bridges: they answer a query that is sent
+        after it, and are not silent before. Takes one round trip."""
+        query = self._query()
+        self._awaited.add(query)
+        query.add_done_callback(self._awaited.discard)
+        ends: set[asyncio.Future[Any]] = {query, self._silenced}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        return question.done() and not question.cancelled() and question.result()
+        return query.done() and not query.cancelled() and query.result()
 
-    def look(self) -> None:
-        """Before anything is judged: whether the event loop stood still, and so may know nothing of
-        what the robot has published in the meantime."""
+    def check_stall(self) -> None:
+        """Call it before data is ingested. After a stall of the event loop, what the robot has
+        published in the meantime may not have been received yet: the robot is not caught up."""
         now = self._monotonic()
-        if now - self._last_sent_at < EVERY_S + STOOD_STILL_S:
+        if now - self._last_sent_at < EVERY_S + STALLED_S:
             return
         if not self._behind:
-            self._log.warning("the event loop stood still for %.1f s", now - self._last_sent_at)
+            self._log.warning("the event loop stalled for %.1f s", now - self._last_sent_at)
         self._behind, self._behind_since = GOOD, now
-        self._catch_up(False)
+        self._set_caught_up(False)
 
-    def _hear(self, sent_at: float) -> None:
-        """An answer came: what the bridge sent before it is taken in, when the next one is there."""
+    def _on_reply(self, sent_at: float) -> None:
+        """Counts a reply of bridges that are behind: with the last one everything has been received."""
         if self._behind and sent_at >= self._behind_since:
             self._behind, self._behind_since = self._behind - 1, self._monotonic()
-            self._catch_up(not self._behind)
+            self._set_caught_up(not self._behind)
 
-    def _catch_up(self, done: bool) -> None:
-        if done != self._robot.is_caught_up:
-            self._robot.is_caught_up = done
+    def _set_caught_up(self, is_caught_up: bool) -> None:
+        if is_caught_up != self._robot.is_caught_up:
+            self._robot.is_caught_up = is_caught_up
             self._changed()
 
-    async def _ask_regularly(self) -> None:
+    async def _query_regularly(self) -> None:
         while True:
-            self._ask()
+            self._query()
             await asyncio.sleep(EVERY_S)
 
-    def _ask(self) -> "asyncio.Task[bool]":
-        self.look()
+    def _query(self) -> "asyncio.Task[bool]":
+        self.check_stall()
         self._last_sent_at = self._monotonic()
-        self._follow()
+        self._update_bridges()
         task = asyncio.get_running_loop().create_task(self._answered())
-        self._questions.add(task)
-        task.add_done_callback(self._questions.discard)
+        self._queries.add(task)
+        task.add_done_callback(self._queries.discard)
         return task
 
-    def _follow(self) -> None:
-        """Of other bridges than before, and of a new session's, nothing is known yet; where one stays,
-        so does its silence."""
+    def _update_bridges(self) -> None:
+        """Begins with a new detector if none of the bridges is one of those before, or the session is
+        new. If one stays, so does its silence."""
         bridges = self._robot.graph.bridges if self._robot.link_up else frozenset()
         if bridges != self._bridges:
             if not bridges & self._bridges:
-                self._silence = LivenessDetector()
+                self._detector = LivenessDetector()
             self._bridges = bridges
-            self._tell()
+            self._publish_state()
 
     async def _answered(self) -> bool:
-        """One question to all bridges; whether they answered it."""
-        silence, sent_at = self._silence, self._monotonic()
+        """Queries all bridges once; whether they answered."""
+        detector, sent_at = self._detector, self._monotonic()
         answer = asyncio.ensure_future(self._all(self._bridges))
-        silence.ask(sent_at)
+        detector.on_query(sent_at)
         try:
-            await asyncio.wait({answer}, timeout=silence.limit)
+            await asyncio.wait({answer}, timeout=detector.limit)
             if not answer.done():
                 await asyncio.wait({answer}, timeout=TURN_S)
             answered = answer.done() and answer.result()
             if not answered:
-                silence.judge(self._monotonic())
-                self._tell()
+                detector.judge(self._monotonic())
+                self._publish_state()
                 answered = await answer
         finally:
             answer.cancel()
         if answered:
-            silence.hear(sent_at, self._monotonic())
-            self._tell()
-            self._hear(sent_at)
+            detector.on_reply(sent_at, self._monotonic())
+            self._publish_state()
+            self._on_reply(sent_at)
         return answered
 
     async def _all(self, bridges: frozenset[str]) -> bool:
-        questions = (self._link.ask(bridge_dialect.version(zid), LONGEST_S) for zid in bridges)
+        queries = (self._link.ask(bridge_dialect.version(zid), LONGEST_S) for zid in bridges)
         try:
-            return bool(bridges) and all(await asyncio.gather(*questions))
+            return bool(bridges) and all(await asyncio.gather(*queries))
         except LinkError:
             return False  # there is no session at this moment
 
-    def _tell(self) -> None:
-        answers = not self._silence.silent
-        if answers == self._robot.is_responding:
+    def _publish_state(self) -> None:
+        is_responding = not self._detector.silent
+        if is_responding == self._robot.is_responding:
             return
-        self._robot.is_responding = answers
-        if answers:
+        self._robot.is_responding = is_responding
+        if is_responding:
             self._log.info("the bridge answers")
         else:
             self._log.warning("the bridge does not answer")

@@ -1,4 +1,4 @@
-"""The `Peer` of a robot behind zenoh-bridge-ros2dds: of several bridges, if it has several."""
+"""The `Peer` of a robot behind zenoh-bridge-ros2dds, which may have several bridges."""
 
 import logging
 from collections.abc import Iterable
@@ -40,11 +40,11 @@ class BridgePeer:
         for zid in zids:
             self._log.warning("bridge %s lost", zid)
 
-    def follow(self, came: bool) -> None:
-        self._membership.follow(came)
+    def on_graph_change(self, peer_appeared: bool) -> None:
+        self._membership.on_graph_change(peer_appeared)
 
-    def look(self) -> None:
-        self._liveness.look()
+    def check_stall(self) -> None:
+        self._liveness.check_stall()
 
     async def flushed(self) -> bool:
         return await self._liveness.flushed()

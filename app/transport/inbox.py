@@ -131,10 +131,8 @@ class Inbox:
         """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
         loop at once. `lossless` topics are immediate, and values that were replaced between two drains
         are kept. Every sample of a `recorded` topic is kept."""
-        self._immediate, self._lossless = (
-            frozenset(immediate) | frozenset(lossless),
-            frozenset(lossless),
-        )
+        self._immediate = frozenset(immediate) | frozenset(lossless)
+        self._lossless = frozenset(lossless)
         self._recorded = frozenset(recorded)
 
     def renew(self) -> None:

@@ -1,4 +1,4 @@
-"""The seam between the panel and what stands before a robot: a bridge, or the robot's own nodes."""
+"""The protocol of the peer that a robot is reached by: a bridge, or the robot's own nodes."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -17,37 +17,36 @@ class Peer(Protocol):
     loop only."""
 
     def start(self) -> None:
-        """Begins to watch it, once the session has declared everything."""
+        """Begins to join and query it. Call it once the session has declared everything."""
 
     async def stop(self) -> None:
-        """Ends its tasks; what was sent to the end gets the time for an answer."""
+        """Ends its tasks. Waits for the replies that callers of `flushed` wait for."""
 
     def found(self, zids: Iterable[str]) -> None:
-        """Peers have announced themselves, by their tokens."""
+        """The liveliness tokens of these peers appeared."""
 
     def lost(self, zids: Iterable[str]) -> None:
-        """Tokens of peers have ended."""
+        """The liveliness tokens of these peers were lost."""
 
-    def follow(self, came: bool) -> None:
-        """After every change of the graph: joins it, or leaves. `came`: there is a peer where there was
-        none."""
+    def on_graph_change(self, peer_appeared: bool) -> None:
+        """Joins the ROS graph, updates its tokens, or leaves. `peer_appeared`: there was no peer
+        before."""
 
-    def look(self) -> None:
-        """Before anything that arrived is taken in: whether more may be on its way, as the event loop
-        stalled."""
+    def check_stall(self) -> None:
+        """Call it before data is ingested: sets `is_caught_up` to false if the event loop stalled, as
+        more data may be on its way."""
 
     async def flushed(self) -> bool:
-        """Whether all that was sent until now has reached it."""
+        """Whether everything sent so far has reached it."""
 
     async def answers(self) -> bool:
-        """Whether it answers a query now: a second at most."""
+        """Whether it answers a query now. Takes a second at most."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotContext:
-    """One robot of a panel and the link to it. `changed` is called when something has changed that
-    permits, forbids or is shown. `renew` opens a new session after the link was lost, `reopen` although
-    it is there."""
+    """One robot of a panel and the link to it. Call `changed` after a change of what permission or the
+    view depends on. `renew` opens a new session after the link was lost, `reopen` while it is up."""
 
     panel: Panel
     interfaces: Interfaces

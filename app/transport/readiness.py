@@ -1,4 +1,4 @@
-"""Whether a robot's bridges answer at this moment: many may ask, and few questions go out."""
+"""Whether a robot's bridges answer a query now. Requests at the same time share one query."""
 
 import asyncio
 import logging
@@ -10,16 +10,16 @@ from app.errors import LinkError
 
 log = logging.getLogger("kiosk.readiness")
 
-EVERY_S: Final = 0.5  # from one question to the next
+EVERY_S: Final = 0.5  # from one query to the next
 WITHIN_S: Final = 0.8  # in which a bridge has to answer
-LIMIT_S: Final = 1.0  # of a question, also where Zenoh itself does not come back
+LIMIT_S: Final = 1.0  # of a query, even if Zenoh itself does not return
 
 
 class CoalescedQuery:
-    """One question at a time, shared by all who ask while it is under way and until the next."""
+    """One query at a time. Its result is shared by all calls until the next query is due."""
 
     def __init__(self, ask: Callable[[], Awaitable[bool]]) -> None:
-        """`ask` is whether all bridges answered; it may raise LinkError."""
+        """`ask` returns whether all bridges answered; it may raise LinkError."""
         self._ask = ask
         self._sent_at = -math.inf
         self._asking: asyncio.Task[bool] | None = None
@@ -33,7 +33,7 @@ class CoalescedQuery:
         return await asyncio.shield(self._asking)
 
     async def stop(self) -> None:
-        """Waits for the question that is under way, `LIMIT_S` at most."""
+        """Waits for the running query, `LIMIT_S` at most."""
         if self._asking is not None:
             await asyncio.gather(self._asking, return_exceptions=True)
 

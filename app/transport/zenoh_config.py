@@ -13,10 +13,10 @@ from app.errors import LinkError, SettingsError
 
 Config = zenoh.Config
 
-MOST_QUEUED: Final = 16  # batches; Zenoh takes no more
-JOINED_WITHIN_MS: Final = 3_000  # by who took a connection
-BLOCKED_MOST_US: Final = 200_000  # for a put or query to wait for room: less than a hold's lease
-IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
+MOST_QUEUED: Final = 16  # batches: Zenoh's maximum
+JOINED_WITHIN_MS: Final = 3_000  # by a peer that has accepted a connection
+BLOCKED_MOST_US: Final = 200_000  # that a put or query waits for the queue: less than a hold's lease
+SOURCE_PLACE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh's source an error was raised
 
 
 def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
@@ -25,7 +25,9 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
     try:
         config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
-        raise SettingsError(f"{path} is not a usable Zenoh configuration: {said(error)}") from error
+        raise SettingsError(
+            f"{path} is not a usable Zenoh configuration: {error_text(error)}"
+        ) from error
     if connect:
         try:
             config.insert_json5("connect/endpoints", json.dumps(list(connect)))
@@ -33,9 +35,9 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
             endpoints = ", ".join(connect)
             raise SettingsError(
                 f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: "
-                f"{said(error)}"
+                f"{error_text(error)}"
             ) from error
-    return _fit(config)
+    return _apply_required_settings(config)
 
 
 def config_to(endpoint: str) -> zenoh.Config:
@@ -50,17 +52,18 @@ def config_to(endpoint: str) -> zenoh.Config:
         "open/return_conditions/connect_scouted": "false",
     }.items():
         config.insert_json5(place, value)
-    return _fit(config)
+    return _apply_required_settings(config)
 
 
-def _fit(config: zenoh.Config) -> zenoh.Config:
-    """What a kiosk needs of any configuration.
+def _apply_required_settings(config: zenoh.Config) -> zenoh.Config:
+    """Applies the settings that the panel server needs in any configuration.
 
-    No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
-    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
-    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
-    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session's
-    end waits for who takes a connection and says nothing, as a frozen bridge's port does: not for 10 s.
+    No shared memory: Zenoh keeps a segment and its file of each earlier session, and a session is
+    renewed at every loss of the link. A queue for a burst: Zenoh's default is two messages. If the
+    queue is full, a put blocks the event loop: after `BLOCKED_MOST_US` (Zenoh's default is 5 s) the
+    connection is closed once, and everything locks. Nothing is dropped silently. Closing a session
+    waits for a peer that has accepted a connection and does not answer, such as a frozen bridge: not
+    for 10 s.
     """
     config.insert_json5("transport/unicast/open_timeout", str(JOINED_WITHIN_MS))
     config.insert_json5("transport/shared_memory/enabled", "false")
@@ -70,13 +73,13 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
     return config
 
 
-def said(error: zenoh.ZError) -> str:
-    """What Zenoh says of an error, without where in its source that was."""
-    return IN_ITS_SOURCE.sub("", str(error))
+def error_text(error: zenoh.ZError) -> str:
+    """The message of a Zenoh error, without the place in Zenoh's source."""
+    return SOURCE_PLACE.sub("", str(error))
 
 
 def endpoints_of(config: zenoh.Config) -> tuple[str, ...]:
-    """Where a session connects; empty where it only looks around."""
+    """The endpoints that a session connects to; empty if it only scouts."""
     found = json.loads(config.get_json("connect/endpoints"))
     if isinstance(found, dict):  # for each mode
         found = found.get(json.loads(config.get_json("mode")) or "peer", [])
@@ -89,4 +92,4 @@ def translated(doing: str) -> Iterator[None]:
     try:
         yield
     except zenoh.ZError as error:
-        raise LinkError(f"{doing}: {said(error)}") from error
+        raise LinkError(f"{doing}: {error_text(error)}") from error

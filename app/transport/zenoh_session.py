@@ -1,5 +1,5 @@
-"""The one owner of the Zenoh session. Zenoh calls back on its own threads; what arrives goes into the
-inbox. Its errors leave here as LinkError."""
+"""Owns the Zenoh session. Zenoh's callbacks run on its own threads and put what they receive into the
+inbox. Errors of Zenoh are raised as LinkError."""
 
 import asyncio
 import atexit
@@ -25,11 +25,12 @@ ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
 POLL_S = 0.02
 COPIED_MOST = 16_384  # bytes of a sample
+OnPayload = Callable[[Any], None]
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
-    """A payload that may be kept for long: a small one is a part of what the network was read into,
-    and would keep all of that, so that the next message has to be read into another."""
+    """A payload that may be kept for long. A small one is copied: it is a part of the buffer that the
+    network was read into, and would keep all of it, so that the next message needs another."""
     return payload if len(payload) > COPIED_MOST else payload.to_bytes()
 
 
@@ -37,20 +38,20 @@ class ZenohSession:
     """A session with its subscribers, publishers and tokens."""
 
     def __init__(self, config: zenoh.Config, wake: Callable[[bool], None], dialect: Dialect) -> None:
-        """Opens at once, whether or not anyone is there; `wake` is the inbox's."""
+        """Opens the session, with or without a peer; `wake` is the inbox's."""
         self._config = config
         self._dialect = dialect
         self._inbox = Inbox(wake)
         self._declared: Declarations = NOTHING
         self._sent: Counter[str] = Counter()  # messages and queries, by key expression
-        self._looked: dict[str, tuple[str, Callable[[Any], None]]] = {}
-        self._looking: dict[str, zenoh.Subscriber[None]] = {}
+        self._on_demand: dict[str, tuple[str, OnPayload]] = {}  # key → key expression, callback
+        self._demanded: dict[str, zenoh.Subscriber[None]] = {}
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it connects, as its configuration says; empty where it only looks around."""
+        """The endpoints it connects to, as configured; empty if it only scouts."""
         return endpoints_of(self._config)
 
     def _open(self) -> None:
@@ -66,12 +67,12 @@ class ZenohSession:
         self._declare()
 
     def renew(self) -> None:
-        """A new session with everything declared; blocks for up to some tenths of a second.
+        """Opens a new session and declares everything; blocks for up to some tenths of a second.
 
-        Zenoh would take up the old one by itself. But then the bridge may end for this session
-        what it had just begun again, when it notices late that the old connection is lost: it
-        would show the panel server as a subscriber and read nothing for it. And a subscriber drops
-        what it has seen before, also when what it saw was cut off in between.
+        Zenoh would reconnect the old one by itself. But a bridge that notices late that the old
+        connection is lost ends the routes that it has just made again for this session: it would show
+        the panel server as a subscriber and read nothing for it. And a subscriber drops a sample that
+        it has received before, although the loss of the link has invalidated it.
         """
         held, self._held = self._held, None
         self._inbox.renew()
@@ -100,7 +101,7 @@ class ZenohSession:
                 for key, expression in self._declared.subscribe.items()
                 for declared in self._subscriptions(key, expression)
             ]
-            self._looking = {key: self._look(*looked) for key, looked in dict(self._looked).items()}
+            self._demanded = {key: self._subscriber(*of) for key, of in dict(self._on_demand).items()}
 
     def _publisher(self, expression: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
@@ -112,9 +113,9 @@ class ZenohSession:
         )
 
     def _subscriptions(self, key: str, expression: str) -> Iterator[zenoh.Subscriber[None]]:
-        """What is published from now on, and the caches of what was published before. Zenoh's own
-        subscriber with history drops what has an older stamp than what it had last: after a stamp of a
-        clock that is ahead it would be deaf."""
+        """A subscriber to the topic, and one to the tokens of its publishers' caches. Zenoh's own
+        subscriber with history drops samples with an older timestamp than the last: after a timestamp
+        of a clock that is ahead it would drop all."""
         put = self._inbox.put
         yield self._session.declare_subscriber(
             expression, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
@@ -123,25 +124,25 @@ class ZenohSession:
             caches(expression), self._direct(lambda sample: self._on_cache(key, sample)), history=True
         )
 
-    def look(self, key: str, expression: str, take: Callable[[bytes | zenoh.ZBytes], None]) -> None:
-        """Subscribes to a topic until `look_away`, in this session and those after it. `take` gets each
-        payload on a thread of Zenoh's, under the inbox's lock: it must not wait."""
-        self._looked[key] = expression, take
+    def subscribe_on_demand(self, key: str, expression: str, on_payload: OnPayload) -> None:
+        """Subscribes to a topic until `unsubscribe`, in this session and those after it. `on_payload`
+        is called on Zenoh's threads, under the inbox's lock: it must not block."""
+        self._on_demand[key] = expression, on_payload
         if self._held is None:
             return  # the new session subscribes
         with translated(f"can't subscribe to {key}"):
-            self._looking[key] = self._look(expression, take)
+            self._demanded[key] = self._subscriber(expression, on_payload)
 
-    def look_away(self, key: str) -> None:
-        """Ends what `look` began."""
-        self._looked.pop(key, None)
-        if (declared := self._looking.pop(key, None)) is not None:
+    def unsubscribe(self, key: str) -> None:
+        """Ends a subscription of `subscribe_on_demand`."""
+        self._on_demand.pop(key, None)
+        if (declared := self._demanded.pop(key, None)) is not None:
             with translated(f"can't unsubscribe from {key}"):
                 declared.undeclare()
 
-    def _look(self, expression: str, take: Callable[[Any], None]) -> "zenoh.Subscriber[None]":
+    def _subscriber(self, expression: str, on_payload: OnPayload) -> "zenoh.Subscriber[None]":
         return self._session.declare_subscriber(
-            expression, self._direct(lambda sample: take(_own(sample.payload)))
+            expression, self._direct(lambda sample: on_payload(_own(sample.payload)))
         )
 
     def _ask_cache(self, key: str, token: str) -> None:
@@ -152,7 +153,7 @@ class ZenohSession:
             if reply.ok is not None:
                 put(key, _own(reply.ok.payload), reply.ok.timestamp)
 
-        with suppress(zenoh.ZError):  # a session that is closed: the next one finds the cache again
+        with suppress(zenoh.ZError):  # the session is closed: the next one finds the cache again
             self._session.get(
                 newest(token),
                 self._direct(take),
@@ -163,7 +164,7 @@ class ZenohSession:
             )
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
-        """A handler on the receiving thread, with no thread of its own; it ends with `renew`."""
+        """A handler that runs on Zenoh's receiving thread. It does nothing after `renew`."""
         take = self._inbox.guarded(function)
 
         def handle(what: Any) -> None:
@@ -189,19 +190,18 @@ class ZenohSession:
             self._publishers[key].put(payload, attachment=self._attachment(self._declared.publish[key]))
 
     def _attachment(self, expression: str) -> bytes | None:
-        """What goes with the next message or query on a key expression."""
+        """The attachment of the next message or query on a key expression."""
         self._sent[expression] += 1
         return self._dialect.attachment(self.zid, expression, self._sent[expression], time.time_ns())
 
     def has_reader(self, key: str) -> bool:
-        """Whether someone is known to listen; not whether they act on it."""
+        """Whether the publisher has a matching subscriber."""
         with translated(f"can't ask who listens on {key}"):
             status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
             return bool(status.matching)
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
-        """Queries a declared service once; the future gets the first answer, or None when there is
-        none."""
+        """Queries a declared service once. The future gets the first answer, None if there is none."""
         return self.query_at(self._declared.query[key], payload, timeout_s)
 
     def query_at(
@@ -221,15 +221,14 @@ class ZenohSession:
             )
 
     async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
-        """(key, payload) of each answer to a query that comes within `timeout_s`."""
+        """(key, payload) of each answer to a query that arrives within `timeout_s`."""
+        get = self._session.get
         with translated(f"can't ask {selector}"):
-            found, _ = await collected(
-                lambda callback: self._session.get(selector, callback, timeout=timeout_s), timeout_s
-            )
+            found, _ = await collected(lambda back: get(selector, back, timeout=timeout_s), timeout_s)
         return found
 
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
-        """The liveliness tokens of the ROS graph; LinkError if they do not all come in time."""
+        """The liveliness tokens of the ROS graph; LinkError if not all of them arrive in time."""
         with translated("can't ask for the ROS graph"):
             liveliness = self._session.liveliness()
             found, whole = await collected(
@@ -257,7 +256,7 @@ class ZenohSession:
             return bool(info.routers_zid() or info.peers_zid())
 
     def respond(self) -> None:
-        """Returns when neither the inbox nor the session stands still; blocks while one does."""
+        """Returns when both the inbox and the session respond; blocks until then."""
         self._inbox.respond()
         with suppress(zenoh.ZError):  # a session that is being renewed has responded too
             info = self._session.info
@@ -265,9 +264,9 @@ class ZenohSession:
             info.routers_zid()
 
     def drain(self) -> Changes:
-        """Takes all that came since the last call."""
+        """Returns and removes everything received since the last call."""
         changes = self._inbox.drain()
-        for key, token in changes.caches:  # not where it was heard of: a callback may not query
+        for key, token in changes.caches:  # not in the callback, which must not query
             self._ask_cache(key, token)
         return changes
 
@@ -277,13 +276,13 @@ class ZenohSession:
         return self._inbox.has_immediate
 
     def close(self) -> None:
-        """Takes everything down; blocks for up to some tenths of a second."""
+        """Closes the session; blocks for up to some tenths of a second."""
         atexit.unregister(self._leave)
         with translated("the Zenoh session did not close cleanly"):
             self._session.close()
 
     def _leave(self) -> None:
-        """At exit without a close: an interpreter that ends must not be called into."""
+        """At exit without a close: Zenoh must not call into an interpreter that ends."""
         with suppress(LinkError):
             self.close()
 

@@ -77,14 +77,14 @@ class TinyPeer:
     def lost(self, zids: Iterable[str]) -> None:
         self.said += [f"lost {zid}" for zid in zids]
 
-    def follow(self, came: bool) -> None:
+    def on_graph_change(self, peer_appeared: bool) -> None:
         robot, link = self._context.robot, self._context.link
-        if came:
+        if peer_appeared:
             own = OwnEndpoint("MP", robot.key("/go"), "std_msgs/msg/String", Qos())
             link.hold(robot.dialect.own_tokens(link.zid, [own]))
             robot.settled_at = time.monotonic()
 
-    def look(self) -> None: ...
+    def check_stall(self) -> None: ...
 
     async def flushed(self) -> bool:
         return True

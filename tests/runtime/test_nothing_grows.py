@@ -152,7 +152,7 @@ def rest(kiosk: Server) -> tuple[dict[str, int], int]:
 
     def nothing_open() -> bool:
         sizes.update(kiosk.http.get("/sizes").json())
-        return sizes["ServiceCalls._open"] == sizes["BridgeLiveness._questions"] == 0
+        return sizes["ServiceCalls._open"] == sizes["BridgeLiveness._queries"] == 0
 
     nothing_open()  # the first look makes what Python keeps of what it looked at
     until(nothing_open, "no answer is waited for")

@@ -303,7 +303,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
 ) -> None:
     for module in (controller, lease):  # a busy machine misses heartbeats
         monkeypatch.setattr(module, "LEASE_S", ENOUGH_S)
-    for limit in ("STOOD_STILL_S", "SILENT_S"):  # and its loop stands still
+    for limit in ("STALLED_S", "SILENT_S"):  # and its loop stands still
         monkeypatch.setattr(bridge_liveness, limit, ENOUGH_S)
 
     async def scene() -> None:

@@ -13,10 +13,10 @@ from app.permission.interlocks import link_verdict
 from app.robot.state import RobotState
 from app.transport import bridge_liveness
 from app.transport.bridge_liveness import (
+    DELAYS_KEPT,
     EVERY_S,
     GOOD,
     LONGEST_S,
-    LOOKED_AT,
     BridgeLiveness,
     LivenessDetector,
 )
@@ -31,9 +31,9 @@ def network(silence: LivenessDetector, took_s: float, begin: float, count: int) 
     heard = [(sent_at + took_s, sent_at) for sent_at, _ in events]
     for now, sent_at in sorted([*events, *heard], key=lambda one: one[0]):
         if sent_at is None:
-            silence.ask(now)
+            silence.on_query(now)
         else:
-            silence.hear(sent_at, now)
+            silence.on_reply(sent_at, now)
         silence.judge(now)
     return max(now for now, _ in heard)
 
@@ -47,7 +47,7 @@ def test_a_bridge_that_answers_is_not_silent() -> None:
 def test_no_answer_is_silence_after_its_limit() -> None:
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
-    silence.ask(end)
+    silence.on_query(end)
     silence.judge(end + silence.limit - 0.01)
     assert not silence.silent
     silence.judge(end + silence.limit + LAN_S)
@@ -66,35 +66,35 @@ def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     for n in range(20):
-        silence.ask(end + n * EVERY_S)
+        silence.on_query(end + n * EVERY_S)
         silence.judge(end + n * EVERY_S)
     thaw = end + 20 * EVERY_S
     for n in range(18):  # all that waited comes at once
-        silence.hear(end + n * EVERY_S, thaw)
+        silence.on_reply(end + n * EVERY_S, thaw)
     assert silence.silent
     for n in range(GOOD):
         assert silence.silent
-        silence.ask(thaw + 1 + n)
-        silence.hear(thaw + 1 + n, thaw + 1 + n + LAN_S)
+        silence.on_query(thaw + 1 + n)
+        silence.on_reply(thaw + 1 + n, thaw + 1 + n + LAN_S)
     assert not silence.silent
 
 
 def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 50)
-    end = network(silence, 0.7, end, LOOKED_AT // 2)
+    end = network(silence, 0.7, end, DELAYS_KEPT // 2)
     assert silence.silent
-    end = network(silence, 0.7, end, LOOKED_AT + 10)
+    end = network(silence, 0.7, end, DELAYS_KEPT + 10)
     assert not silence.silent
-    network(silence, LAN_S, end, LOOKED_AT)
+    network(silence, LAN_S, end, DELAYS_KEPT)
     assert silence.limit < bridge_liveness.SILENT_S + 0.01
 
 
 def test_a_loop_that_stood_still_is_no_slow_network() -> None:
     silence = LivenessDetector()
-    end = network(silence, LAN_S, 0.0, LOOKED_AT)
-    silence.ask(end)
-    silence.hear(end, end + 2.0)  # no one judged in the meantime
+    end = network(silence, LAN_S, 0.0, DELAYS_KEPT)
+    silence.on_query(end)
+    silence.on_reply(end, end + 2.0)  # no one judged in the meantime
     assert not silence.silent
     assert silence.limit < bridge_liveness.SILENT_S + 0.01
 
@@ -108,10 +108,10 @@ class Line:
         self.frozen = ""  # a bridge that does not answer
         self.fails = False
 
-    async def ask(self, selector: str, within_s: float = 2.0) -> list[tuple[str, bytes]]:
+    async def ask(self, selector: str, timeout_s: float = 2.0) -> list[tuple[str, bytes]]:
         if self.fails:
             raise LinkError("no session")
-        assert within_s == LONGEST_S
+        assert timeout_s == LONGEST_S
         answered = asyncio.get_running_loop().create_future()
         self.queries.append((selector, answered))
         if self.answers and not (self.frozen and selector == bridge_dialect.version(self.frozen)):
@@ -145,7 +145,7 @@ def run(
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bridge_liveness, "EVERY_S", 0.02)
     monkeypatch.setattr(bridge_liveness, "SILENT_S", 0.1)
-    monkeypatch.setattr(bridge_liveness, "STOOD_STILL_S", 60.0)
+    monkeypatch.setattr(bridge_liveness, "STALLED_S", 60.0)
 
 
 async def until(what: Callable[[], object]) -> None:
@@ -222,7 +222,7 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
-        presses = presses_of(small_panel(), robot, line, reached=mine.flushed)
+        presses = presses_of(small_panel(), robot, line, flushed=mine.flushed)
 
         async def press(press_id: str) -> str:
             receipt = await presses.press("free", {"message": "hi"}, press_id, FROM)
@@ -256,7 +256,7 @@ def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
 
 def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was asked before it is answered before what waited; so is what was asked at its end."""
-    monkeypatch.setattr(bridge_liveness, "STOOD_STILL_S", 0.1)
+    monkeypatch.setattr(bridge_liveness, "STALLED_S", 0.1)
     clock = 0.0
 
     async def benched() -> None:
@@ -279,10 +279,10 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
 
         await queried(1)
         clock += 0.1
-        mine.look()
+        mine.check_stall()
         assert robot.is_caught_up
         clock += 3.0
-        mine.look()  # as it is before each press is judged
+        mine.check_stall()  # as it is before each press is judged
         before = len(line.queries)
         assert changes == ["catching_up"]
         answer(1)

@@ -242,7 +242,7 @@ def test_of_a_lossless_topic_what_came_and_went_between_two_drains_is_kept(
     _, session = peer
     link = linked(declared(["a", "b"], [], lossless=["a"]))
     ends: list[bytes] = []
-    link.look("end", "end", lambda payload: ends.append(bytes(payload)))
+    link.subscribe_on_demand("end", "end", lambda payload: ends.append(bytes(payload)))
     # What it declared before is known as well.
     until(partial(matched, session.declare_publisher("end")), "it is subscribed")
 

@@ -85,7 +85,7 @@ def bear_standstills() -> None:
     nothing here and refuses no press. A test of stalls starts its server with `EXACT_LIVENESS=1`."""
     from app.transport import bridge_liveness, bridge_peer, readiness
 
-    vars(bridge_liveness).update(STOOD_STILL_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
+    vars(bridge_liveness).update(STALLED_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
     vars(bridge_peer)["WITHIN_S"] = 10.0
     vars(readiness)["LIMIT_S"] = 15.0
 
