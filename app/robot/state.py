@@ -19,12 +19,12 @@ from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC, key_of
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
+from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
 from app.robot.history import History
 from app.robot.keyed_entries import KeyedEntries
 from app.robot.log_lines import LogLines
-from app.robot.looked_at import LookedAt
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.replayed import ReplayedMessages
@@ -75,7 +75,7 @@ class RobotState:
         self.command_status: dict[str, CommandStatus] = {}  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
-        self.looked_at: dict[str, LookedAt] = {}  # by the key of a camera's topic
+        self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its bridges do not respond

@@ -1,8 +1,8 @@
-"""The newest picture of each camera's topic, while a browser shows it.
+"""The newest frame of each camera's topic, while a browser shows it.
 
-Only then the topic is subscribed to: the bridge reads a topic for its subscribers, so a camera that no
-browser shows does not even cross the network. A message is replaced by the next one where it arrives,
-on the link's thread, undecoded; the event loop is woken only where a browser waits for one.
+A camera's topic is subscribed to only while a browser shows it. The bridge reads a topic only for
+subscribers, so a camera that no browser shows needs no bandwidth. On the link's thread a message
+replaces the last one undecoded; the event loop is woken only if a browser waits for the next frame.
 """
 
 import asyncio
@@ -14,18 +14,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import LinkError, TooMany
-from app.i18n import say
-from app.interfaces import Interfaces
-from app.panel.model import Panel
+from app.i18n import TextLike, say
 from app.panel.widgets.camera import Camera
-from app.robot.looked_at import LookedAt
+from app.robot.camera_topic import CameraTopicState
 from app.robot.pictures import NoPicture, Picture, picture
 from app.robot.sample import Buffer
-from app.robot.state import RobotState
-from app.transport.zenoh_session import ZenohSession
+from app.transport.peer import RobotContext
 
-LINGER_S: Final = 6.0  # a page without scripts looks again after five seconds
-LOOKERS_MOST: Final = 32  # at one topic
+LINGER_S: Final = 6.0  # a page without scripts requests the next frame after five seconds
+VIEWERS_MOST: Final = 32  # of one topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,22 +38,13 @@ class Frame:
 class Frames:
     """The cameras of one robot. Used on the event loop only."""
 
-    def __init__(
-        self,
-        panel: Panel,
-        robot: RobotState,
-        interfaces: Interfaces,
-        link: ZenohSession,
-        changed: Callable[[], None],
-        tokens: Callable[[], None],
-    ) -> None:
-        """`changed` is called when what the view shows of a camera has changed by itself, `tokens` when
-        a topic is wanted or not any more."""
-        cameras = [w for w in panel.widgets() if isinstance(w, Camera)]
+    def __init__(self, context: RobotContext, update_tokens: Callable[[], None]) -> None:
+        """`update_tokens` is called when a topic is subscribed to or no longer."""
+        cameras = [w for w in context.panel.widgets() if isinstance(w, Camera)]
         self._feeds = {}
-        for topic, name in panel.on_demand().items():
-            fresh_s = min(camera.max_age_s for camera in cameras if camera.topic == topic)
-            self._feeds[topic] = Feed(topic, name, robot, interfaces, link, changed, tokens, fresh_s)
+        for topic, type_name in context.panel.on_demand().items():
+            max_age_s = min(camera.max_age_s for camera in cameras if camera.topic == topic)
+            self._feeds[topic] = Feed(context, update_tokens, topic, type_name, max_age_s)
 
     def feed(self, widget: Camera) -> "Feed":
         """The topic of a camera."""
@@ -69,132 +57,130 @@ class Frames:
 
 
 class Feed:
-    """One topic: the newest message, and who waits for one."""
+    """One camera topic: its newest message, and the viewers that wait for the next one."""
 
     def __init__(
         self,
+        context: RobotContext,
+        update_tokens: Callable[[], None],
         topic: str,
         type_name: str,
-        robot: RobotState,
-        interfaces: Interfaces,
-        link: ZenohSession,
-        changed: Callable[[], None],
-        tokens: Callable[[], None],
-        fresh_s: float,
+        max_age_s: float,
     ) -> None:
+        """`max_age_s` is the shortest of the topic's cameras."""
         self.topic = topic
-        self._fresh_s = fresh_s
+        self._max_age_s = max_age_s
         self._type = type_name
-        self._robot = robot
-        self._key = robot.key(topic)
-        self._interfaces = interfaces
-        self._link = link
-        self._changed = changed
-        self._tokens = tokens
+        self._robot = context.robot
+        self._key = context.robot.key(topic)
+        self._interfaces = context.interfaces
+        self._link = context.link
+        self._changed = context.changed
+        self._update_tokens = update_tokens
         self._loop = asyncio.get_running_loop()
-        self._lookers = 0
-        self._leaving: asyncio.TimerHandle | None = None
+        self._viewers = 0
+        self._closing: asyncio.TimerHandle | None = None
         self._newest: Frame | None = None  # set on the link's thread
-        self._received = LookedAt()
+        self._state = CameraTopicState()
         self._viewed_at = -math.inf  # of the newest frame that the view knows of
-        self._came: asyncio.Future[None] | None = None  # of those who wait for a frame
-        self._made: tuple[Frame, asyncio.Task[Picture]] | None = None
+        self._next_frame: asyncio.Future[None] | None = None  # if a viewer waits for it
+        self._encoding: tuple[Frame, asyncio.Task[Picture]] | None = None
 
     @contextmanager
-    def looked_at(self) -> Iterator[None]:
-        """The topic is subscribed to while the block runs, and a little longer."""
-        if self._lookers >= LOOKERS_MOST:
-            raise TooMany(say("camera_lookers", most=LOOKERS_MOST), 5)
-        self._lookers += 1
-        self._look()
+    def subscribed(self) -> Iterator[None]:
+        """Keeps the topic subscribed to during the block, and `LINGER_S` longer."""
+        if self._viewers >= VIEWERS_MOST:
+            raise TooMany(say("camera_lookers", most=VIEWERS_MOST), 5)
+        self._viewers += 1
+        self._subscribe()
         try:
             yield
         finally:
-            self._lookers -= 1
-            if not self._lookers and self._robot.looked_at.get(self._key) is self._received:
-                self._leaving = self._loop.call_later(LINGER_S, self.close)
+            self._viewers -= 1
+            if not self._viewers and self._robot.camera_topics.get(self._key) is self._state:
+                self._closing = self._loop.call_later(LINGER_S, self.close)
 
     async def newer(self, than: int) -> Frame:
-        """The newest frame, when its number is larger: at once, or as soon as one comes."""
+        """The newest frame with a larger number; waits for the next one if there is none."""
         while (found := self._newest) is None or found.number <= than:
-            if self._came is None:
-                self._came = self._loop.create_future()
-            if self._newest is found:  # none has come in between
-                await asyncio.shield(self._came)
+            if self._next_frame is None:
+                self._next_frame = self._loop.create_future()
+            if self._newest is found:  # none has arrived in between
+                await asyncio.shield(self._next_frame)
         self._show(found)
         return found
 
     async def picture(self, frame: Frame, widget: Camera) -> Picture:
-        """The picture of a frame, made once for all; NoPicture says why there is none."""
+        """The picture of a frame, encoded once for all viewers; NoPicture says why there is none."""
         try:
             if len(frame.payload) > widget.max_bytes:
                 size, most = len(frame.payload), widget.max_bytes
                 raise NoPicture(say("camera_large", size=size, most=most))
-            made = await asyncio.shield(self._making(frame))
+            encoded = await asyncio.shield(self._encode_once(frame))
         except NoPicture as error:
-            self._problem(error)
+            self._set_problem(error.reason)
             raise
-        self._problem(None)
-        return made
+        self._set_problem("")
+        return encoded
 
     def close(self) -> None:
-        """Unsubscribes, and keeps nothing."""
-        if self._leaving is not None:
-            self._leaving.cancel()
-            self._leaving = None
-        if self._robot.looked_at.pop(self._key, None) is not None:
+        """Unsubscribes and drops the newest frame."""
+        self._cancel_closing()
+        if self._robot.camera_topics.pop(self._key, None) is not None:
             with suppress(LinkError):
                 self._link.unsubscribe(self._key)
-            self._tokens()
-            self._newest = self._made = None
+            self._update_tokens()
+            self._newest = self._encoding = None
 
-    def _look(self) -> None:
-        if self._leaving is not None:
-            self._leaving.cancel()
-            self._leaving = None
-        if self._key in self._robot.looked_at:
+    def _cancel_closing(self) -> None:
+        if self._closing is not None:
+            self._closing.cancel()
+            self._closing = None
+
+    def _subscribe(self) -> None:
+        self._cancel_closing()
+        if self._key in self._robot.camera_topics:
             return
-        self._received = self._robot.looked_at[self._key] = LookedAt()
+        self._state = self._robot.camera_topics[self._key] = CameraTopicState()
         self._viewed_at = -math.inf
         self._newest = None  # what arrived while the last subscription ended
         expression = self._robot.dialect.topic(self._key, self._type)
-        self._tokens()
-        with suppress(LinkError):  # the next session has it
-            self._link.subscribe_on_demand(self._key, expression, self._take)
+        self._update_tokens()
+        with suppress(LinkError):  # the next session subscribes
+            self._link.subscribe_on_demand(self._key, expression, self._on_payload)
         self._changed()
 
-    def _take(self, payload: Buffer) -> None:
-        """On the link's thread: replaces what was there, and wakes the loop where someone waits."""
+    def _on_payload(self, payload: Buffer) -> None:
+        """On the link's thread: replaces the newest frame, and wakes the loop if a viewer waits."""
         last = self._newest  # the loop may replace it by None
         frame = Frame(last.number + 1 if last else 1, payload, time.monotonic(), time.time())
         self._newest = frame
-        self._received.at, self._received.wall = frame.at, frame.wall
-        if self._came is not None:
+        self._state.at, self._state.wall = frame.at, frame.wall
+        if self._next_frame is not None:
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake)
 
     def _wake(self) -> None:
-        came, self._came = self._came, None
-        if came is not None and not came.done():
-            came.set_result(None)
+        next_frame, self._next_frame = self._next_frame, None
+        if next_frame is not None and not next_frame.done():
+            next_frame.set_result(None)
 
     def _show(self, frame: Frame) -> None:
-        """The view looks by itself when a frame gets old: the first one after that changes it."""
-        if frame.at - self._viewed_at >= self._fresh_s:
+        """The view has a deadline for the age of a frame: only the first frame after it changes it."""
+        if frame.at - self._viewed_at >= self._max_age_s:
             self._changed()
         self._viewed_at = frame.at
 
-    def _making(self, frame: Frame) -> "asyncio.Task[Picture]":
-        if self._made is None or self._made[0] is not frame:
-            work = asyncio.to_thread(self._make, frame.payload)
-            self._made = frame, asyncio.ensure_future(work)
-        return self._made[1]
+    def _encode_once(self, frame: Frame) -> "asyncio.Task[Picture]":
+        if self._encoding is None or self._encoding[0] is not frame:
+            work = asyncio.to_thread(self._encode, frame.payload)
+            self._encoding = frame, asyncio.ensure_future(work)
+        return self._encoding[1]
 
-    def _make(self, payload: Buffer) -> Picture:
+    def _encode(self, payload: Buffer) -> Picture:
         return picture(self._interfaces, self._type, bytes(payload))
 
-    def _problem(self, error: NoPicture | None) -> None:
-        problem = error.reason if error else ""
-        if self._received.problem != problem:
-            self._received.problem = problem
+    def _set_problem(self, problem: TextLike) -> None:
+        if self._state.problem != problem:
+            self._state.problem = problem
             self._changed()

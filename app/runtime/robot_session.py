@@ -131,14 +131,7 @@ class RobotSession:
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading
         self.robot.keyed_entries.on_decoded = lambda key: self.refresher.values({key})
-        self.frames = Frames(
-            panel,
-            self.robot,
-            self.interfaces,
-            self.link,
-            self.show,
-            lambda: self.peer.on_graph_change(False),
-        )
+        self.frames = Frames(context, lambda: self.peer.on_graph_change(False))
         self._rosout = Rosout(
             self.robot, self.interfaces, self.link, asyncio.get_running_loop(), self._own_line
         )

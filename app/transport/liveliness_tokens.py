@@ -69,7 +69,7 @@ class LivelinessTokens:
         """(topic, type) of what the panel listens to now."""
         yield from self._panel.subscriptions().items()
         for topic, name in self._panel.on_demand().items():
-            if self._robot.key(topic) in self._robot.looked_at:
+            if self._robot.key(topic) in self._robot.camera_topics:
                 yield topic, name
 
     def _qos(self, topic: str) -> Qos:

@@ -12,7 +12,7 @@ from app.robot.state import RobotState
 
 def camera(widget: Camera, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` and `note`; and when they change. Unknown while no browser shows it."""
-    received = robot.looked_at.get(robot.key(widget.topic))
+    received = robot.camera_topics.get(robot.key(widget.topic))
     doubt = topic_mismatch("MS", widget, robot)
     if doubt and doubt.code != "unheard":  # its bridge reads it while a browser shows it
         return {"state": "unreadable", "note": doubt.reason or ""}, math.inf

@@ -2,7 +2,7 @@
 
 from app.i18n import Text
 from app.panel.widgets.camera import Camera
-from app.robot.looked_at import LookedAt
+from app.robot.camera_topic import CameraTopicState
 from app.robot.state import RobotState
 from app.view.camera_values import camera
 from tests.support.builders import endpoint, panel_of, robot_there
@@ -17,35 +17,35 @@ def shown(robot: RobotState, widget: Camera, now: float) -> tuple[str, str, floa
     return attributes["state"], note.code if isinstance(note, Text) else note, until
 
 
-def looked() -> tuple[RobotState, Camera, LookedAt]:
+def subscribed() -> tuple[RobotState, Camera, CameraTopicState]:
     panel = panel_of(CAMERA)
     robot = robot_there(panel)
     (widget,) = (w for w in panel.widgets() if isinstance(w, Camera))
-    received = robot.looked_at[robot.key("/cam")] = LookedAt(RECEIVED, 0.0)
+    received = robot.camera_topics[robot.key("/cam")] = CameraTopicState(RECEIVED, 0.0)
     return robot, widget, received
 
 
 def test_nothing_is_known_while_no_page_shows_it() -> None:
-    robot, widget, _ = looked()
-    robot.looked_at.clear()
+    robot, widget, _ = subscribed()
+    robot.camera_topics.clear()
     assert shown(robot, widget, RECEIVED) == ("waiting", "camera_waiting", float("inf"))
 
 
 def test_a_picture_is_old_after_a_second_and_its_age_counts() -> None:
-    robot, widget, _ = looked()
+    robot, widget, _ = subscribed()
     assert shown(robot, widget, RECEIVED + 0.9) == ("live", "", RECEIVED + 1)
     assert shown(robot, widget, RECEIVED + 1.5) == ("old", "camera_old", RECEIVED + 2)
     assert shown(robot, widget, RECEIVED + 130) == ("old", "camera_old", RECEIVED + 180)
 
 
 def test_a_picture_that_can_not_be_shown_says_why() -> None:
-    robot, widget, received = looked()
+    robot, widget, received = subscribed()
     received.problem = "broken"
     assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "broken")
 
 
 def test_a_topic_of_another_type_says_so() -> None:
-    robot, widget, _ = looked()
+    robot, widget, _ = subscribed()
     endpoint(robot, "MP", "/cam", "sensor_msgs/msg/Image")
     assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "wrong_type")
 

@@ -61,7 +61,7 @@ async def frame(
 ) -> Response:
     camera = session.panel.widget(widget, Camera)
     feed = session.frames.feed(camera)
-    with feed.looked_at():
+    with feed.subscribed():
         try:
             async with asyncio.timeout(AFTER_WITHIN_S if after else FIRST_WITHIN_S):
                 shown, picture = await _next(feed, camera, after)
@@ -99,7 +99,7 @@ async def _next(feed: Feed, camera: Camera, after: int) -> tuple[Frame, Picture]
 
 
 class _FrameSocket:
-    """One browser that looks at one camera."""
+    """One browser that shows one camera."""
 
     def __init__(self, socket: WebSocket, feed: Feed, camera: Camera) -> None:
         self._socket = socket
@@ -109,8 +109,8 @@ class _FrameSocket:
         self._language = language_of(socket)
 
     async def run(self) -> None:
-        """Until the browser closes it."""
-        with self._feed.looked_at():
+        """Sends frames until the browser closes the WebSocket."""
+        with self._feed.subscribed():
             writing = spawn_logged(self._write(), log, "sending pictures failed")
             try:
                 while (message := await received(self._socket))["type"] == "websocket.receive":

@@ -1,4 +1,4 @@
-"""What is known of the topic of a camera while a browser shows it."""
+"""The state of a camera's topic while it is subscribed to: while a browser shows it."""
 
 import math
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from app.i18n import TextLike
 
 
 @dataclass(slots=True)
-class LookedAt:
+class CameraTopicState:
     """`at` (monotonic seconds) and `wall` (seconds since the epoch) are those of the newest message,
-    shown or not; `problem` is why the newest that was wanted can't be shown, "" if it can."""
+    shown or not. `problem` is why the last frame that was requested can't be shown, "" if it can."""
 
     at: float = -math.inf
     wall: float = 0.0
