@@ -76,7 +76,7 @@ WIRE_THE_BRIDGE = {
     "app.cli.robot.topic_reader",
     "app.diagnose.link",
     "app.diagnose.robot",
-    "app.diagnose.watch",
+    "app.diagnose.observation",
     "app.runtime.robot_session",
     "app.simulator.zenoh_peer",
     "app.simulator.zenoh_robot",

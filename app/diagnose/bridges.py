@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from app.diagnose.findings import Report
-from app.diagnose.names import Behind
+from app.diagnose.names import NamesBehindBridge
 from app.dialect.endpoint import DEMO_VERSION
 from app.graph.model import Bridge, RosGraph
 
@@ -13,7 +13,9 @@ TESTED: Final = "1.10.2"  # zenoh-plugin-ros2dds; see docs/compatibility.md
 MOST_NAMED: Final = 3
 
 
-def check_bridges(report: Report, graph: RosGraph, behind: Behind, endpoints: Sequence[str]) -> bool:
+def check_bridges(
+    report: Report, graph: RosGraph, behind: NamesBehindBridge, endpoints: Sequence[str]
+) -> bool:
     """Whether there is something to be said of the topics behind them."""
     robot = behind.robot
     if not graph.bridges:
@@ -45,7 +47,7 @@ def _check_bridge(report: Report, bridge: Bridge, robot: str) -> None:
     report.fact(f"bridge {bridge.zid} is version {version}, {where}")
 
 
-def _check_several(report: Report, behind: Behind, robot: str) -> None:
+def _check_several(report: Report, behind: NamesBehindBridge, robot: str) -> None:
     """Whether two bridges forward the same for the same namespace."""
     found = {}
     for name in sorted(behind.robot.needed()):
@@ -61,7 +63,7 @@ def _check_several(report: Report, behind: Behind, robot: str) -> None:
         report.find("bridges_two", about, robot=robot, number=len(zids), zids=", ".join(sorted(zids)))
 
 
-def _check_nodes(report: Report, behind: Behind, bridges: Sequence[Bridge]) -> bool:
+def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Bridge]) -> bool:
     """Whether the bridges see nodes, and any of what the panel needs."""
     topics = sum(len(one.topics) for one in behind.graphs)
     nodes = behind.nodes()

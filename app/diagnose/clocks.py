@@ -8,7 +8,7 @@ from typing import Final
 
 from app.diagnose.findings import Report
 from app.diagnose.names import PanelRobot
-from app.diagnose.watch import Watched
+from app.diagnose.observation import Observation
 from app.errors import DecodeError, InterfaceError
 from app.interfaces import Interfaces
 from app.robot.sample import Sample
@@ -18,12 +18,14 @@ FIRST_REAL_S: Final = 1e9  # 2001: a stamp before that is of simulated time
 STAMP: Final = ("header.stamp.sec", "header.stamp.nanosec")
 
 
-def check_clocks(report: Report, robot: PanelRobot, watched: Watched, interfaces: Interfaces) -> None:
+def check_clocks(
+    report: Report, robot: PanelRobot, observed: Observation, interfaces: Interfaces
+) -> None:
     types = robot.panel.subscriptions()
-    live = {topic: watched.live(robot.key(topic)) for topic in types}
+    live = {topic: observed.live(robot.key(topic)) for topic in types}
     sent = [one.sent - one.wall for several in live.values() for one in several if one.sent]
     if not sent:
-        report.find("clock_unknown", robot=robot.id, window=f"{watched.window_s:.1f}")
+        report.find("clock_unknown", robot=robot.id, window=f"{observed.window_s:.1f}")
         return
     if _compare(report, robot.id, "the bridge's machine", sent):
         return  # the nodes' stamps would only say it again

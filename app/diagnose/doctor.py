@@ -10,7 +10,7 @@ from app.diagnose.findings import Report
 from app.diagnose.fonts import HasBrowser, HasFont, check_fonts, has_browser, has_font
 from app.diagnose.machine import FreeBytes, check_data, check_port, free_bytes
 from app.diagnose.names import PanelRobot
-from app.diagnose.robot import LISTEN_S, check_robot, check_way
+from app.diagnose.robot import LISTEN_S, check_connection, check_robot
 from app.diagnose.screen import DRM, check_screens
 from app.errors import PanelError
 from app.graph.model import RosGraph
@@ -68,7 +68,7 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
     if mode == "demo":
         report.find("demo_mode", str(panel.title) if panel else "")
     elif panel is None:
-        await check_way(report, "", settings.zenoh, ())
+        await check_connection(report, "", settings.zenoh, ())
     else:
         for entry in panel.robots or (None,):
             robot = PanelRobot(panel, entry)

@@ -28,11 +28,11 @@ RELEASE: Final = re.compile(r"v?(\d+\.\d+)(\.\d+)?")
 
 
 class AdminSession(Protocol):
-    """What is needed of a session."""
+    """The part of the Zenoh session that queries of the admin space need."""
 
     zid: str
 
-    async def ask(self, selector: str, timeout_s: float, /) -> list[tuple[str, bytes]]: ...
+    async def ask(self, selector: str, timeout_s: float) -> list[tuple[str, bytes]]: ...
 
 
 def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) -> tuple[str, ...]:

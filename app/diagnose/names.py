@@ -1,4 +1,4 @@
-"""What a panel needs of one robot, and where that is in the robot's graph. Pure."""
+"""The names that a panel uses of one robot, found in the ROS graph behind its bridges. Pure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -46,14 +46,15 @@ class PanelRobot:
 
 
 @dataclass(frozen=True, slots=True)
-class Behind:
-    """What is behind those of a link's bridges that may have this robot, by the panel's names."""
+class NamesBehindBridge:
+    """The graphs behind those bridges of a link that may be this robot's, queried by the panel's
+    names."""
 
     robot: PanelRobot
     graphs: tuple[RobotGraph, ...]
 
     @classmethod
-    def of(cls, robot: PanelRobot, graph: RosGraph) -> "Behind":
+    def of(cls, robot: PanelRobot, graph: RosGraph) -> "NamesBehindBridge":
         return cls(robot, tuple(one for one in graph.robots if within(robot.namespace, one.namespace)))
 
     def _places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:
@@ -71,7 +72,7 @@ class Behind:
         return [one for topic in self.topics(name) for one in topic.subscribers]
 
     def is_announced(self, name: str) -> bool:
-        """Whether a bridge passes a topic on."""
+        """Whether a bridge routes a topic."""
         return any(topic.announced for topic in self.topics(name))
 
     def services(self, name: str) -> list[Server]:
@@ -99,14 +100,14 @@ class Behind:
         return [one for graph in self.graphs for one in graph.routes if one.key == key]
 
     def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
-        """A sentence with similar names that are there; "" without one."""
+        """A sentence with similar names in the graph; "" if there are none."""
         there = [f"{graph.namespace}{one.name}" for graph in self.graphs for one in _of(graph, kind)]
         own = self.robot.namespace
         similar = [one.removeprefix(own) for one in near(f"{own}{name}", there)]
         return f" Did you mean {' or '.join(similar)}?" if similar else ""
 
     def elsewhere(self, names: set[str]) -> Iterator[tuple[str, str]]:
-        """(what there is, the namespace before it) of names that end like the panel's."""
+        """(name, its namespace) of each name in the graph that ends with one of the panel's."""
         own = self.robot.namespace
         for graph in self.graphs:
             topics, servers = (t.name for t in graph.topics), (*graph.services, *graph.actions)

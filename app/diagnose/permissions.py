@@ -3,8 +3,8 @@
 from typing import Final
 
 from app.diagnose.findings import Report
-from app.diagnose.names import Behind
-from app.diagnose.watch import Watched
+from app.diagnose.names import NamesBehindBridge
+from app.diagnose.observation import Observation
 from app.errors import DecodeError
 from app.i18n import TextLike, render, say
 from app.interfaces import Interfaces
@@ -14,29 +14,31 @@ from app.permission.conditions import permits, unmet
 REGULAR: Final = 2  # messages while one listens
 
 
-def check_permissions(report: Report, behind: Behind, watched: Watched, interfaces: Interfaces) -> None:
+def check_permissions(
+    report: Report, behind: NamesBehindBridge, observed: Observation, interfaces: Interfaces
+) -> None:
     for topic in dict.fromkeys(one.topic for one in behind.robot.panel.interlocks):
-        _check_topic(report, behind, watched, topic)
+        _check_topic(report, behind, observed, topic)
     for interlock in behind.robot.panel.interlocks:
-        _check_value(report, behind, watched, interlock, interfaces)
+        _check_value(report, behind, observed, interlock, interfaces)
 
 
-def _check_topic(report: Report, behind: Behind, watched: Watched, topic: str) -> None:
+def _check_topic(report: Report, behind: NamesBehindBridge, observed: Observation, topic: str) -> None:
     """Whether its publisher stays, and a panel that starts later would get a permission."""
     using = [one for one in behind.robot.panel.interlocks if one.topic == topic]
     key, ids = behind.robot.key(topic), ", ".join(one.id for one in using)
-    count, window = len(watched.live(key)), f"{watched.window_s:.1f}"
+    count, window = len(observed.live(key)), f"{observed.window_s:.1f}"
     publishers = behind.publishers(topic)
     robot = behind.robot.id
     if not publishers:
-        if watched.samples[key] or key in watched.lost:
+        if observed.samples[key] or key in observed.lost:
             report.find("permission_ends", topic, robot=robot, ids=ids)
         else:
             hint = behind.hint(topic, "topics")
             report.find("permission_no_publisher", topic, robot=robot, ids=ids, hint=hint)
         return
     limits = [one.max_age_s for one in using if one.max_age_s is not None]
-    if limits and watched.longest_gap(key) > min(limits):
+    if limits and observed.longest_gap(key) > min(limits):
         report.find(
             "permission_stale",
             topic,
@@ -49,14 +51,18 @@ def _check_topic(report: Report, behind: Behind, watched: Watched, topic: str) -
     elif count < REGULAR and not any(one.qos.transient_local for one in publishers):
         report.find("permission_not_latched", topic, robot=robot, ids=ids, count=count, window=window)
     else:
-        report.fact(f"permission {topic} came {len(watched.samples[key])} times in {window} s")
+        report.fact(f"permission {topic} came {len(observed.samples[key])} times in {window} s")
 
 
 def _check_value(
-    report: Report, behind: Behind, watched: Watched, interlock: Interlock, interfaces: Interfaces
+    report: Report,
+    behind: NamesBehindBridge,
+    observed: Observation,
+    interlock: Interlock,
+    interfaces: Interfaces,
 ) -> None:
     """Whether the last value permits; nothing is said of one that is unknown."""
-    samples = watched.samples[behind.robot.key(interlock.topic)]
+    samples = observed.samples[behind.robot.key(interlock.topic)]
     if not samples:
         return
     reader = interfaces.field_reader(interlock.type, [interlock.field])

@@ -1,4 +1,5 @@
-"""One robot of a panel, looked at through its bridge: the way there, its graph, what it publishes."""
+"""Diagnoses one robot of a panel through its bridge: the link, the ROS graph, what the robot
+publishes."""
 
 import asyncio
 from contextlib import suppress
@@ -9,10 +10,10 @@ from app.diagnose.bridges import check_bridges
 from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
 from app.diagnose.link import check_link, configured
-from app.diagnose.names import Behind, PanelRobot
+from app.diagnose.names import NamesBehindBridge, PanelRobot
+from app.diagnose.observation import Observation, copies, observe
 from app.diagnose.permissions import check_permissions
 from app.diagnose.topics import TopicChecks
-from app.diagnose.watch import Watched, copies, watch
 from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError
 from app.graph.model import RosGraph
@@ -25,8 +26,10 @@ LISTEN_S: Final = 5.0
 CONNECTED_WITHIN_S: Final = 4.0
 
 
-async def check_way(report: Report, robot_id: str, zenoh: Path, connect: tuple[str, ...]) -> list[str]:
-    """The endpoints at which Zenoh answers."""
+async def check_connection(
+    report: Report, robot_id: str, zenoh: Path, connect: tuple[str, ...]
+) -> list[str]:
+    """Checks the Zenoh configuration and the link; returns the endpoints at which Zenoh answers."""
     endpoints = configured(report, zenoh, connect, robot_id)
     return await check_link(report, zenoh, endpoints, robot_id)
 
@@ -34,9 +37,9 @@ async def check_way(report: Report, robot_id: str, zenoh: Path, connect: tuple[s
 async def check_robot(
     report: Report, robot: PanelRobot, zenoh: Path, listen_s: float = LISTEN_S
 ) -> RosGraph | None:
-    """Everything that can be found out of a robot; its graph, None where there is no way to it."""
+    """Adds all findings of a robot to the report. Returns its graph, None without a link."""
     connect = robot.entry.connect if robot.entry else ()
-    endpoints = await check_way(report, robot.id, zenoh, connect)
+    endpoints = await check_connection(report, robot.id, zenoh, connect)
     if not endpoints:
         return None
     session = await asyncio.to_thread(
@@ -44,7 +47,7 @@ async def check_robot(
     )
     try:
         await session.connected(CONNECTED_WITHIN_S)
-        return await _look(report, robot, session, endpoints, listen_s)
+        return await _inspect(report, robot, session, endpoints, listen_s)
     except LinkError as error:
         report.find("zenoh_config", str(zenoh), robot=robot.id, detail=str(error))
         return None
@@ -53,48 +56,49 @@ async def check_robot(
             await asyncio.to_thread(session.close)
 
 
-async def _look(
+async def _inspect(
     report: Report, robot: PanelRobot, session: ZenohSession, endpoints: list[str], listen_s: float
 ) -> RosGraph:
-    """Listens first: what ended in the meantime is not in the graph after it any more."""
+    """Observes the topics first, then reads the graph: what ended in the meantime is not in it."""
     interfaces = load_interfaces(robot.panel.distro, robot.panel.interfaces)
     before = await first_graph(session, session.zid)
-    if not check_bridges(report, before, Behind.of(robot, before), endpoints):
+    if not check_bridges(report, before, NamesBehindBridge.of(robot, before), endpoints):
         return before
-    watched = await _watched(robot, session, before, listen_s)
+    observed = await _observe(robot, session, before, listen_s)
     graph = await _later(session, before)
     if gone := silent(before, graph):
         for bridge in gone:
             report.find("bridge_silent", bridge, robot=robot.id)
         return before
-    behind = Behind.of(robot, graph)
-    check_permissions(report, behind, watched, interfaces)
-    TopicChecks(report, behind, interfaces, Behind.of(robot, before)).check()
-    check_clocks(report, robot, watched, interfaces)
-    check_copies(report, robot, watched)
+    behind = NamesBehindBridge.of(robot, graph)
+    check_permissions(report, behind, observed, interfaces)
+    TopicChecks(report, behind, interfaces, NamesBehindBridge.of(robot, before)).check()
+    check_clocks(report, robot, observed, interfaces)
+    check_copies(report, robot, observed)
     return graph
 
 
 async def _later(session: ZenohSession, before: RosGraph) -> RosGraph:
-    """Empty if no answer comes."""
+    """The graph now; empty if no bridge answers."""
     try:
         return await later_graph(session, session.zid, before)
     except LinkError:
         return RosGraph()
 
 
-def check_copies(report: Report, robot: PanelRobot, watched: Watched) -> None:
-    """Whether a bridge reads a topic more than once for each message."""
+def check_copies(report: Report, robot: PanelRobot, observed: Observation) -> None:
+    """Reports topics of which a bridge sends each message more than once."""
     for topic in robot.panel.subscriptions():
-        if (times := copies(watched.live(robot.key(topic)))) > 1:
+        if (times := copies(observed.live(robot.key(topic)))) > 1:
             report.find("bridge_piled_readers", topic, robot=robot.id, times=times)
 
 
-async def _watched(
+async def _observe(
     robot: PanelRobot, session: ZenohSession, graph: RosGraph, longest_s: float
-) -> Watched:
-    """Waits for permissions that are not latched, and for those that may not be old."""
-    panel, behind, dialect = robot.panel, Behind.of(robot, graph), BridgeDialect()
+) -> Observation:
+    """Observes the panel's topics until interlocks that are not latched, or have a max_age_s, have been
+    received often enough."""
+    panel, behind, dialect = robot.panel, NamesBehindBridge.of(robot, graph), BridgeDialect()
     topics = panel.subscriptions()
     expressions = {robot.key(name): dialect.topic(robot.key(name), of) for name, of in topics.items()}
     waited_for = {
@@ -103,4 +107,4 @@ async def _watched(
         if one.max_age_s is not None
         or not any(end.qos.transient_local for end in behind.publishers(one.topic))
     }
-    return await watch(session, expressions, waited_for, longest_s)
+    return await observe(session, expressions, waited_for, longest_s)

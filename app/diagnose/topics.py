@@ -6,7 +6,7 @@ from typing import Final
 
 from app.diagnose.bridges import denies
 from app.diagnose.findings import Report
-from app.diagnose.names import Behind
+from app.diagnose.names import NamesBehindBridge
 from app.errors import InterfaceError
 from app.graph.model import Server, TopicEndpoint
 from app.interfaces import Interfaces
@@ -27,9 +27,9 @@ class TopicChecks:
     def __init__(
         self,
         report: Report,
-        behind: Behind,
+        behind: NamesBehindBridge,
         interfaces: Interfaces,
-        earlier: Behind | None = None,
+        earlier: NamesBehindBridge | None = None,
     ) -> None:
         """`earlier` is what was there some seconds before: a bridge announces a new publisher late."""
         self._report = report

@@ -14,7 +14,7 @@ import zenoh
 
 from app.cli.command import main
 from app.diagnose import link
-from app.diagnose.watch import Watched, watch
+from app.diagnose.observation import Observation, observe
 from app.transport import bridge_graph_reader
 from app.transport.inbox import Changes
 from app.transport.zenoh_session import ZenohSession
@@ -189,11 +189,11 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
 ]
 
 
-async def watch_all(
+async def observe_all(
     session: ZenohSession, topics: Mapping[str, str], _: Iterable[str], longest_s: float
-) -> Watched:
+) -> Observation:
     """Waits for messages on every topic."""
-    return await watch(session, topics, topics, longest_s)
+    return await observe(session, topics, topics, longest_s)
 
 
 @pytest.mark.parametrize(("text", "expected"), [b[1:] for b in BROKEN], ids=[b[0] for b in BROKEN])
@@ -210,7 +210,7 @@ def test_what_is_broken_is_named_and_nothing_else(
         listen_s = LONGEST_S
     elif expected[0][0] in {"clock_differs", "simulated_time"}:
         listen_s = ENOUGH_S
-        monkeypatch.setattr("app.diagnose.robot.watch", watch_all)
+        monkeypatch.setattr("app.diagnose.robot.observe", observe_all)
     found = setup.findings(text, shared.endpoint, listen_s)
     assert named(found) == expected
     assert all(one.what and one.do for one in found)
@@ -237,7 +237,9 @@ def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
         return changes
 
     monkeypatch.setattr(ZenohSession, "drain", drained)
-    monkeypatch.setattr("app.diagnose.watch.ENOUGH", 1000)  # it waits for the end of the publisher
+    monkeypatch.setattr(
+        "app.diagnose.observation.ENOUGH", 1000
+    )  # it waits for the end of the publisher
     with ThreadPoolExecutor() as pool:
         published = pool.submit(publish_and_go, robot, "/hasty", BOOL, {"data": True}, heard.is_set)
         found = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
@@ -331,13 +333,13 @@ def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
 ) -> None:
     thaw = threading.Timer(frozen_s, shared.thaw)
 
-    async def watched(*arguments: Any) -> Watched:
-        found = await watch(*arguments)
+    async def observed(*arguments: Any) -> Observation:
+        found = await observe(*arguments)
         shared.freeze()
         thaw.start()
         return found
 
-    monkeypatch.setattr("app.diagnose.robot.watch", watched)
+    monkeypatch.setattr("app.diagnose.robot.observe", observed)
     text = panel_of(call("/system_controller/list_parameters", LIST_PARAMETERS))
     try:
         found = setup.findings(text, shared.endpoint, listen_s=0.2)

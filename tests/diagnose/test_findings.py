@@ -7,7 +7,7 @@ from typing import Final
 import pytest
 
 from app.diagnose.findings import KINDS, Report
-from app.diagnose.watch import copies
+from app.diagnose.observation import copies
 from app.robot.sample import Sample
 from app.settings import PACKAGE
 from tests.support.parts import TESTS

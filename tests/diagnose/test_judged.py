@@ -15,10 +15,10 @@ from app.diagnose import link
 from app.diagnose.bridges import denies
 from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
-from app.diagnose.names import Behind, PanelRobot
+from app.diagnose.names import NamesBehindBridge, PanelRobot
+from app.diagnose.observation import Observation
 from app.diagnose.robot import check_copies
 from app.diagnose.topics import TopicChecks
-from app.diagnose.watch import Watched
 from app.graph.model import (
     Bridge,
     BridgeRoute,
@@ -53,7 +53,7 @@ def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> Topic:
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
     report = Report()
-    behind = Behind.of(robot, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
+    behind = NamesBehindBridge.of(robot, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
     TopicChecks(report, behind, INTERFACES).check()
     return report
 
@@ -89,8 +89,11 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(readout("/words")))
     lost = replace(topic("/words"), announced=False)
     assert judged(here, topics=(lost,)).codes() == ["topic_unrouted"]
-    new = Behind.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
-    report, before = Report(), Behind.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,)),)))
+    new = NamesBehindBridge.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
+    report, before = (
+        Report(),
+        NamesBehindBridge.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,)),))),
+    )
     TopicChecks(report, new, INTERFACES, before).check()
     assert report.codes() == []
 
@@ -122,7 +125,7 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
     bridged = RobotGraph(namespace="/robot1", bridges=(BRIDGE,), topics=(topic("/words"),))
     other = RobotGraph(namespace="/robot2", bridges=(BRIDGE,), topics=(topic("/words", BOOL),))
     report = Report()
-    behind = Behind.of(robot(tmp_path, text), RosGraph(robots=(bridged, other)))
+    behind = NamesBehindBridge.of(robot(tmp_path, text), RosGraph(robots=(bridged, other)))
     TopicChecks(report, behind, INTERFACES).check()
     assert report.codes() == []
 
@@ -143,9 +146,9 @@ def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> Non
     assert denies([Bridge(zid="b1", config=config)], "publishers", "/words") is expected
 
 
-def watched(*samples: tuple[float, float | None]) -> Watched:
+def observed(*samples: tuple[float, float | None]) -> Observation:
     """Of /words: (when it came, by the sender's clock)."""
-    found = Watched(began=0.0, ended=3.0)
+    found = Observation(began=0.0, ended=3.0)
     found.samples["words"] = [Sample(SENT, 0, at, at, "b1", sent=sent) for at, sent in samples]
     return found
 
@@ -155,7 +158,7 @@ def watched(*samples: tuple[float, float | None]) -> Watched:
 )
 def test_the_clock_of_the_bridges_machine(ahead_s: float, expected: list[str], tmp_path: Path) -> None:
     report = Report()
-    came = watched(*((at, at + ahead_s) for at in (0.1, 1.1, 2.1)))
+    came = observed(*((at, at + ahead_s) for at in (0.1, 1.1, 2.1)))
     check_clocks(report, robot(tmp_path, panel_of(readout("/words"))), came, INTERFACES)
     assert report.codes() == expected
     for one in report.findings:
@@ -165,14 +168,14 @@ def test_the_clock_of_the_bridges_machine(ahead_s: float, expected: list[str], t
 def test_a_clock_that_nothing_is_known_of(tmp_path: Path) -> None:
     report = Report()
     here = robot(tmp_path, panel_of(readout("/words")))
-    check_clocks(report, here, watched((0.1, None)), INTERFACES)
+    check_clocks(report, here, observed((0.1, None)), INTERFACES)
     assert report.codes() == ["clock_unknown"]
 
 
 def test_readers_that_a_bridge_has_piled_up(tmp_path: Path) -> None:
     report = Report()
     here = robot(tmp_path, panel_of(readout("/words")))
-    check_copies(report, here, watched(*((at + c / 1000, at) for at in (0.1, 1.1) for c in range(3))))
+    check_copies(report, here, observed(*((at + c / 1000, at) for at in (0.1, 1.1) for c in range(3))))
     assert named(report.findings) == [("bridge_piled_readers", "/words")]
     assert report.findings[0].details["times"] == 3
 
@@ -185,7 +188,7 @@ def test_another_version_of_zenoh(theirs: str, expected: list[str]) -> None:
     class Session:
         zid = "us"
 
-        async def ask(self, selector: str, within_s: float) -> list[tuple[str, bytes]]:
+        async def ask(self, selector: str, timeout_s: float) -> list[tuple[str, bytes]]:
             far = {"sessions": [{"peer": "them"}], "version": "v0.5.0"}
             near = {"sessions": [{"peer": "us"}], "version": theirs}
             answers = [b"no JSON", json.dumps(far).encode(), json.dumps(near).encode()]

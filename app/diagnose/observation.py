@@ -1,4 +1,4 @@
-"""What a robot's topics say while one listens: how often, how late by which clock, how many times."""
+"""Observes a robot's topics for some seconds: which samples are received, when, and how many copies."""
 
 import asyncio
 import time
@@ -15,16 +15,16 @@ from app.transport.inbox import Changes
 from app.transport.zenoh_session import ZenohSession
 
 POLL_S: Final = 0.05
-LEAST_S: Final = 1.0  # for what a latched publisher kept, and for copies
-ENOUGH: Final = 3  # messages of a topic; more say nothing new
+LEAST_S: Final = 1.0  # for samples from the caches of latched publishers, and for copies
+ENOUGH: Final = 3  # messages of a topic
 COPIES_WITHIN_S: Final = 0.02
-APART: Final = 3  # times farther than copies are messages that are none
+APART: Final = 3  # times `COPIES_WITHIN_S`: the least time between messages that are no copies
 
 
 @dataclass(slots=True)
-class Watched:
-    """What came on each topic within `window_s`, by key; `began` and `ended` in monotonic seconds.
-    `lost` are the keys of those whose publisher ended."""
+class Observation:
+    """The samples received on each topic within `window_s`, by key. `began` and `ended` are in
+    monotonic seconds. `lost` are the keys of topics whose publisher ended."""
 
     began: float = 0.0
     ended: float = 0.0
@@ -36,21 +36,21 @@ class Watched:
         return self.ended - self.began
 
     def live(self, key: str) -> list[Sample]:
-        """Without what was kept from before."""
+        """The samples of a topic without those from a publisher's cache."""
         return [sample for sample in self.samples[key] if not sample.cached]
 
     def longest_gap(self, key: str) -> float:
-        """Seconds without a message: between two, or from the last one to the end."""
+        """The longest time without a message in seconds: between two, or from the last to the end."""
         times = [sample.at for sample in self.live(key)]
         return max((b - a for a, b in pairwise([*times, self.ended])), default=self.window_s)
 
 
-async def watch(
+async def observe(
     session: ZenohSession, topics: Mapping[str, str], wanted: Iterable[str], longest_s: float
-) -> Watched:
-    """Listens to the topics (key → key expression): until each of `wanted` has come often enough, or
-    for `longest_s`."""
-    found = Watched(began=time.monotonic())
+) -> Observation:
+    """Subscribes to the topics (key → key expression) until `ENOUGH` samples of each of `wanted` have
+    been received, `longest_s` at most."""
+    found = Observation(began=time.monotonic())
     session.start(Declarations(subscribe=topics, recorded=topics.keys()))
     waited_for = set(wanted)
     end = found.began + longest_s
