@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from app.clock import format_time
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations, equal
 from app.commands.parameters.sync import ParameterSync
 from app.commands.service_calls import ServiceCalls
+from app.commands.transport import Transport
 from app.errors import InputError, NotFound
 from app.i18n import ENGLISH, TextLike, number, say
 from app.i18n.locales import number_from
@@ -24,13 +25,6 @@ from app.panel.widgets.step import Step
 from app.permission.interlocks import reported_value
 from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import RobotState
-
-
-class Transport(Protocol):
-    """The part of the Zenoh session that publishing needs."""
-
-    def put(self, key: str, payload: bytes) -> None: ...
-    def has_reader(self, key: str) -> bool: ...
 
 
 async def assume_flushed() -> bool:

@@ -10,9 +10,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from app.clock import format_time
+from app.commands.transport import Transport
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
 from app.i18n import PanelText, Text, TextLike, joined, number, say
@@ -33,13 +34,6 @@ NO_VALUE: Final = "—"
 MAX_VALUE_CHARS: Final = 500  # of one value: every browser gets it, and logs keep it
 LATE_S: Final = 60.0  # after the timeout, a response still corrects the receipt
 MAX_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
-
-
-class QueryClient(Protocol):
-    """The part of the Zenoh session that calls need: a query, answered with bytes, or None without a
-    reply."""
-
-    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]": ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +64,17 @@ class ServiceCalls:
     """The service calls of one robot. Used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: RobotState, link: QueryClient, changed: Callable[[], None]
+        self,
+        interfaces: Interfaces,
+        robot: RobotState,
+        transport: Transport,
+        changed: Callable[[], None],
     ) -> None:
         """`changed` is called when the status of a command has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._link = link
+        self._transport = transport
         self._changed = changed
         self._open: dict[int, _Waiting] = {}
         self._answering: set[str] = set()
@@ -134,7 +132,7 @@ class ServiceCalls:
             return Outcome("refused", why)
         loop = asyncio.get_running_loop()
         final_check()
-        query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
+        query = self._transport.query(key, request.payload, request.timeout_s + LATE_S)
         waiting = _Waiting(request, press_id, query, loop.create_future())
         number = id(waiting)
         self._open[number] = waiting

@@ -13,6 +13,7 @@ from typing import Final, Protocol
 from app.diagnose.findings import Report
 from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError, SettingsError
+from app.transport.admin_space import AdminSpace
 from app.transport.zenoh_config import config_from, endpoints_of
 from app.transport.zenoh_session import ZenohSession
 
@@ -27,12 +28,10 @@ TCP: Final = re.compile(r"(?P<protocol>tcp|tls|ws)/(?P<host>\[[^\]]+\]|[^\s/?#:]
 RELEASE: Final = re.compile(r"v?(\d+\.\d+)(\.\d+)?")
 
 
-class AdminSession(Protocol):
-    """The part of the Zenoh session that queries of the admin space need."""
+class AdminSession(AdminSpace, Protocol):
+    """A link with the id of its session."""
 
     zid: str
-
-    async def ask(self, selector: str, timeout_s: float) -> list[tuple[str, bytes]]: ...
 
 
 def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) -> tuple[str, ...]:

@@ -3,21 +3,16 @@
 import asyncio
 import json
 from contextlib import suppress
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import Endpoint
 from app.interfaces.names import valid_type
 from app.robot.graph import Route
 from app.robot.state import RobotState
+from app.transport.admin_space import AdminSpace
 
 MISSES_ALLOWED: Final = 1
-
-
-class AdminSpace(Protocol):
-    """The part of the Zenoh session that queries of the admin space need."""
-
-    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
 
 
 class BridgeAdmin:

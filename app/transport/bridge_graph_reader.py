@@ -5,25 +5,18 @@ import json
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final, Protocol
+from typing import Final
 
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.errors import LinkError
 from app.graph.model import RosGraph
+from app.transport.admin_space import GraphLink
 from app.transport.bridge_graph import Answers, GraphAnswers, ros_graph
 
 ANNOUNCED_WITHIN_S: Final = 1.5
 ANSWERED_WITHIN_S: Final = 5.0
 POLL_S: Final = 0.02
-
-
-class GraphLink(Protocol):
-    """What is needed of the link: (key, payload) of each answer to a query; the liveliness tokens."""
-
-    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
-
-    async def tokens(self, timeout_s: float = ...) -> list[str]: ...
 
 
 async def first_graph(link: GraphLink, zid: str) -> RosGraph:

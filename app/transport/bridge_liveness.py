@@ -20,7 +20,7 @@ from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
-from app.transport.bridge_admin import AdminSpace
+from app.transport.admin_space import AdminSpace
 
 log = logging.getLogger("kiosk.pulse")
 

@@ -25,6 +25,7 @@ from tests.support.builders import (
     GUARDED,
     INTERFACES,
     MESSAGE,
+    FakeTransport,
     panel_of,
     permits,
     presses_of,
@@ -105,7 +106,7 @@ class SlowLog:
         return self.entries[-1]
 
 
-class Bench:
+class Bench(FakeTransport):
     """Presses on a robot that is there and permits; what is asked of it is answered by the test."""
 
     def __init__(self, log: Log, happened: list[str], panel: Panel | None = None) -> None:
@@ -115,16 +116,13 @@ class Bench:
         self.queries: list[asyncio.Future[bytes | None]] = []
         permits(self.robot)
         self.presses = presses_of(
-            panel, self.robot, self, asker=self, press_log=PressLog(log, "arm", lambda: "board-3")
+            panel, self.robot, self, press_log=PressLog(log, "arm", lambda: "board-3")
         )
         for service in ("light",):
             self.robot.graph.apply_token(f"@/b1/@ros2_lv/SS/{service}/std_srvs§srv§SetBool", True)
 
     def put(self, key: str, payload: bytes) -> None:
         self.happened.append("sent")
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         self.happened.append("sent")

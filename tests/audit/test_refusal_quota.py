@@ -26,7 +26,15 @@ from app.commands.presses import Presses
 from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
 from app.robot.state import RobotState
-from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
+from tests.support.builders import (
+    COUNT,
+    FakeTransport,
+    panel_of,
+    permits,
+    presses_of,
+    robot_there,
+    small_panel,
+)
 from tests.support.holds import PANEL, PATIENT
 from tests.support.parts import ENOUGH_S, Server, until
 from tests.support.servers import demo_server
@@ -133,7 +141,7 @@ def test_what_is_left_out_is_summed_up_by_browser_and_the_rest_together(counted:
     assert counted.refusals.summary_due() == []
 
 
-class Cell:
+class Cell(FakeTransport):
     """A robot with its presses, on a real log."""
 
     def __init__(self, log: OperatorLog) -> None:
@@ -146,9 +154,6 @@ class Cell:
 
     def put(self, key: str, payload: bytes) -> None:
         self.sent += 1
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
     async def press(self, press_id: str, origin: Origin = KIM, **inputs: Any) -> Receipt:
         by = PressContext(origin)

@@ -16,7 +16,7 @@ from app.panel.widgets.service_action import Action, Call
 from app.permission.interlocks import call_blocked
 from app.robot.command_status import CommandStatus, Outcome
 from app.robot.state import RobotState, Sample
-from tests.support.builders import BRIDGE, INTERFACES, panel_of, robot_there
+from tests.support.builders import BRIDGE, INTERFACES, FakeTransport, panel_of, robot_there
 from tests.support.words import english
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -33,7 +33,7 @@ GOAL = {
 }
 
 
-class Line:
+class Line(FakeTransport):
     """A link whose queries are answered by hand."""
 
     def __init__(self) -> None:

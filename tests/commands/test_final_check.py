@@ -24,6 +24,7 @@ from tests.support.builders import (
     FROM,
     GUARDED,
     MESSAGE,
+    FakeTransport,
     Table,
     panel_of,
     permits,
@@ -48,7 +49,7 @@ PANEL = panel_of(MESSAGE, FREE, GUARDED, CALL, GOAL)
 PRESSES = several(300, 600)
 
 
-class Way:
+class Way(FakeTransport):
     """It keeps what was sent, and answers nothing."""
 
     def __init__(self) -> None:
@@ -56,9 +57,6 @@ class Way:
 
     def put(self, key: str, payload: bytes) -> None:
         self.sent.append(key)
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         self.sent.append(key)
@@ -94,7 +92,7 @@ def robot_permits() -> RobotState:
 
 
 def pressed(widget: str, way: Way, late: Late, robot: RobotState) -> Receipt:
-    presses = presses_of(PANEL, robot, way, asker=way, catch_up=late.catch_up, news=late.news)
+    presses = presses_of(PANEL, robot, way, catch_up=late.catch_up, news=late.news)
     return asyncio.run(presses.press(widget, {"message": "x"}, "p1", FROM))
 
 

@@ -31,6 +31,7 @@ from tests.support.builders import (
     INTERFACES,
     NOW,
     TEXT,
+    FakeTransport,
     Table,
     endpoint,
     panel_of,
@@ -105,7 +106,7 @@ def _when(timer: Timer) -> float:
     return timer.when
 
 
-class Way:
+class Way(FakeTransport):
     """The way to the robot: it keeps what was put, and when."""
 
     def __init__(self, loop: Loop) -> None:
@@ -135,8 +136,7 @@ class Bench:
         self.way = Way(self.loop)
         self.robot = robot_there(self.panel)
         permits(self.robot, at=NOW)
-        way: Any = self.way
-        checked = sending_of(self.panel, self.robot, way).check_inputs
+        checked = sending_of(self.panel, self.robot, self.way).check_inputs
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.news: Callable[[], bool] = lambda: bool(self.pending)

@@ -21,7 +21,7 @@ from app.robot.command_status import Outcome
 from app.robot.parameter_state import UNKNOWN, ParameterState, allowed_range, encode_value, limits_text
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
-from tests.support.builders import BRIDGE, INTERFACES, NOW, Table, panel_of, robot_there
+from tests.support.builders import BRIDGE, INTERFACES, NOW, FakeTransport, Table, panel_of, robot_there
 from tests.support.words import english
 
 SPEED: Table = {
@@ -47,7 +47,7 @@ def descriptor(name: str, kind: int, **more: Any) -> dict[str, Any]:
     return {**empty, "name": name, "type": kind, **more}
 
 
-class Line:
+class Line(FakeTransport):
     """A link whose queries are answered by hand."""
 
     def __init__(self) -> None:

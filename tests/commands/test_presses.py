@@ -34,6 +34,7 @@ from tests.support.builders import (
     MESSAGE,
     NOW,
     TEXT,
+    FakeTransport,
     Table,
     endpoint,
     panel_of,
@@ -48,7 +49,7 @@ from tests.support.words import english
 PATH = "nav_msgs/msg/Path"
 
 
-class Way:
+class Way(FakeTransport):
     """The way to the robot, as a press needs it: it keeps what was put."""
 
     def __init__(self) -> None:

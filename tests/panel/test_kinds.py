@@ -9,25 +9,15 @@ from app.panel.widgets.kinds import KINDS, find_row
 from app.permission.interlocks import AGAINST
 from app.settings import shipped_path
 from app.view.kinds import SHOWN
-from tests.support.builders import panel_of, robot_there, sending_of
+from tests.support.builders import FakeTransport, panel_of, robot_there, sending_of
 
 EACH = pytest.mark.parametrize(("kind", "of"), KINDS.items())
-
-
-class Unsent:
-    """A link by which nothing is sent."""
-
-    def put(self, key: str, payload: bytes) -> None:
-        raise AssertionError(f"{key} was put")
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
 
 @pytest.fixture(scope="module")
 def dispatcher() -> Dispatcher:
     panel = panel_of()
-    return sending_of(panel, robot_there(panel), Unsent())
+    return sending_of(panel, robot_there(panel), FakeTransport())
 
 
 def widget(of: type[BaseWidget], kind: str) -> BaseWidget:

@@ -32,6 +32,7 @@ from tests.support.builders import (
     MESSAGE,
     NOW,
     TEXT,
+    FakeTransport,
     endpoint,
     panel_of,
     presses_of,
@@ -66,7 +67,7 @@ FEW: Final = settings(
 )
 
 
-class Way:
+class Way(FakeTransport):
     """The way to the robot: keeps what was put, and the queries until they are answered."""
 
     def __init__(self) -> None:
@@ -78,9 +79,6 @@ class Way:
         if self.fails:
             raise LinkError("no way")
         self.put_texts.append(INTERFACES.decode(TEXT, payload).data)
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         query: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
@@ -150,7 +148,6 @@ class Panels(RuleBasedStateMachine):
             self.panel,
             self.robot,
             self.way,
-            asker=self.way,
             calls=self.calls,
             monotonic=lambda: self.now,
         )

@@ -25,7 +25,7 @@ from tests.support.builders import (
     ENABLED,
     INTERFACES,
     KIOSK,
-    NoServices,
+    FakeTransport,
     robot_there,
     small_panel,
 )
@@ -169,7 +169,7 @@ def incoming() -> Iterator[Incoming]:
 
 
 async def made() -> Incoming:
-    panel, services = small_panel(), NoServices()
+    panel, services = small_panel(), FakeTransport()
     robot = robot_there(panel)
     calls = ServiceCalls(INTERFACES, robot, services, lambda: None)
     inbox = Inbox(lambda _: None)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from app.audit import NullLog, Origin
 from app.audit.press_record import PressLog
@@ -13,7 +13,8 @@ from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressContext
 from app.commands.press_judge import Arrivals, PressJudge
 from app.commands.presses import Presses
-from app.commands.service_calls import QueryClient, ServiceCalls
+from app.commands.service_calls import ServiceCalls
+from app.commands.transport import Transport
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import TopicRole
@@ -130,44 +131,41 @@ def permits(robot: RobotState, permitted: bool = True, *, at: float = NOW) -> No
     says(robot, ENABLED, permitted, BOOL, at=at)
 
 
-class NoServices:
-    """A link on which no query is expected."""
+class FakeTransport:
+    """A link with matching subscribers, on which neither a message nor a query is expected."""
+
+    def put(self, key: str, payload: bytes) -> None:
+        raise AssertionError(f"unexpected message: {key}")
+
+    def has_reader(self, key: str) -> bool:
+        return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         raise AssertionError(f"unexpected query: {key}")
 
 
-class FakeLink(Protocol):
-    """A fake of the Zenoh session."""
-
-    def put(self, key: str, payload: bytes) -> None: ...
-    def has_reader(self, key: str) -> bool: ...
-
-
 def sending_of(
     panel: Panel,
     robot: RobotState,
-    way: FakeLink,
+    transport: Transport,
     *,
-    asker: QueryClient | None = None,
     calls: ServiceCalls | None = None,
     confirmations: Confirmations | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
     **more: Any,
 ) -> Dispatcher:
     """A dispatcher, with defaults for the parts that a test does not provide."""
-    asker = asker or NoServices()
-    calls = calls or ServiceCalls(INTERFACES, robot, asker, lambda: None)
+    calls = calls or ServiceCalls(INTERFACES, robot, transport, lambda: None)
     return Dispatcher(
         panel,
         INTERFACES,
         robot,
-        way,
+        transport,
         Trackers(
             calls,
-            GoalTracker(INTERFACES, robot, asker, lambda: None),
+            GoalTracker(INTERFACES, robot, transport, lambda: None),
             confirmations or Confirmations(robot, lambda: None),
-            ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
+            ParameterSync(panel, INTERFACES, robot, transport, calls, lambda: None),
         ),
         monotonic,
         **more,
@@ -177,7 +175,7 @@ def sending_of(
 def presses_of(
     panel: Panel,
     robot: RobotState,
-    way: FakeLink,
+    transport: Transport,
     *,
     press_log: PressLog | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
@@ -186,6 +184,6 @@ def presses_of(
     **more: Any,
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
-    sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
+    sending = sending_of(panel, robot, transport, monotonic=monotonic, **more)
     judge = PressJudge(panel, robot, Arrivals(catch_up, news), monotonic)
     return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

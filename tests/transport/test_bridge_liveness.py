@@ -20,7 +20,7 @@ from app.transport.bridge_liveness import (
     BridgeLiveness,
     LivenessDetector,
 )
-from tests.support.builders import BRIDGE, FROM, presses_of, robot_there, small_panel
+from tests.support.builders import BRIDGE, FROM, FakeTransport, presses_of, robot_there, small_panel
 
 LAN_S = 0.001
 
@@ -99,7 +99,7 @@ def test_a_loop_that_stood_still_is_no_slow_network() -> None:
     assert silence.limit < bridge_liveness.SILENT_S + 0.01
 
 
-class Line:
+class Line(FakeTransport):
     """A link on which each question waits until the test answers it."""
 
     def __init__(self) -> None:
@@ -119,9 +119,6 @@ class Line:
         return [(selector, b"1")] if await answered else []
 
     def put(self, key: str, payload: bytes) -> None: ...
-
-    def has_reader(self, key: str) -> bool:
-        return True
 
 
 def run(

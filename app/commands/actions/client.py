@@ -11,7 +11,8 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.commands.actions.goal import Goal
-from app.commands.service_calls import BRIDGE_LOSS_DELAY_S, QueryClient
+from app.commands.service_calls import BRIDGE_LOSS_DELAY_S
+from app.commands.transport import Transport
 from app.errors import DecodeError
 from app.i18n import Text, joined, number, say
 from app.interfaces import Fields, Interfaces
@@ -36,11 +37,11 @@ class ActionClient:
     """The action services of one robot. Methods that send raise LinkError if the request could not be
     sent; methods that read a reply return None if it is not readable."""
 
-    def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, transport: Transport) -> None:
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._link = link
+        self._transport = transport
 
     def is_offered(self, widget: Action) -> bool:
         """Whether the robot offers a widget's action with the same type."""
@@ -70,7 +71,7 @@ class ActionClient:
 
     def _query(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
         key = of_action(self._robot.key(widget.action), service)
-        return self._link.query(key, payload, timeout_s)
+        return self._transport.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
         """The reply; None at a timeout, or if the bridge was lost in the meantime."""

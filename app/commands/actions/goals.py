@@ -14,7 +14,8 @@ from app.clock import format_time
 from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
 from app.commands.actions.results import ResultWaiter
-from app.commands.service_calls import MAX_UNANSWERED, QueryClient
+from app.commands.service_calls import MAX_UNANSWERED
+from app.commands.transport import Transport
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
@@ -32,13 +33,17 @@ class GoalTracker:
     """The goals of one robot. Used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: RobotState, link: QueryClient, changed: Callable[[], None]
+        self,
+        interfaces: Interfaces,
+        robot: RobotState,
+        transport: Transport,
+        changed: Callable[[], None],
     ) -> None:
         """`changed` is called when the status of a command has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._changed = changed
-        self._services = ActionClient(interfaces, robot, link)
+        self._services = ActionClient(interfaces, robot, transport)
         self._results = ResultWaiter(
             self._services, robot, cut=self._cut_off, restored=self._advanced, finished=self._finish
         )

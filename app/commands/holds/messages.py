@@ -2,8 +2,9 @@
 The server fills in a deadline and a counter if the panel file names fields for them."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
+from app.commands.transport import Transport
 from app.errors import LinkError
 from app.i18n import TextLike, say
 from app.interfaces import INTEGER_RANGES, Interfaces
@@ -15,12 +16,6 @@ from app.robot.state import RobotState
 
 Values = Mapping[str, Any]  # input values by input id, from the beginning of the hold
 Checked = Callable[[Iterable[str], Values], dict[str, Any]]
-
-
-class Transport(Protocol):
-    """The part of the Zenoh session that holds need."""
-
-    def put(self, key: str, payload: bytes) -> None: ...
 
 
 class HoldMessages:

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-from app.commands.service_calls import QueryClient
+from app.commands.transport import Transport
 from app.errors import LinkError
 from app.interfaces import Interfaces
 from app.panel.widgets.parameter import DESCRIBE, GET
@@ -26,10 +26,10 @@ class NoResponse(Exception):
 class ParameterClient:
     """The parameter services of one robot's nodes. One request per caller at a time."""
 
-    def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, transport: Transport) -> None:
         self._interfaces = interfaces
         self._robot = robot
-        self._link = link
+        self._transport = transport
 
     async def read(
         self, node: str, names: Sequence[str], silent: Callable[[], None]
@@ -55,7 +55,7 @@ class ParameterClient:
         payload = self._interfaces.encode(request, {"names": list(names)})
         key = self._robot.key(f"{node}/{service[0]}")
         try:
-            query = self._link.query(key, payload, ANSWER_S + LATE_S)
+            query = self._transport.query(key, payload, ANSWER_S + LATE_S)
         except LinkError as error:
             silent()
             raise NoResponse(str(error), dropped=True) from error

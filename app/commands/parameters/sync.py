@@ -18,7 +18,8 @@ from app.commands.parameters.known import KnownParameters
 from app.commands.parameters.node import Node, within
 from app.commands.parameters.setting import set_request
 from app.commands.parameters.values import check_value
-from app.commands.service_calls import QueryClient, ServiceCalls
+from app.commands.service_calls import ServiceCalls
+from app.commands.transport import Transport
 from app.concurrency import spawn_logged
 from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
@@ -51,7 +52,7 @@ class ParameterSync:
         panel: Panel,
         interfaces: Interfaces,
         robot: RobotState,
-        link: QueryClient,
+        transport: Transport,
         calls: ServiceCalls,
         changed: Callable[[], None],
     ) -> None:
@@ -59,7 +60,7 @@ class ParameterSync:
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._services = ParameterClient(interfaces, robot, link)
+        self._services = ParameterClient(interfaces, robot, transport)
         self._calls = calls
         self._changed = changed
         self._known = KnownParameters(robot, self._log)

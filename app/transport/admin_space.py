@@ -1,0 +1,17 @@
+"""The protocols of a link by which the admin space and the ROS graph are queried."""
+
+from typing import Protocol
+
+
+class AdminSpace(Protocol):
+    """The part of the Zenoh session that queries of the admin space need."""
+
+    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]:
+        """(key, payload) of each answer that arrives in time. LinkError without a link."""
+
+
+class GraphLink(AdminSpace, Protocol):
+    """The part of the Zenoh session that reading the ROS graph needs."""
+
+    async def tokens(self, timeout_s: float = ...) -> list[str]:
+        """The liveliness tokens. LinkError without a link, or if not all arrive in time."""
