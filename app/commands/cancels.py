@@ -2,16 +2,18 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 
 from app.audit import Origin
 from app.audit.press_record import PressLog
 from app.clock import format_time
-from app.commands.dispatch import Dispatcher
+from app.commands.actions.goals import GoalTracker
 from app.commands.receipts import Receipt, close_entry, origin_text, receipt_of
 from app.commands.refusals import EarlyRefusals
 from app.concurrency import CancellableWaits
 from app.errors import Cause, LinkError, NotFound
 from app.i18n import say
+from app.panel.widgets.families import PressCommand
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import Outcome
 from app.ros_logging import RobotLog
@@ -22,13 +24,16 @@ class Cancels:
 
     def __init__(
         self,
-        dispatcher: Dispatcher,
+        widget_of: Callable[[str], PressCommand],
+        goals: GoalTracker,
         press_log: PressLog,
         early_refusals: EarlyRefusals,
         waits: CancellableWaits,
         log: RobotLog,
     ) -> None:
-        self._dispatcher = dispatcher
+        """`widget_of` returns the command widget with an id; NotFound for every other id."""
+        self._widget_of = widget_of
+        self._goals = goals
         self._press_log = press_log
         self._early_refusals = early_refusals
         self._waits = waits
@@ -36,10 +41,10 @@ class Cancels:
 
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
         """Asks the robot to cancel the goal of a press; without a press id, the running goal."""
-        widget = self._dispatcher.widget(widget_id)
+        widget = self._widget_of(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        if (why := self._dispatcher.no_goal_reason(widget, press_id)) and not self._press_log.has_room(
+        if (why := self._goals.no_goal_reason(widget, press_id)) and not self._press_log.has_room(
             origin
         ):
             answer = Outcome("refused", why)
@@ -63,7 +68,7 @@ class Cancels:
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:
             async with self._waits.cancellable():
-                answer = await self._dispatcher.cancel(widget, press_id)
+                answer = await self._goals.cancel(widget, press_id)
         except TimeoutError:
             return Outcome("unknown", say("server_ends")), ""
         except LinkError as error:

@@ -76,7 +76,7 @@ class Dispatcher:
         self._robot = robot
         self._transport = transport
         self._calls = trackers.calls
-        self._actions = trackers.actions
+        self.actions = trackers.actions
         self._confirmations = trackers.confirmations
         self._parameters = trackers.parameters
         self._monotonic = monotonic
@@ -90,7 +90,7 @@ class Dispatcher:
         self.refusals: Mapping[type[Any], Callable[[Any, dict[str, Any]], TextLike]] = {
             PublishPress: self._check_message,
             Call: self._check_call,
-            Action: lambda widget, _: self._actions.full(widget.action),
+            Action: lambda widget, _: self.actions.full(widget.action),
             Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
@@ -190,7 +190,7 @@ class Dispatcher:
         return self._calls.full(widget.service)
 
     async def _start(self, widget: Action, going: Outgoing) -> Outcome:
-        return await self._actions.start(
+        return await self.actions.start(
             widget, going.fields, going.press_id, going.correct, going.entry, going.final_check
         )
 
@@ -229,11 +229,3 @@ class Dispatcher:
                 raise InputError(f'the input "{name}" is missing')
             values[name] = find_row(self.checks, field)(field, inputs[name])
         return values
-
-    def no_goal_reason(self, widget: Action, press_id: str) -> TextLike:
-        """Why there is no goal to cancel, "" if there is one."""
-        return self._actions.no_goal_reason(widget, press_id)
-
-    async def cancel(self, widget: Action, press_id: str) -> Outcome:
-        """Asks the robot to cancel the goal of a press; without a press id, the running goal."""
-        return await self._actions.cancel(widget, press_id)

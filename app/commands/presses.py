@@ -79,7 +79,14 @@ class Presses:
         self._waits = CancellableWaits()
         self.early_refusals = EarlyRefusals(judge, dispatcher, press_log, self._receipts, self._log)
         self._repeated = RepeatedPresses(dispatcher, self.early_refusals, self._log)
-        self._cancels = Cancels(dispatcher, press_log, self.early_refusals, self._waits, self._log)
+        self._cancels = Cancels(
+            dispatcher.widget,
+            dispatcher.actions,
+            press_log,
+            self.early_refusals,
+            self._waits,
+            self._log,
+        )
 
     def close(self) -> None:
         """Refuses every press from now on. Goals can still be canceled."""
