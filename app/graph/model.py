@@ -12,7 +12,6 @@ from typing import Any, Final, Literal, Protocol, TypeVar
 
 from app.interfaces.names import key_of
 
-FAST_DDS: Final = "Fast DDS"
 CYCLONE_DDS: Final = "Cyclone DDS"
 CALLABLE: Final = ("", CYCLONE_DDS)  # of a server; "": its DDS is not known
 NEAR_MOST: Final = 3

@@ -1,11 +1,12 @@
-"""A link that only looks: the ROS graph behind the bridges, calls that read, topics as they come.
+"""A link that only reads: the ROS graph behind the bridges, service calls, topics. It publishes
+nothing.
 
-For commands that run beside the panel's server or without one. It publishes nothing.
+For commands that run beside the panel server or without one.
 """
 
 import asyncio
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import suppress
 from typing import Final
 
 from app.dialect.bridge_dialect import BridgeDialect
@@ -28,7 +29,6 @@ class BridgeObserver:
     def __init__(self, config: Config) -> None:
         self._loop = asyncio.get_running_loop()
         self._woken = asyncio.Event()
-        self._link_up = False
         self._dialect = BridgeDialect()
         self._session = ZenohSession(config, self._wake, self._dialect)
 
@@ -39,17 +39,17 @@ class BridgeObserver:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it connects, such as "tcp/127.0.0.1:7447"."""
+        """The endpoints it connects to, such as "tcp/127.0.0.1:7447"."""
         return self._session.endpoints
 
     async def connect(self, within_s: float = CONNECT_S) -> None:
-        """Waits for a connection; LinkError that says where nothing answered."""
+        """Waits for a connection; LinkError names the endpoints without an answer."""
         if not await self._session.connected(within_s):
             where = ", ".join(self.endpoints) or "any place that was found by scouting"
             raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
 
     async def graph(self) -> RosGraph:
-        """The graph now; LinkError without a link. A graph without robots: no bridge is there."""
+        """The graph now; LinkError without a link. Without a bridge it has no robots."""
         return await first_graph(self._session, self.zid)
 
     async def call(self, key: str, payload: bytes, timeout_s: float = CALL_S) -> bytes | None:
@@ -62,11 +62,11 @@ class BridgeObserver:
     async def listen(
         self, topics: Sequence[OwnEndpoint], *, hold: bool = True
     ) -> AsyncIterator[tuple[str, Sample]]:
-        """(key, sample) of each sample of these topics, those which latched publishers have kept first.
-        Once per observer. LinkError when the connection is lost.
+        """(key, sample) of each sample of these topics, beginning with those that latched publishers
+        have kept. Call it once per observer. LinkError when the connection is lost.
 
-        `hold`: with tokens, by which the bridge keeps its routes and each sample comes once. Not for a
-        topic without a publisher: the token would fix the route's QoS for the publisher that comes.
+        `hold`: declares tokens, so that the bridge keeps its routes and each sample arrives once. Not
+        for a topic without a publisher: the token would fix the QoS of the route for a later publisher.
         """
         expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
         self._session.start(
@@ -93,14 +93,3 @@ class BridgeObserver:
         """On Zenoh's threads."""
         with suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._woken.set)
-
-
-@asynccontextmanager
-async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterator[BridgeObserver]:
-    """An observer that is connected, closed at the end."""
-    observer = BridgeObserver(config)
-    try:
-        await observer.connect(within_s)
-        yield observer
-    finally:
-        await observer.close()

@@ -1,8 +1,8 @@
 """The ROS graph, read through the real bridge without a server."""
 
 import asyncio
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,25 @@ from app.interfaces.names import Qos
 from app.interfaces.parsing import parse_definition
 from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
 from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
-from app.transport.bridge_observer import observing
-from app.transport.zenoh_config import config_to
+from app.transport.bridge_observer import CONNECT_S, BridgeObserver
+from app.transport.zenoh_config import Config, config_to
 from tests.support.cyclone import NODE, CycloneRobot
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, live, until
 
 GRIPPER = "gripper_msgs/msg/Gripper"
 INTERFACES = load_interfaces("kilted")
 BOOL = "std_msgs/msg/Bool"
+
+
+@asynccontextmanager
+async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterator[BridgeObserver]:
+    """A connected observer, closed at the end."""
+    observer = BridgeObserver(config)
+    try:
+        await observer.connect(within_s)
+        yield observer
+    finally:
+        await observer.close()
 
 
 def graph_at(endpoint: str) -> RosGraph:

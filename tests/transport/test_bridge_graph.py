@@ -5,11 +5,10 @@ from typing import Any
 
 import pytest
 
-from app.dialect.bridge_entities import DdsEntity, entity_of, node_place, qos_of, route_place
+from app.dialect.bridge_entities import entity_of
 from app.graph.model import EndpointQos, PeerEndpoint, RobotGraph
 from app.transport.bridge_graph import GraphAnswers, ros_graph
 
-HASH = "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9"
 FAST, CYCLONE = "010f78fdb176d54800000000000001c1", "01103b80c068b0dad3529cde000001c1"
 BOOL = "std_msgs::msg::dds_::Bool_"
 
@@ -40,37 +39,6 @@ def read(**more: Any) -> RobotGraph:
     return robot
 
 
-def parsed(**qos: Any) -> DdsEntity:
-    participant, role = qos.pop("participant", FAST), qos.pop("role", "writer")
-    found = entity_of(*entity("a", participant, role, "/on", **qos))
-    assert found is not None
-    return found
-
-
-def test_qos_and_type_of_a_dds_writer() -> None:
-    found = parsed(
-        reliability={"kind": "RELIABLE"},
-        durability={"kind": "TRANSIENT_LOCAL"},
-        history={"kind": "KEEP_LAST", "depth": 5},
-        user_data=list(f"typehash={HASH};".encode()),
-    )
-    assert (found.name, found.type, found.type_hash) == ("/on", "std_msgs/msg/Bool", HASH)
-    assert (found.reliable, found.transient_local, found.keep_all, found.depth) == (
-        True,
-        True,
-        False,
-        5,
-    )
-    assert found.vendor == "Fast DDS"
-
-
-@pytest.mark.parametrize(("role", "reliable"), [("writer", True), ("reader", False)])
-def test_what_is_left_out_is_the_default_of_dds(role: str, reliable: bool) -> None:
-    found = parsed(role=role)
-    assert (found.reliable, found.transient_local, found.depth) == (reliable, False, None)
-    assert parsed(participant=CYCLONE).depth == 1
-
-
 @pytest.mark.parametrize(
     ("key", "answer"),
     [
@@ -87,26 +55,6 @@ def test_what_is_no_topic_of_ros_is_left_out(key: str, answer: Any) -> None:
     assert (
         ros_graph(GraphAnswers(versions={"a": "v1"}, entities=[(key, answer)])).robots[0].topics == ()
     )
-
-
-def test_the_qos_in_a_token() -> None:
-    answer = qos_of(f"@/a/@ros2_lv/MP/on/t/:1:1:0,7:typehash={HASH};")
-    assert (answer.reliable, answer.transient_local, answer.depth, answer.type_hash) == (
-        True,
-        True,
-        7,
-        HASH,
-    )
-    assert qos_of("@/a/@ros2_lv/MS/on/t/:0:::").reliable is False
-    assert qos_of("@/a/@ros2_lv/MS/on/t/::::").reliable is None
-    assert qos_of("@/a/@ros2_lv/MS/on/t/K:1::1,:").keep_all
-    assert qos_of("nonsense").depth is None
-
-
-def test_malformed_places_are_none() -> None:
-    assert route_place("@/a/ros2/route/topic/in/x") is None
-    assert node_place(f"@/a/ros2/node/{FAST}/a node") is None
-    assert node_place(f"@/a/ros2/node/{FAST}/arm/driver") == ("a", FAST, "/arm/driver")
 
 
 def test_a_topic_with_its_endpoints_and_their_nodes() -> None:
