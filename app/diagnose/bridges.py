@@ -7,14 +7,14 @@ from typing import Any, Final
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
 from app.dialect.endpoint import DEMO_VERSION
-from app.graph.model import Bridge, RosGraph
+from app.graph.model import Bridge, GraphSnapshot
 
 TESTED: Final = "1.10.2"  # zenoh-plugin-ros2dds; see docs/compatibility.md
 MOST_NAMED: Final = 3
 
 
 def check_bridges(
-    report: Report, graph: RosGraph, behind: NamesBehindBridge, endpoints: Sequence[str]
+    report: Report, graph: GraphSnapshot, behind: NamesBehindBridge, endpoints: Sequence[str]
 ) -> bool:
     """Whether there is something to be said of the topics behind them."""
     robot = behind.robot

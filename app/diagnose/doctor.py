@@ -13,7 +13,7 @@ from app.diagnose.names import PanelRobot
 from app.diagnose.robot import LISTEN_S, check_connection, check_robot
 from app.diagnose.screen import DRM, check_screens
 from app.errors import PanelError
-from app.graph.model import RosGraph
+from app.graph.model import GraphSnapshot
 from app.i18n import ENGLISH
 from app.panel import Panel, load_panel
 from app.settings import Settings
@@ -49,7 +49,7 @@ class Diagnosis:
 
     report: Report = field(default_factory=Report)
     panel: Panel | None = None
-    graphs: dict[str, RosGraph] = field(default_factory=dict)
+    graphs: dict[str, GraphSnapshot] = field(default_factory=dict)
 
 
 async def diagnose(settings: Settings, options: Options) -> Diagnosis:

@@ -7,9 +7,9 @@ from typing import Literal
 from app.dialect.endpoint import within
 from app.graph.model import (
     BridgeRoute,
+    GraphSnapshot,
     Node,
     RobotGraph,
-    RosGraph,
     Server,
     Topic,
     TopicEndpoint,
@@ -54,7 +54,7 @@ class NamesBehindBridge:
     graphs: tuple[RobotGraph, ...]
 
     @classmethod
-    def of(cls, robot: PanelRobot, graph: RosGraph) -> "NamesBehindBridge":
+    def of(cls, robot: PanelRobot, graph: GraphSnapshot) -> "NamesBehindBridge":
         return cls(robot, tuple(one for one in graph.robots if within(robot.namespace, one.namespace)))
 
     def _places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:

@@ -16,7 +16,7 @@ from app.diagnose.permissions import check_permissions
 from app.diagnose.topics import TopicChecks
 from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError
-from app.graph.model import RosGraph
+from app.graph.model import GraphSnapshot
 from app.interfaces import load_interfaces
 from app.transport.bridge_graph_reader import first_graph, later_graph, silent
 from app.transport.zenoh_config import config_from
@@ -36,7 +36,7 @@ async def check_connection(
 
 async def check_robot(
     report: Report, robot: PanelRobot, zenoh: Path, listen_s: float = LISTEN_S
-) -> RosGraph | None:
+) -> GraphSnapshot | None:
     """Adds all findings of a robot to the report. Returns its graph, None without a link."""
     connect = robot.entry.connect if robot.entry else ()
     endpoints = await check_connection(report, robot.id, zenoh, connect)
@@ -58,7 +58,7 @@ async def check_robot(
 
 async def _inspect(
     report: Report, robot: PanelRobot, session: ZenohSession, endpoints: list[str], listen_s: float
-) -> RosGraph:
+) -> GraphSnapshot:
     """Observes the topics first, then reads the graph: what ended in the meantime is not in it."""
     interfaces = load_interfaces(robot.panel.distro, robot.panel.interfaces)
     before = await first_graph(session, session.zid)
@@ -78,12 +78,12 @@ async def _inspect(
     return graph
 
 
-async def _later(session: ZenohSession, before: RosGraph) -> RosGraph:
+async def _later(session: ZenohSession, before: GraphSnapshot) -> GraphSnapshot:
     """The graph now; empty if no bridge answers."""
     try:
         return await later_graph(session, session.zid, before)
     except LinkError:
-        return RosGraph()
+        return GraphSnapshot()
 
 
 def check_copies(report: Report, robot: PanelRobot, observed: Observation) -> None:
@@ -94,7 +94,7 @@ def check_copies(report: Report, robot: PanelRobot, observed: Observation) -> No
 
 
 async def _observe(
-    robot: PanelRobot, session: ZenohSession, graph: RosGraph, longest_s: float
+    robot: PanelRobot, session: ZenohSession, graph: GraphSnapshot, longest_s: float
 ) -> Observation:
     """Observes the panel's topics until interlocks that are not latched, or have a max_age_s, have been
     received often enough."""

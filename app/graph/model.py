@@ -192,7 +192,7 @@ Entry = TypeVar("Entry", bound=_Named)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotGraph:
-    """What is behind the bridges of one namespace; each list is sorted by name."""
+    """The part of a graph behind the bridges of one namespace. Each list is sorted by name."""
 
     namespace: str = ""
     bridges: tuple[Bridge, ...] = ()
@@ -220,10 +220,10 @@ class RobotGraph:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RosGraph:
-    """All robots that are reached by one link, by namespace. Bridges of one namespace are one robot's.
-    `peers` is what panels and tools hold in the graph, as far as the router reports it: to peers it
-    reports clients only. Who uses a route is in `BridgeRoute.remote`, of all of them."""
+class GraphSnapshot:
+    """The ROS graph of all robots on one link at one moment, by namespace. Bridges of one namespace are
+    one robot's. `peers` are the endpoints of panels and tools, as far as the router reports them: to
+    peers it reports only clients. `BridgeRoute.remote` has all peers that use a route."""
 
     robots: tuple[RobotGraph, ...] = ()
     peers: tuple[PeerEndpoint, ...] = ()

@@ -24,7 +24,7 @@ from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
-from app.robot.graph import Graph, cached_until_change
+from app.robot.graph import LiveGraph, cached_until_change
 from app.robot.parameter_state import (
     UNKNOWN,
     ParameterState,
@@ -270,7 +270,7 @@ def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict 
 
 @cached_until_change
 def _misfit(
-    graph: Graph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+    graph: LiveGraph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
 ) -> Verdict | None:
     if found := graph.mismatched_type(role, key, type_name):
         return locked("wrong_type", topic=topic, found=found, wanted=type_name)

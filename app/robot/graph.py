@@ -50,11 +50,11 @@ Result = TypeVar("Result")
 
 
 def cached_until_change(
-    query: Callable[["Graph", *Arguments], Result],
-) -> Callable[["Graph", *Arguments], Result]:
+    query: Callable[["LiveGraph", *Arguments], Result],
+) -> Callable[["LiveGraph", *Arguments], Result]:
     """Caches the results of a query until the graph changes: queries are far more frequent."""
 
-    def cached(graph: "Graph", *arguments: *Arguments) -> Result:
+    def cached(graph: "LiveGraph", *arguments: *Arguments) -> Result:
         key = (query, arguments)
         result: Result
         try:
@@ -67,9 +67,9 @@ def cached_until_change(
     return cached
 
 
-class Graph:
-    """The ROS graph behind all bridges. Changed on the event loop only, by `apply_token` and the
-    `update_…` methods."""
+class LiveGraph:
+    """The current ROS graph behind all bridges. Changed on the event loop only, by `apply_token` and
+    the `update_…` methods."""
 
     def __init__(
         self,

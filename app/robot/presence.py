@@ -6,7 +6,7 @@ from typing import Final
 
 from app.dialect.endpoint import Role
 from app.panel.model import Panel
-from app.robot.graph import Graph, cached_until_change
+from app.robot.graph import LiveGraph, cached_until_change
 
 RequiredEndpoint = tuple[Role, str]
 ROLE_ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
@@ -29,7 +29,7 @@ class EndpointPresence:
         self.required = needed
         self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
 
-    def update(self, graph: Graph) -> None:
+    def update(self, graph: LiveGraph) -> None:
         """Updates the presence; call it after every change of the graph."""
         for end, (role, key) in self.required.items():
             if bridges := graph.bridges_with(role, key):
@@ -40,22 +40,22 @@ class EndpointPresence:
         """Forgets all endpoints; call it when the link is lost."""
         self.last_bridges.clear()
 
-    def any_present(self, graph: Graph) -> bool:
+    def any_present(self, graph: LiveGraph) -> bool:
         """Whether any required endpoint exists."""
         return _any_present(graph, self)
 
-    def missing(self, graph: Graph) -> list[str]:
+    def missing(self, graph: LiveGraph) -> list[str]:
         """The ROS names of endpoints that have disappeared while their bridge is connected."""
         return _missing(graph, self)
 
 
 @cached_until_change
-def _any_present(graph: Graph, presence: EndpointPresence) -> bool:
+def _any_present(graph: LiveGraph, presence: EndpointPresence) -> bool:
     return any(graph.has_endpoint(role, key) for role, key in presence.required.values())
 
 
 @cached_until_change
-def _missing(graph: Graph, presence: EndpointPresence) -> list[str]:
+def _missing(graph: LiveGraph, presence: EndpointPresence) -> list[str]:
     return [
         end[1]
         for end, bridges in presence.last_bridges.items()

@@ -21,7 +21,7 @@ from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatus
-from app.robot.graph import Graph
+from app.robot.graph import LiveGraph
 from app.robot.history import History
 from app.robot.keyed_entries import KeyedEntries
 from app.robot.log_lines import LogLines
@@ -68,7 +68,7 @@ class RobotState:
         needed = list(required_endpoints(panel))
         named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
         self._required_keys = frozenset(map(self.key, named))
-        self.graph = Graph(dialect, own_zid, self._own_namespace, self._required_keys)
+        self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self._required_keys)
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.replayed = ReplayedMessages()
@@ -162,7 +162,7 @@ class RobotState:
         """The link was lost: the graph is empty, and no sample is valid."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = Graph(self.dialect, "", self._own_namespace, self._required_keys)
+        self.graph = LiveGraph(self.dialect, "", self._own_namespace, self._required_keys)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.replayed.begin_all()
         self.presence.clear()

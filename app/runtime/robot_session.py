@@ -238,6 +238,6 @@ class RobotSession:
     def renew(self) -> None:
         """Replaces the Zenoh session. Until the new one has joined, no endpoint is known."""
         self.robot.mark_link_lost()
-        self._turn.on_graph_change(came=False)
+        self._turn.on_graph_change(peer_appeared=False)
         self.show()
         self._renewal.begin()

@@ -14,10 +14,10 @@ from app.graph.model import (
     Bridge,
     BridgeRoute,
     EndpointQos,
+    GraphSnapshot,
     Node,
     PeerEndpoint,
     RobotGraph,
-    RosGraph,
     RouteDirection,
     RouteKind,
     Server,
@@ -42,7 +42,7 @@ class GraphAnswers:
     routes: Answers = field(default_factory=list)
 
 
-def ros_graph(answers: GraphAnswers) -> RosGraph:
+def ros_graph(answers: GraphAnswers) -> GraphSnapshot:
     """The graph that these answers describe."""
     parsed = [(token, one) for token in answers.tokens if (one := dialect.parsed(token)) is not None]
     zids = {one.zid for _, one in parsed if one.role is None} | answers.versions.keys()
@@ -68,7 +68,7 @@ def ros_graph(answers: GraphAnswers) -> RosGraph:
         _Robot(namespace, tuple(found), parsed, answers).graph()
         for namespace, found in sorted(by_namespace.items())
     ]
-    return RosGraph(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
+    return GraphSnapshot(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
 
 
 def _qos(of: DdsEntity | TokenQos) -> EndpointQos:

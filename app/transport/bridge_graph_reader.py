@@ -10,7 +10,7 @@ from typing import Final
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.errors import LinkError
-from app.graph.model import RosGraph
+from app.graph.model import GraphSnapshot
 from app.transport.admin_space import GraphLink
 from app.transport.bridge_graph import Answers, GraphAnswers, ros_graph
 
@@ -19,32 +19,32 @@ ANSWERED_WITHIN_S: Final = 5.0
 POLL_S: Final = 0.02
 
 
-async def first_graph(link: GraphLink, zid: str) -> RosGraph:
+async def first_graph(link: GraphLink, zid: str) -> GraphSnapshot:
     """`read_graph` in a new session, to which a router announces the bridges some time after it has
     connected. Without a bridge this takes `ANNOUNCED_WITHIN_S`."""
     return await _read_until(link, zid, lambda graph: bool(graph.bridges), ANNOUNCED_WITHIN_S)
 
 
-async def later_graph(link: GraphLink, zid: str, earlier: RosGraph) -> RosGraph:
+async def later_graph(link: GraphLink, zid: str, earlier: GraphSnapshot) -> GraphSnapshot:
     """`read_graph` once more: a bridge that answered earlier has `ANSWERED_WITHIN_S` to answer again
     with all that is still there, for on a busy machine it stops for seconds, and loses its link."""
 
-    def is_whole(graph: RosGraph) -> bool:
+    def is_whole(graph: GraphSnapshot) -> bool:
         return not silent(earlier, graph) and not _unannounced(earlier, graph)
 
     return await _read_until(link, zid, is_whole, ANSWERED_WITHIN_S)
 
 
-def silent(earlier: RosGraph, graph: RosGraph) -> list[str]:
+def silent(earlier: GraphSnapshot, graph: GraphSnapshot) -> list[str]:
     """The ids of the bridges that answered for the earlier graph and not for this one."""
     return sorted({one.zid for one in earlier.bridges if one.answers} - _answering(graph))
 
 
-def _answering(graph: RosGraph) -> set[str]:
+def _answering(graph: GraphSnapshot) -> set[str]:
     return {one.zid for one in graph.bridges if one.answers}
 
 
-def _unannounced(earlier: RosGraph, graph: RosGraph) -> set[str]:
+def _unannounced(earlier: GraphSnapshot, graph: GraphSnapshot) -> set[str]:
     """The keys of services and actions that were announced earlier, and are now only known to be
     offered by a node."""
     offered = {
@@ -56,13 +56,13 @@ def _unannounced(earlier: RosGraph, graph: RosGraph) -> set[str]:
     return (_servers(earlier) - _servers(graph)) & offered
 
 
-def _servers(graph: RosGraph) -> set[str]:
+def _servers(graph: GraphSnapshot) -> set[str]:
     return {one.key for robot in graph.robots for one in (*robot.services, *robot.actions)}
 
 
 async def _read_until(
-    link: GraphLink, zid: str, is_whole: Callable[[RosGraph], bool], within_s: float
-) -> RosGraph:
+    link: GraphLink, zid: str, is_whole: Callable[[GraphSnapshot], bool], within_s: float
+) -> GraphSnapshot:
     end = time.monotonic() + within_s
     while True:
         try:
@@ -75,7 +75,7 @@ async def _read_until(
         await asyncio.sleep(POLL_S)
 
 
-async def read_graph(link: GraphLink, zid: str) -> RosGraph:
+async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
     """The graph now; `zid` is that of the session that asks. LinkError without a link, and when the
     tokens do not come in time. A bridge that is known by its token and does not answer is in it,
     without a version."""

@@ -12,7 +12,7 @@ from typing import Final
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
-from app.graph.model import RosGraph
+from app.graph.model import GraphSnapshot
 from app.robot.sample import Sample
 from app.transport.bridge_graph_reader import first_graph
 from app.transport.declarations import Declarations
@@ -48,7 +48,7 @@ class BridgeObserver:
             where = ", ".join(self.endpoints) or "any place that was found by scouting"
             raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
 
-    async def graph(self) -> RosGraph:
+    async def graph(self) -> GraphSnapshot:
         """The graph now; LinkError without a link. Without a bridge it has no robots."""
         return await first_graph(self._session, self.zid)
 

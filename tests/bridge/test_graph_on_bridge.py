@@ -10,7 +10,7 @@ import pytest
 
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
-from app.graph.model import Node, RosGraph
+from app.graph.model import GraphSnapshot, Node
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import Definitions
@@ -39,8 +39,8 @@ async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterato
         await observer.close()
 
 
-def graph_at(endpoint: str) -> RosGraph:
-    async def read() -> RosGraph:
+def graph_at(endpoint: str) -> GraphSnapshot:
+    async def read() -> GraphSnapshot:
         async with observing(config_to(endpoint)) as observer:
             return await observer.graph()
 
@@ -48,9 +48,9 @@ def graph_at(endpoint: str) -> RosGraph:
 
 
 def until_graph(
-    endpoint: str, holds: Callable[[RosGraph], bool], why: str, within_s: float = ENOUGH_S
-) -> RosGraph:
-    found: list[RosGraph] = []
+    endpoint: str, holds: Callable[[GraphSnapshot], bool], why: str, within_s: float = ENOUGH_S
+) -> GraphSnapshot:
+    found: list[GraphSnapshot] = []
 
     def there() -> bool:
         found.append(graph_at(endpoint))
@@ -135,7 +135,7 @@ def test_a_bridge_with_a_namespace_is_a_robot_of_that_namespace(domain: int) -> 
     assert (speed.key, found.key("/speed")) == ("robot1/speed", "robot1/speed")
 
 
-def on_fast_dds(bridge: Bridge) -> tuple[RosNode, RosGraph]:
+def on_fast_dds(bridge: Bridge) -> tuple[RosNode, GraphSnapshot]:
     """A node on Fast DDS whose name the bridge knows. On a busy machine Cyclone DDS may get a type of
     Fast DDS out of order ("invalid type object"), and the name of that node never arrives: it starts
     again."""

@@ -23,8 +23,8 @@ from app.graph.model import (
     Bridge,
     BridgeRoute,
     EndpointQos,
+    GraphSnapshot,
     RobotGraph,
-    RosGraph,
     Server,
     Topic,
     TopicEndpoint,
@@ -53,7 +53,9 @@ def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> Topic:
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
     report = Report()
-    behind = NamesBehindBridge.of(robot, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
+    behind = NamesBehindBridge.of(
+        robot, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), **graph),))
+    )
     TopicChecks(report, behind, INTERFACES).check()
     return report
 
@@ -89,10 +91,12 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(readout("/words")))
     lost = replace(topic("/words"), announced=False)
     assert judged(here, topics=(lost,)).codes() == ["topic_unrouted"]
-    new = NamesBehindBridge.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
+    new = NamesBehindBridge.of(
+        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
+    )
     report, before = (
         Report(),
-        NamesBehindBridge.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,)),))),
+        NamesBehindBridge.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,)),))),
     )
     TopicChecks(report, new, INTERFACES, before).check()
     assert report.codes() == []
@@ -125,7 +129,7 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
     bridged = RobotGraph(namespace="/robot1", bridges=(BRIDGE,), topics=(topic("/words"),))
     other = RobotGraph(namespace="/robot2", bridges=(BRIDGE,), topics=(topic("/words", BOOL),))
     report = Report()
-    behind = NamesBehindBridge.of(robot(tmp_path, text), RosGraph(robots=(bridged, other)))
+    behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
     TopicChecks(report, behind, INTERFACES).check()
     assert report.codes() == []
 

@@ -8,7 +8,7 @@ import pytest
 from app.dialect.bridge_dialect import bridge_token, server_token, token
 from app.dialect.endpoint import DEMO_VERSION, TopicRole
 from app.interfaces.names import Qos
-from app.robot.graph import Graph, Route
+from app.robot.graph import LiveGraph, Route
 from tests.support.builders import BOOL, BRIDGE, DIALECT, KIOSK, TEXT
 
 OTHER_KIOSK = "c2"
@@ -20,59 +20,59 @@ def topic_token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos | 
 
 
 @pytest.fixture
-def graph() -> Graph:
+def graph() -> LiveGraph:
     """A graph with one bridge."""
-    made = Graph(DIALECT, KIOSK)
+    made = LiveGraph(DIALECT, KIOSK)
     made.apply_token(bridge_token(BRIDGE), True)
     return made
 
 
 def test_a_bridge_comes_and_goes() -> None:
-    graph = Graph(DIALECT, KIOSK)
+    graph = LiveGraph(DIALECT, KIOSK)
     assert graph.apply_token(bridge_token(BRIDGE), True) == BRIDGE
     assert graph.bridges == {BRIDGE}
     assert graph.apply_token(bridge_token(BRIDGE), False) == BRIDGE
     assert graph.bridges == frozenset()
 
 
-def test_a_topics_token_is_no_bridge(graph: Graph) -> None:
+def test_a_topics_token_is_no_bridge(graph: LiveGraph) -> None:
     assert graph.apply_token(topic_token("x", "MP", "a", BOOL), True) is None
     assert graph.bridges == {BRIDGE}
 
 
 def test_the_kiosks_own_tokens_do_not_count() -> None:
-    graph = Graph(DIALECT, KIOSK)
+    graph = LiveGraph(DIALECT, KIOSK)
     assert graph.apply_token(bridge_token(KIOSK), True) is None
     graph.apply_token(topic_token(KIOSK, "MP", "a", BOOL), True)
     assert graph.bridges == frozenset()
     assert graph.mismatched_type("MP", "a", TEXT) is None
 
 
-def test_what_is_no_token_changes_nothing(graph: Graph) -> None:
+def test_what_is_no_token_changes_nothing(graph: LiveGraph) -> None:
     assert graph.apply_token("@/b1/@ros2_lv/SS/add/x", True) is None
     assert graph.bridges == {BRIDGE}
 
 
 @pytest.mark.parametrize("role", ["MP", "MS"])
-def test_a_node_behind_a_bridge_is_on_the_robot(graph: Graph, role: TopicRole) -> None:
+def test_a_node_behind_a_bridge_is_on_the_robot(graph: LiveGraph, role: TopicRole) -> None:
     graph.apply_token(topic_token(BRIDGE, role, "a", BOOL), True)
     assert graph.has_endpoint(role, "a")
     assert not graph.has_endpoint(role, "b")
     assert not graph.has_endpoint("MS" if role == "MP" else "MP", "a")
 
 
-def test_a_node_that_ended_is_not_on_the_robot(graph: Graph) -> None:
+def test_a_node_that_ended_is_not_on_the_robot(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), False)
     assert not graph.has_endpoint("MP", "a")
 
 
-def test_another_kiosk_is_not_the_robot(graph: Graph) -> None:
+def test_another_kiosk_is_not_the_robot(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(OTHER_KIOSK, "MP", "a", BOOL), True)
     assert not graph.has_endpoint("MP", "a")
 
 
-def test_nodes_go_with_their_bridge(graph: Graph) -> None:
+def test_nodes_go_with_their_bridge(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
     graph.apply_token(bridge_token(BRIDGE), False)
     assert not graph.has_endpoint("MP", "a")
@@ -88,7 +88,7 @@ def test_nodes_go_with_their_bridge(graph: Graph) -> None:
     ],
 )
 def test_a_counterpart_of_another_type_is_reported(
-    graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
+    graph: LiveGraph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply_token(topic_token(zid, role, "a", TEXT), True)
     assert graph.mismatched_type(panel_role, "a", BOOL) == TEXT
@@ -106,19 +106,19 @@ def test_a_counterpart_of_another_type_is_reported(
     ],
 )
 def test_who_shares_no_route_with_the_panel_may_have_another_type(
-    graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
+    graph: LiveGraph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply_token(topic_token(zid, role, "a", TEXT), True)
     assert graph.mismatched_type(panel_role, "a", BOOL) is None
 
 
-def test_one_of_several_publishers_with_another_type_is_enough(graph: Graph) -> None:
+def test_one_of_several_publishers_with_another_type_is_enough(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), True)
     assert graph.mismatched_type("MS", "a", BOOL) == TEXT
 
 
-def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
+def test_a_type_is_right_again_when_the_wrong_one_ends(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), False)
     assert graph.mismatched_type("MS", "a", BOOL) is None
@@ -126,7 +126,7 @@ def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
 
 @pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
 def test_a_bridges_route_of_another_type_is_reported(
-    graph: Graph, role: TopicRole, direction: str
+    graph: LiveGraph, role: TopicRole, direction: str
 ) -> None:
     graph.update_routes([Route(BRIDGE, "pub" if direction == "pub" else "sub", "a", TEXT)])
     assert graph.mismatched_type(role, "a", BOOL) == TEXT
@@ -134,33 +134,33 @@ def test_a_bridges_route_of_another_type_is_reported(
     assert graph.mismatched_type("MP" if role == "MS" else "MS", "a", BOOL) is None
 
 
-def test_routes_of_a_bridge_that_went_do_not_count(graph: Graph) -> None:
+def test_routes_of_a_bridge_that_went_do_not_count(graph: LiveGraph) -> None:
     graph.update_routes([Route(BRIDGE, "pub", "a", TEXT)])
     graph.apply_token(bridge_token(BRIDGE), False)
     assert graph.mismatched_type("MS", "a", BOOL) is None
 
 
-def test_a_bridge_that_was_not_asked_is_not_silent(graph: Graph) -> None:
+def test_a_bridge_that_was_not_asked_is_not_silent(graph: LiveGraph) -> None:
     assert not graph.has_silent_bridge
 
 
-def test_a_bridge_that_does_not_answer_is_silent(graph: Graph) -> None:
+def test_a_bridge_that_does_not_answer_is_silent(graph: LiveGraph) -> None:
     graph.update_versions({})
     assert graph.has_silent_bridge
 
 
-def test_a_bridge_that_answers_is_not_silent(graph: Graph) -> None:
+def test_a_bridge_that_answers_is_not_silent(graph: LiveGraph) -> None:
     graph.update_versions({BRIDGE: '"1.10.0"', "router": '"1.10.0"'})
     assert not graph.has_silent_bridge
 
 
-def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: Graph) -> None:
+def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: LiveGraph) -> None:
     graph.apply_token(bridge_token("b2"), True)
     graph.update_versions({"b2": '"v1"'})
     assert graph.has_silent_bridge
 
 
-def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: Graph) -> None:
+def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: LiveGraph) -> None:
     graph.update_routes([Route(BRIDGE, "pub", "a", TEXT, has_reader=False)])
     assert not graph.is_unrouted("a")
     graph.apply_token(token(BRIDGE, "MP", "a", TEXT, Qos(), "RIHS01_0"), True)
@@ -169,18 +169,18 @@ def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: 
     assert not graph.is_unrouted("a")
 
 
-def test_an_answer_of_who_is_no_bridge_does_not_help(graph: Graph) -> None:
+def test_an_answer_of_who_is_no_bridge_does_not_help(graph: LiveGraph) -> None:
     graph.update_versions({"router": '"1.10.0"'})
     assert graph.has_silent_bridge
 
 
 def test_without_a_bridge_nothing_is_silent() -> None:
-    graph = Graph(DIALECT)
+    graph = LiveGraph(DIALECT)
     graph.update_versions({})
     assert not graph.has_silent_bridge
 
 
-def test_a_bridge_that_comes_back_is_asked_anew(graph: Graph) -> None:
+def test_a_bridge_that_comes_back_is_asked_anew(graph: LiveGraph) -> None:
     graph.update_versions({})
     graph.apply_token(bridge_token(BRIDGE), False)
     graph.apply_token(bridge_token(BRIDGE), True)
@@ -188,30 +188,30 @@ def test_a_bridge_that_comes_back_is_asked_anew(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize(("version", "simulated"), [(DEMO_VERSION, True), ('"1.10.0"', False)])
-def test_a_demo_robot_is_known_by_its_version(graph: Graph, version: str, simulated: bool) -> None:
+def test_a_demo_robot_is_known_by_its_version(graph: LiveGraph, version: str, simulated: bool) -> None:
     graph.update_versions({BRIDGE: version})
     assert graph.is_simulated is simulated
 
 
-def test_a_bridge_that_did_not_answer_is_not_taken_for_a_demo(graph: Graph) -> None:
+def test_a_bridge_that_did_not_answer_is_not_taken_for_a_demo(graph: LiveGraph) -> None:
     assert not graph.is_simulated
 
 
-def test_a_demo_robot_that_went_leaves_no_banner(graph: Graph) -> None:
+def test_a_demo_robot_that_went_leaves_no_banner(graph: LiveGraph) -> None:
     graph.update_versions({BRIDGE: DEMO_VERSION})
     graph.apply_token(bridge_token(BRIDGE), False)
     assert not graph.is_simulated
 
 
 @pytest.mark.parametrize("latched", [True, False])
-def test_a_publishers_durability_is_known(graph: Graph, latched: bool) -> None:
+def test_a_publishers_durability_is_known(graph: LiveGraph, latched: bool) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL, Qos(transient_local=latched)), True)
     assert graph.is_transient_local("a") is latched
 
 
 @pytest.mark.parametrize(("zid", "role"), [(BRIDGE, "MS"), (OTHER_KIOSK, "MP")])
 def test_who_is_no_publisher_of_the_robots_has_no_durability(
-    graph: Graph, zid: str, role: TopicRole
+    graph: LiveGraph, zid: str, role: TopicRole
 ) -> None:
     graph.apply_token(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
     assert graph.is_transient_local("a") is None
@@ -241,7 +241,7 @@ LATCHED = Qos(transient_local=True)
     ],
 )
 def test_a_qos_that_dds_would_not_match_is_reported(
-    graph: Graph, role: TopicRole, robots: Qos, panels: Qos, code: str | None
+    graph: LiveGraph, role: TopicRole, robots: Qos, panels: Qos, code: str | None
 ) -> None:
     theirs: TopicRole = "MP" if role == "MS" else "MS"
     graph.apply_token(topic_token(BRIDGE, theirs, "a", BOOL, robots), True)
@@ -251,7 +251,7 @@ def test_a_qos_that_dds_would_not_match_is_reported(
     assert graph.mismatched_qos(role, "a", panels) is None
 
 
-def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph: Graph) -> None:
+def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph: LiveGraph) -> None:
     for role in ("MP", "MS"):
         graph.apply_token(topic_token(BRIDGE, role, "a", BOOL), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL, BEST_EFFORT), True)
@@ -260,18 +260,18 @@ def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph
     assert graph.mismatched_qos("MP", "a", Qos()) is None
 
 
-def test_another_kiosks_qos_does_not_count(graph: Graph) -> None:
+def test_another_kiosks_qos_does_not_count(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(OTHER_KIOSK, "MP", "a", BOOL, BEST_EFFORT), True)
     assert graph.mismatched_qos("MS", "a", Qos()) is None
 
 
-def test_a_token_that_does_not_say_is_no_mismatch(graph: Graph) -> None:
+def test_a_token_that_does_not_say_is_no_mismatch(graph: LiveGraph) -> None:
     graph.apply_token(f"@/{BRIDGE}/@ros2_lv/MP/a/std_msgs§msg§Bool/:::,:", True)
     assert graph.mismatched_qos("MS", "a", Qos()) is None
 
 
 def test_a_robots_bridges_are_those_of_its_namespace() -> None:
-    graph = Graph(DIALECT, KIOSK, "/robot1")
+    graph = LiveGraph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
         graph.apply_token(bridge_token(zid), True)
     assert graph.bridges == {"b1", "b2", "b3"}  # none has reported its namespace yet
@@ -286,7 +286,7 @@ def test_a_robots_bridges_are_those_of_its_namespace() -> None:
 
 
 def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
-    graph = Graph(DIALECT, KIOSK, "/robot1")
+    graph = LiveGraph(DIALECT, KIOSK, "/robot1")
     graph.apply_token(bridge_token("b1"), True)
     graph.update_namespaces({"b1": "/robot1"})
     graph.apply_token(bridge_token("b2"), True)
@@ -296,12 +296,12 @@ def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
     assert graph.has_silent_bridge
 
 
-def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Graph) -> None:
+def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: LiveGraph) -> None:
     graph.update_namespaces({BRIDGE: "/robot7"})
     assert graph.bridges == {BRIDGE}
 
 
-def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
+def test_of_nodes_that_came_and_went_nothing_is_kept(graph: LiveGraph) -> None:
     def sizes() -> dict[str, int]:
         return {name: len(one) for name, one in vars(graph).items() if isinstance(one, Sized)}
 
@@ -315,7 +315,7 @@ def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
 
 def test_ten_thousand_nodes_that_the_panel_does_not_name_cost_next_to_nothing() -> None:
     """They come at once, when a bridge is joined that has them behind it."""
-    graph = Graph(DIALECT, KIOSK, keys=["a"])
+    graph = LiveGraph(DIALECT, KIOSK, keys=["a"])
     others = [topic_token(BRIDGE, "MP", f"some/topic{number}", TEXT) for number in range(10_000)]
     began = time.thread_time()
     for one in others:

@@ -170,7 +170,7 @@ def test_thousands_of_calls_leave_nothing_behind(kiosk: Server, robot: Robot) ->
     after, memory_after = rest(kiosk)
     assert after.pop("objects") - before.pop("objects") < STRAY_OBJECTS
     assert after.pop("Receipts._past_ids") - before.pop("Receipts._past_ids") == CALLS < PAST_IDS_KEPT
-    assert max(after.pop("Graph.cache"), before.pop("Graph.cache")) < MOST_KNOWN
+    assert max(after.pop("LiveGraph.cache"), before.pop("LiveGraph.cache")) < MOST_KNOWN
     assert abs(after.pop("tasks") - before.pop("tasks")) < PASSING_TASKS
     assert after == before
     assert before["Receipts._receipts"] == RECEIPTS_KEPT

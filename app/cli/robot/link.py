@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from app.cli.arguments import seconds
 from app.errors import KioskError, LinkError
-from app.graph.model import RobotGraph, RosGraph, Topic, near
+from app.graph.model import GraphSnapshot, RobotGraph, Topic, near
 from app.interfaces import DISTROS
 from app.interfaces.names import NAMESPACE
 from app.panel import load_panel
@@ -122,7 +122,7 @@ def _is_elsewhere(endpoint: str) -> bool:
 
 
 @asynccontextmanager
-async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, RosGraph]]:
+async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, GraphSnapshot]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
     observer = BridgeObserver(config_from(place.zenoh, place.connect))
     try:
@@ -147,7 +147,7 @@ def full_name(robot: RobotGraph, name: str) -> str:
     return f"{robot.namespace}{name}"
 
 
-def shown_topics(graph: RosGraph, below: str) -> dict[str, tuple[RobotGraph, Topic]]:
+def shown_topics(graph: GraphSnapshot, below: str) -> dict[str, tuple[RobotGraph, Topic]]:
     """The topics below a namespace, by their names without it."""
     return {
         name.removeprefix(below): (robot, topic)
@@ -157,7 +157,7 @@ def shown_topics(graph: RosGraph, below: str) -> dict[str, tuple[RobotGraph, Top
     }
 
 
-def check_namespace(graph: RosGraph, below: str) -> None:
+def check_namespace(graph: GraphSnapshot, below: str) -> None:
     """LinkError if no topic is below the namespace."""
     if below and not shown_topics(graph, below):
         robots = [robot.namespace for robot in graph.robots if robot.namespace]
@@ -165,7 +165,7 @@ def check_namespace(graph: RosGraph, below: str) -> None:
         raise LinkError(f"there are no topics below {below}{hint}")
 
 
-def topic_named(graph: RosGraph, below: str, given: str) -> tuple[RobotGraph, Topic]:
+def topic_named(graph: GraphSnapshot, below: str, given: str) -> tuple[RobotGraph, Topic]:
     """The topic of this name; LinkError with similar names."""
     check_namespace(graph, below)
     known = shown_topics(graph, below)

@@ -15,7 +15,7 @@ from app.cli.robot.link import Place, add_options, check_namespace, ended, opene
 from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey
 from app.errors import KioskError, PanelError
-from app.graph.model import RobotGraph, RosGraph
+from app.graph.model import GraphSnapshot, RobotGraph
 from app.interfaces import load_interfaces
 from app.panel import check_panel
 from app.scaffold.draft import make_draft
@@ -75,7 +75,7 @@ def _nothing_there(robot: RobotGraph, namespace: str) -> str:
     )
 
 
-def _base(place: Place, graph: RosGraph, namespace: str, target: Path | None) -> Draft:
+def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | None) -> Draft:
     """All but the pages. Several robots, and a place that is not that of zenoh.json5, are entries."""
     others = [one.namespace for one in graph.robots if one.topics] if not place.namespace else []
     names = others if len(others) > 1 else [namespace]

@@ -7,22 +7,22 @@ import asyncio
 from typing import Final, Protocol
 
 from app.diagnose.bridges import denies
-from app.graph.model import RobotGraph, RosGraph, Topic
+from app.graph.model import GraphSnapshot, RobotGraph, Topic
 
 SETTLES_WITHIN_S: Final = 5.0
 READ_EVERY_S: Final = 0.5
 
 
 class GraphReader(Protocol):
-    async def graph(self) -> RosGraph: ...
+    async def graph(self) -> GraphSnapshot: ...
 
 
 async def settled_graph(
     reader: GraphReader,
-    first: RosGraph,
+    first: GraphSnapshot,
     within_s: float = SETTLES_WITHIN_S,
     every_s: float = READ_EVERY_S,
-) -> RosGraph:
+) -> GraphSnapshot:
     """The graph once it has topics, has the same ones twice, and the bridge passes on all that its
     `allow` and `deny` let through; the last one read after `within_s`."""
     clock = asyncio.get_running_loop().time
@@ -40,7 +40,7 @@ async def settled_graph(
     return now
 
 
-def _topics(graph: RosGraph) -> set[str]:
+def _topics(graph: GraphSnapshot) -> set[str]:
     return {topic.key for robot in graph.robots for topic in robot.topics}
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from app.cli.robot.topic_reader import endpoint_for
 from app.errors import DecodeError
-from app.graph.model import RobotGraph, RosGraph, Server, Topic
+from app.graph.model import GraphSnapshot, RobotGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces
 from app.scaffold.displays import JOINTS
@@ -22,7 +22,7 @@ IRREGULAR: Final = 3.0  # the longest period of a regular topic, in its shortest
 JITTER_S: Final = 0.2
 
 
-def robot_at(graph: RosGraph, namespace: str) -> tuple[RobotGraph, str]:
+def robot_at(graph: GraphSnapshot, namespace: str) -> tuple[RobotGraph, str]:
     """The robot that the pages are made of, and the part of a namespace that is below its bridge's."""
     for robot in sorted(graph.robots, key=lambda one: -len(one.namespace)):
         if f"{namespace}/".startswith(f"{robot.namespace}/") and (namespace or not robot.namespace):

@@ -8,7 +8,7 @@ from typing import Any, Final
 from app.cli.robot.link import Place, topic_named
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import InterfaceError, LinkError
-from app.graph.model import RobotGraph, RosGraph, Topic
+from app.graph.model import GraphSnapshot, RobotGraph, Topic
 from app.graph.node_services import NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import attribute_name
@@ -39,7 +39,12 @@ class TopicReader:
 
     @classmethod
     def find(
-        cls, observer: BridgeObserver, graph: RosGraph, place: Place, name: str, type_name: str = ""
+        cls,
+        observer: BridgeObserver,
+        graph: GraphSnapshot,
+        place: Place,
+        name: str,
+        type_name: str = "",
     ) -> "TopicReader":
         """LinkError for a topic that is not there or not passed on, and for one of several types."""
         robot, topic = topic_named(graph, place.namespace, name)

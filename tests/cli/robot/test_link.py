@@ -11,7 +11,7 @@ from app.cli.robot.hz import Rate
 from app.cli.robot.link import Place, add_options, place_of, topic_named
 from app.cli.robot.topic_reader import TopicReader
 from app.errors import LinkError, PanelError
-from app.graph.model import Bridge, EndpointQos, RobotGraph, RosGraph, Topic, TopicEndpoint
+from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 
 BOOL = "std_msgs/msg/Bool"
 
@@ -21,8 +21,8 @@ def topic(name: str, *types: str, **more: Any) -> Topic:
     return Topic(name=name, key=name[1:], publishers=tuple(publishers), **more)
 
 
-def graph_of(*robots: tuple[str, Sequence[Topic]]) -> RosGraph:
-    return RosGraph(
+def graph_of(*robots: tuple[str, Sequence[Topic]]) -> GraphSnapshot:
+    return GraphSnapshot(
         robots=tuple(
             RobotGraph(
                 namespace=namespace,
@@ -49,7 +49,7 @@ TWO = graph_of(("/r1", [topic("/speed")]), ("/r2", [topic("/speed"), topic("/loa
     ],
 )
 def test_a_topic_is_found_by_its_name(
-    graph: RosGraph, below: str, given: str, robot: str, name: str
+    graph: GraphSnapshot, below: str, given: str, robot: str, name: str
 ) -> None:
     found, one = topic_named(graph, below, given)
     assert (found.namespace, one.name) == (robot, name)
@@ -67,7 +67,7 @@ def test_a_topic_is_found_by_its_name(
     ],
 )
 def test_a_topic_that_is_not_there_is_a_sentence(
-    graph: RosGraph, below: str, given: str, sentence: str
+    graph: GraphSnapshot, below: str, given: str, sentence: str
 ) -> None:
     with pytest.raises(LinkError) as caught:
         topic_named(graph, below, given)

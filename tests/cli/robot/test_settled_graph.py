@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.cli.robot.settled_graph import settled_graph
-from app.graph.model import Bridge, EndpointQos, RobotGraph, RosGraph, Topic, TopicEndpoint
+from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 
 LONG_S = 60.0
 
@@ -15,11 +15,11 @@ LONG_S = 60.0
 class Reader:
     """Gives one graph after the other, then the last one again and again."""
 
-    def __init__(self, graphs: Sequence[RosGraph]) -> None:
+    def __init__(self, graphs: Sequence[GraphSnapshot]) -> None:
         self._graphs = list(graphs)
         self.read = 0
 
-    async def graph(self) -> RosGraph:
+    async def graph(self) -> GraphSnapshot:
         self.read += 1
         return self._graphs.pop(0) if len(self._graphs) > 1 else self._graphs[0]
 
@@ -29,12 +29,12 @@ def topic(name: str, announced: bool = True) -> Topic:
     return Topic(name=name, key=name.strip("/"), publishers=(end,), announced=announced)
 
 
-def graph_of(*topics: Topic, **config: Any) -> RosGraph:
+def graph_of(*topics: Topic, **config: Any) -> GraphSnapshot:
     bridge = Bridge(zid="b", version="1.10.2", config=config)
-    return RosGraph(robots=(RobotGraph(bridges=(bridge,), topics=topics),))
+    return GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), topics=topics),))
 
 
-def settled(*graphs: RosGraph, within_s: float = LONG_S) -> tuple[RosGraph, int]:
+def settled(*graphs: GraphSnapshot, within_s: float = LONG_S) -> tuple[GraphSnapshot, int]:
     """The graph, and how often it was read."""
     reader = Reader(graphs[1:] or graphs)
     found = asyncio.run(settled_graph(reader, graphs[0], within_s, every_s=0.001))
@@ -58,7 +58,7 @@ def test_a_graph_that_is_whole_is_read_once_more() -> None:
     ],
     ids=["no topic", "another topic comes", "none is passed on yet", "one is not passed on yet"],
 )
-def test_what_is_still_to_come_is_waited_for(early: RosGraph) -> None:
+def test_what_is_still_to_come_is_waited_for(early: GraphSnapshot) -> None:
     assert settled(early, WHOLE)[0] == WHOLE
 
 
