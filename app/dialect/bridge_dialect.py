@@ -50,19 +50,20 @@ def server_token(zid: str, role: ServerRole, key: str, type_name: str) -> str:
 
 
 def action_client_token(zid: str, key: str, type_name: str) -> str:
-    """Keeps the bridge's route of an action for as long as it is held: feedback comes once."""
+    """The token of an action client. While it is held, the bridge keeps the route of the action, so
+    that feedback arrives once."""
     if not TOPIC.fullmatch("/" + key) or not ACTION_TYPE.fullmatch(type_name):
         raise ValueError(f'"{key}" with type "{type_name}" can not be a token')
     return f"@/{zid}/@ros2_lv/AC/{_escaped(key)}/{_escaped(type_name)}"
 
 
 def bridge_token(zid: str) -> str:
-    """The token by which a bridge says that it is there."""
+    """The token of a bridge itself."""
     return f"@/{zid}/@ros2_lv"
 
 
 def parsed(token_key: str) -> Endpoint | None:
-    """What a token shows; None for clients and for what is not a token."""
+    """The endpoint of a token; None for clients and for what is not a token."""
     found = _TOKEN.fullmatch(token_key)
     if found is None:
         return None
@@ -81,17 +82,17 @@ def parsed(token_key: str) -> Endpoint | None:
 
 
 def version(zid: str) -> str:
-    """Where one bridge answers for `VERSION`."""
+    """The key expression of one bridge's `VERSION`."""
     return f"@/{zid}/ros2/version"
 
 
 def config(zid: str) -> str:
-    """Where one bridge answers for `CONFIG`."""
+    """The key expression of one bridge's `CONFIG`."""
     return f"@/{zid}/ros2/config"
 
 
 def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:
-    """The publishers and subscribers of one node, from what its bridge says of it (see `NODES`)."""
+    """The publishers and subscribers of one node, from its bridge's answer to `NODES`."""
     roles: tuple[tuple[TopicRole, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
     for role, name in roles:
         for topic in node[name]:
@@ -102,12 +103,12 @@ def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Ite
 
 
 def zid_of(admin_key: str) -> str:
-    """Whose admin space an answer came from."""
+    """The zid of the bridge that gave an answer."""
     return admin_key.split("/")[1]
 
 
 def route_of(admin_key: str) -> tuple[str, Direction, str] | None:
-    """(bridge, direction, topic key) of an answer from the admin space."""
+    """(zid, direction, topic key) of an answer to `ROUTES`."""
     found = _ROUTE.fullmatch(admin_key)
     if found is None:
         return None
@@ -120,7 +121,7 @@ class BridgeDialect:
     tokens: Final = TOKENS
 
     def topic(self, key: str, type_name: str) -> str:
-        """The bridge puts a topic on its own name."""
+        """The key: the bridge publishes a topic on its name."""
         return key
 
     def service(self, key: str, type_name: str) -> str:

@@ -1,4 +1,4 @@
-"""The seam between what the panel knows of a robot and how that is said in Zenoh."""
+"""The protocol of a dialect: how the names of a robot's ROS graph are written in Zenoh."""
 
 from collections.abc import Iterable
 from typing import Protocol
@@ -7,11 +7,11 @@ from app.dialect.endpoint import Endpoint, OwnEndpoint
 
 
 class Dialect(Protocol):
-    """How the ROS 2 names of a kind of robot become Zenoh key expressions, and its liveliness tokens
-    endpoints. Pure: it has no session and keeps nothing.
+    """Maps the ROS 2 names of a kind of robot to Zenoh key expressions, and its liveliness tokens to
+    endpoints. Pure functions, without a session or state.
 
-    A `key` is a ROS 2 name without its first slash (`interfaces.names.key_of`). By it the panel knows
-    topics, services and actions; only `transport/` has to do with key expressions.
+    A `key` is a ROS 2 name with its namespace, without the first slash (`interfaces.names.key_of`). The
+    panel knows topics, services and actions by it; only `transport/` uses key expressions.
     """
 
     @property
@@ -25,19 +25,19 @@ class Dialect(Protocol):
         """The key expression on which a service is queried."""
 
     def attachment(self, zid: str, expression: str, number: int, at_ns: int) -> bytes | None:
-        """What goes with a message or a query, beside its payload; None for nothing. `zid` is of the
-        session that sends it, `number` counts what this session sends on `expression`, from 1, and
-        `at_ns` is the time (nanoseconds since the epoch)."""
+        """The attachment of a message or a query; None for none. `zid` is the sending session's,
+        `number` counts what this session sends on `expression`, from 1, and `at_ns` is the time in
+        nanoseconds since the epoch."""
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
-        """The tokens that a session holds to be in the ROS graph with these endpoints."""
+        """The tokens by which a session has these endpoints in the ROS graph."""
 
     def endpoint(self, token: str) -> Endpoint | None:
-        """What a token shows; None for what the panel needs not know."""
+        """The endpoint of a token; None for one that the panel does not need."""
 
     def name_in(self, token: str) -> str:
-        """The name that a token is about, as `in_token` writes it; "" for a peer's own. It has to be
-        cheap: there may be ten thousand tokens of which the panel needs ten."""
+        """The name in a token, as `in_token` writes it; "" for a peer's own token. It has to be fast:
+        there may be ten thousand tokens of which the panel needs ten."""
 
     def in_token(self, key: str) -> str:
-        """How a token writes a key."""
+        """A key as it is written in a token."""

@@ -1,4 +1,4 @@
-"""A publisher, subscriber or server of a robot, as the graph knows it."""
+"""Endpoints of the ROS graph: publishers, subscribers, servers of a robot or of the panel."""
 
 from dataclasses import dataclass, field
 from typing import Final, Literal
@@ -16,8 +16,8 @@ DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its versi
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher, subscriber or server that a token shows, or with the role None the peer itself that
-    the robot is behind. `reliable` is None where the token does not say."""
+    """A publisher, subscriber or server of a token. The role None means the peer that the robot is
+    reached by. `reliable` is None if it is not in the token."""
 
     zid: str
     role: Role | None = None
@@ -29,8 +29,8 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class OwnEndpoint:
-    """A publisher, subscriber or action client of the panel's, as the ROS graph is to show it. An
-    action client has neither QoS nor hash."""
+    """A publisher, subscriber or action client of the panel in the ROS graph. An action client has
+    neither QoS nor hash."""
 
     role: OwnRole
     key: str

@@ -1,5 +1,5 @@
-"""The caches by which publishers that are TRANSIENT_LOCAL keep their last message for subscribers that
-come late. They are zenoh-ext's, the same in every dialect (source: zenoh-ext 1.10). No I/O."""
+"""The caches in which TRANSIENT_LOCAL publishers keep their last message for late subscribers. They are
+zenoh-ext's, the same in every dialect (source: zenoh-ext 1.10). No I/O."""
 
 from typing import Final
 
@@ -7,7 +7,8 @@ _CACHES: Final = "/@adv/pub/"
 
 
 def caches(expression: str) -> str:
-    """The tokens of the caches of a topic. Each answers to a query of its own name."""
+    """The key expression of the tokens of a topic's caches. A cache answers queries of its token's
+    name."""
     return f"{expression}{_CACHES}**"
 
 

@@ -29,7 +29,7 @@ SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
 SETTLE_MOST_S: Final = 2.0  # a press's receipt says if a subscriber is not matched by then
 ASK_EVERY_S: Final = 5.0
 ASK_AGAIN_S: Final = 0.5
-UNROUTED_ALLOWED: Final = 3  # queries in a row that find a subscribed topic without a route
+UNROUTED_ALLOWED: Final = 3  # queries in a row that find a topic which its bridge does not read
 
 
 class GraphMembership:
@@ -160,8 +160,8 @@ class GraphMembership:
                 self._context.changed()
 
     def _reopen_session(self) -> None:
-        """Opens a new session if a bridge has no route for a subscribed topic: it makes one for the new
-        session."""
+        """Opens a new session if a bridge does not read a subscribed topic: for a new session it
+        does."""
         subscribed = (self._robot.key(topic) for topic in self._panel.subscriptions())
         lost = [key for key in subscribed if self._robot.graph.is_unrouted(key)]
         self._unrouted = self._unrouted + 1 if lost else 0

@@ -1,4 +1,4 @@
-"""The answers to a Zenoh query, handed over to the event loop."""
+"""Receives the answers to a Zenoh query on the event loop."""
 
 import asyncio
 import time
@@ -12,7 +12,7 @@ Ask = Callable[["Callback[zenoh.Reply]"], None]  # queries with this handler of 
 
 
 async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]], bool]:
-    """(key, payload) of each answer that comes within `timeout_s`, and whether all had come by then."""
+    """(key, payload) of each answer that arrives within `timeout_s`, and whether these are all."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
     answers: list[tuple[str, bytes]] = []
@@ -39,7 +39,7 @@ async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]]
 
 
 def first_answer(ask: Ask) -> "asyncio.Future[bytes | None]":
-    """The payload of the first answer, or None when there is none."""
+    """The payload of the first answer, None if there is none."""
     loop = asyncio.get_running_loop()
     answered: asyncio.Future[bytes | None] = loop.create_future()
 
