@@ -45,19 +45,20 @@ class NodeParameter:
     step: float | None = None
 
 
-class Caller(Protocol):
-    """What is needed of the link: a service's response, or None for none in time."""
+class ServiceClient(Protocol):
+    """The part of a link that service calls need."""
 
-    async def call(self, key: str, payload: bytes, timeout_s: float = ...) -> bytes | None: ...
+    async def call(self, key: str, payload: bytes, timeout_s: float = ...) -> bytes | None:
+        """The response of a service; None without one in time."""
 
 
 class NodeServices:
     """Calls the services of one robot's nodes."""
 
-    def __init__(self, robot: RobotGraph, interfaces: Interfaces, caller: Caller) -> None:
+    def __init__(self, robot: RobotGraph, interfaces: Interfaces, client: ServiceClient) -> None:
         self._robot = robot
         self._interfaces = interfaces
-        self._caller = caller
+        self._client = client
         self._silent: set[str] = set()  # nodes that are not called again
 
     def has_parameters(self, node: Node) -> bool:
@@ -106,7 +107,7 @@ class NodeServices:
             request, response = self._interfaces.service_types(service[1])
             payload = self._interfaces.encode(request, fields)
             key = self._robot.key(f"{node}/{service[0]}")
-            answer = await self._caller.call(key, payload)
+            answer = await self._client.call(key, payload)
             if answer is not None:
                 return self._interfaces.decode_whole(response, answer)
         except (DecodeError, InterfaceError):

@@ -35,9 +35,9 @@ def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: ShutdownCallback) ->
     listened = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     if listened[signal.SIGHUP] is not signal.SIG_DFL:
         del listened[signal.SIGHUP]
-    hear = _ShutdownSequence(loop, end, listened).handle_signal
+    handler = _ShutdownSequence(loop, end, listened).handle_signal
     for number in listened:
-        signal.signal(number, hear)
+        signal.signal(number, handler)
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""Passes the lines of logs on to where they are kept."""
+"""Adds the samples of log topics to the robot's log lines."""
 
 from app.robot.log_lines import LogLines
 from app.robot.sample import Sample
@@ -16,5 +16,5 @@ class LogListener:
         return frozenset(self._lines)
 
     def record_sample(self, key: str, sample: Sample) -> None:
-        """A line came."""
+        """A line was received."""
         self._lines[key].add(sample.payload)

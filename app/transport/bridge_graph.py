@@ -1,4 +1,4 @@
-"""The ROS graph from what the bridges of a link answer: tokens, nodes, DDS entities, routes. Pure."""
+"""Builds the ROS graph from the bridges' answers: tokens, nodes, DDS entities, routes. Pure."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
@@ -31,7 +31,7 @@ HIDDEN = "/_action/"  # the topics and services that an action is made of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraphAnswers:
-    """All that the bridges of a link say of their graph."""
+    """The answers of all bridges of a link about their graph."""
 
     zid: str = ""  # of the session that asked
     tokens: Iterable[str] = ()
@@ -81,7 +81,7 @@ def _qos(of: DdsEntity | TokenQos) -> EndpointQos:
 
 
 class _Robot:
-    """The graph of one robot, put together from what its bridges say."""
+    """Builds the graph of one robot from its bridges' answers."""
 
     def __init__(
         self,
@@ -176,8 +176,8 @@ class _Robot:
         yield from (found[key] for key in sorted(found))
 
     def _serving(self, role: str, endpoint: Endpoint) -> dict[str, Any]:
-        """The nodes that serve it, and their DDS: of several, one that can't be called through the
-        bridge counts, as each of them gets the request."""
+        """The nodes that serve an endpoint, and their DDS. If there are several, one that can't be
+        called through the bridge counts, as each of them gets the request."""
         name = self._name(endpoint.key)
         nodes = [
             node

@@ -20,14 +20,14 @@ POLL_S: Final = 0.02
 
 
 async def first_graph(link: GraphLink, zid: str) -> GraphSnapshot:
-    """`read_graph` in a new session, to which a router announces the bridges some time after it has
-    connected. Without a bridge this takes `ANNOUNCED_WITHIN_S`."""
+    """`read_graph` in a new session: a router announces the bridges some time after the connection.
+    Without a bridge this takes `ANNOUNCED_WITHIN_S`."""
     return await _read_until(link, zid, lambda graph: bool(graph.bridges), ANNOUNCED_WITHIN_S)
 
 
 async def later_graph(link: GraphLink, zid: str, earlier: GraphSnapshot) -> GraphSnapshot:
-    """`read_graph` once more: a bridge that answered earlier has `ANSWERED_WITHIN_S` to answer again
-    with all that is still there, for on a busy machine it stops for seconds, and loses its link."""
+    """`read_graph` again. A bridge that answered earlier has `ANSWERED_WITHIN_S` to answer again and to
+    announce what it still has: on a busy machine it stalls for seconds and loses its link."""
 
     def is_whole(graph: GraphSnapshot) -> bool:
         return not silent(earlier, graph) and not _unannounced(earlier, graph)
@@ -76,9 +76,8 @@ async def _read_until(
 
 
 async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
-    """The graph now; `zid` is that of the session that asks. LinkError without a link, and when the
-    tokens do not come in time. A bridge that is known by its token and does not answer is in it,
-    without a version."""
+    """The graph now; `zid` is that of the querying session. LinkError without a link, or if the tokens
+    do not arrive in time. A bridge that has a token but does not answer has no version."""
     tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
         link.tokens(),
         link.ask(dialect.VERSION),

@@ -17,7 +17,7 @@ OWN: Final = logging.getLogger("kiosk")
 
 
 class Putter(Protocol):
-    """What is needed of the link."""
+    """The part of the Zenoh session that publishing needs."""
 
     def put(self, key: str, payload: bytes) -> None: ...
 
@@ -34,7 +34,7 @@ class Rosout:
         loop: asyncio.AbstractEventLoop,
         own: Callable[[bytes], None] = lambda _: None,
     ) -> None:
-        """`own` gets each line too."""
+        """`own` is called with each line too."""
         self._robot = robot
         self._interfaces = interfaces
         self._link = link
@@ -51,13 +51,13 @@ class Rosout:
         OWN.removeHandler(self._handler)
 
     def _publish(self, fields: Mapping[str, Any]) -> None:
-        """On whatever thread the record was written."""
+        """Called on the thread that wrote the record."""
         if self._robot.link_up and not self._stopped:
             payload = self._interfaces.encode(LOG_TYPE, fields)
             self._loop.call_soon_threadsafe(self._put, payload)
 
     def _put(self, payload: bytes) -> None:
-        with suppress(LinkError):  # a log that can't be sent must not become one more log
+        with suppress(LinkError):  # a record that can't be sent must not cause another one
             if not self._stopped:
                 self._own(payload)
                 self._link.put(self._robot.key(ROSOUT_TOPIC), payload)
