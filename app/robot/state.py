@@ -101,7 +101,8 @@ class RobotState:
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
         """(key, topic) of each topic that the panel subscribes to."""
         fields = panel.subscribed_fields()
-        lossless = {one.topic for one in (*panel.interlocks, *panel.confirmations())}
+        lossless = {one.topic for one in panel.interlocks}
+        lossless |= {one.topic for one in panel.confirmations()}
         for topic, type_name in panel.subscriptions().items():
             key = self.key(topic)
             made = Topic(
