@@ -25,7 +25,7 @@ UNKNOWN_TYPE: Final = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
-    """What is asked of this machine; tests give another one."""
+    """The checks of this machine. Tests replace them."""
 
     has_font: HasFont = has_font
     has_browser: HasBrowser = has_browser
@@ -35,7 +35,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """`host` and `port` are those of the server, `listen_s` is how long the robot is listened to."""
+    """`host` and `port` are those of the server, `listen_s` is how long topics are observed."""
 
     host: str = "127.0.0.1"
     port: int = 8000
@@ -45,7 +45,7 @@ class Options:
 
 @dataclass(slots=True)
 class Diagnosis:
-    """What was found. `graphs` are the robots' graphs by their ids, of those that could be reached."""
+    """The report of a diagnosis. `graphs` are the graphs of the robots that could be reached, by id."""
 
     report: Report = field(default_factory=Report)
     panel: Panel | None = None

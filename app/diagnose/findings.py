@@ -59,7 +59,7 @@ class Finding:
         return self._filled(KINDS[self.code].do)
 
     def _filled(self, sentence: str) -> str:
-        """What a robot or another program said is made printable."""
+        """The sentence with its details. Texts of robots and other programs are made printable."""
         return printable(sentence.format(about=self.about, **self.details))
 
     def as_json(self) -> dict[str, str]:
@@ -69,7 +69,7 @@ class Finding:
 
 @dataclass(slots=True)
 class Report:
-    """What was found, in order: `findings`, and `facts` that were found as they should be."""
+    """The results in order: `findings` are faults, `facts` are what is as it should be."""
 
     findings: list[Finding] = field(default_factory=list)
     facts: list[str] = field(default_factory=list)

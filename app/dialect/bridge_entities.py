@@ -1,4 +1,4 @@
-"""What a bridge's admin space says of DDS readers and writers, routes and nodes. Pure.
+"""DDS readers and writers, routes and nodes, from the answers of a bridge's admin space. Pure.
 
 Source: zenoh-plugin-ros2dds 1.10.2 (`@/<zid>/ros2/dds|route|node/…`), tried with nodes on Fast DDS and
 on Cyclone DDS.

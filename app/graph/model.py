@@ -172,8 +172,7 @@ class BridgeRoute:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeerEndpoint:
-    """What a peer that is no bridge, such as a panel, holds in the graph: with the role "MP" it
-    publishes, with "MS" it subscribes."""
+    """A publisher (role "MP") or subscriber ("MS") of a peer that is no bridge, such as a panel."""
 
     zid: str
     role: str

@@ -1,7 +1,7 @@
-"""What nodes describe by their own services: parameters, and the types that they use.
+"""Reads parameters and type descriptions from the services of nodes.
 
-A node is called only where its service can be called (`Server.can_be_called`): on another DDS than
-the bridge's a request is misread, and a node that never answers leaves it in the bridge for good.
+A node is called only if its service can be called (`Server.can_be_called`). On another DDS than the
+bridge's a request is misread, and a request without a response stays in the bridge forever.
 """
 
 from collections.abc import Mapping, Sequence

@@ -141,7 +141,7 @@ class FieldHistory:
         self._newest, self._gap = at, False
 
     def interrupt(self) -> None:
-        """What comes next does not continue what was before."""
+        """Marks a gap before the next value."""
         self._gap = True
 
     def forget_old(self, now: float) -> None:

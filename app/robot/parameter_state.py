@@ -34,7 +34,7 @@ UNLIMITED: Final = Range()
 
 @dataclass(frozen=True, slots=True)
 class ParameterState:
-    """What is known of a parameter; `robot_type` is its type on the robot.
+    """The known state of a parameter; `robot_type` is its type on the robot.
 
     `value` is None without a value; in the states `cut` and `silent` it is the last known one. `wall`
     (seconds since the epoch) is when it was received.

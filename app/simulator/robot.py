@@ -66,7 +66,7 @@ class Goal:
 
 
 def echoed(topic: str, text: str) -> str:
-    """What it says of a text that it heard."""
+    """The text that it publishes about a received one."""
     return f"{text} ({topic})"
 
 
@@ -99,7 +99,7 @@ class DemoRobot:
         return {"success": False, "message": "not while operation is forbidden"}
 
     def step(self, now: float) -> list[Message]:
-        """What it says on its topics at `now`, as (topic, fields)."""
+        """The messages that it publishes at `now`, as (topic, fields)."""
         if self._began is None:
             self._began = now
         self._now = now

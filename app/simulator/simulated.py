@@ -1,4 +1,4 @@
-"""What the Zenoh peer needs of a robot that it plays."""
+"""The protocol of a simulated robot that a Zenoh peer plays."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -42,4 +42,4 @@ class SimulatedRobot(Protocol):
         """The response to a request; None for what is no request."""
 
     def step(self, moment: Moment) -> Iterable[tuple[str, bytes]]:
-        """What it publishes now, as (topic, CDR)."""
+        """The messages that it publishes now, as (topic, CDR)."""

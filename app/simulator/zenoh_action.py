@@ -98,7 +98,7 @@ class PlayedAction:
             self._results.append((bytes(request.goal_id.uuid), query))
 
     def _publish_states(self) -> None:
-        """As an action server does whenever a goal has another state."""
+        """Publishes the status of all goals. Action servers do so at each change of a goal's state."""
         known = [
             {"goal_info": {"goal_id": {"uuid": goal_id}}, "status": status}
             for goal_id, status in self._states

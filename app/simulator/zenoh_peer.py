@@ -40,7 +40,7 @@ class Simulator:
         interfaces: Interfaces,
         failed: Callable[[KioskError], None] = lambda error: log.error("%s", error),
     ) -> None:
-        """`failed` is called when a robot ends with an error: then all stand still."""
+        """`failed` is called when a robot ends with an error: then all of them stop."""
         self._step_s = min(robot.step_s for robot in robots.values())
         self._failed = failed
         self._lock = threading.Lock()
@@ -64,7 +64,7 @@ class Simulator:
 
     @property
     def endpoint(self) -> str:
-        """Where it listens, with the port that the system chose for `ANY_PORT`."""
+        """The endpoint that it listens on, with the port that the system chose for `ANY_PORT`."""
         for reply in self._session.get(f"@/{self._session.zid()}/peer"):
             if reply.ok is not None:
                 return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])

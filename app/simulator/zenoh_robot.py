@@ -65,13 +65,13 @@ class PlayedRobot:
         return names.key_of(topic, self._namespace)
 
     def _publisher(self, topic: str, about: Topic) -> Any:
-        """What is TRANSIENT_LOCAL is kept for subscribers that come late."""
+        """A publisher; a TRANSIENT_LOCAL one keeps its last message for late subscribers."""
         if about.qos.transient_local:
             return latched(self._session, self._key(topic))
         return self._session.declare_publisher(self._key(topic))
 
     def _subscriber(self, topic: str) -> Any:
-        """What the robot itself publishes is no press."""
+        """A subscriber that ignores what the robot itself publishes."""
 
         def on_sample(sample: zenoh.Sample) -> None:
             with self._lock:

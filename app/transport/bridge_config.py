@@ -1,5 +1,5 @@
-"""A configuration of zenoh-bridge-ros2dds that lets through what a panel needs of one robot, and
-nothing else. Source of the keys: zenoh-plugin-ros2dds 1.10, `config.rs`, tried. No I/O.
+"""A configuration of zenoh-bridge-ros2dds that allows what a panel needs of one robot, and nothing
+else. Source of the keys: `config.rs` of zenoh-plugin-ros2dds 1.10, tested. No I/O.
 """
 
 import json
@@ -20,8 +20,8 @@ LISTED: Final = "publishers subscribers service_servers service_clients action_s
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BridgeOptions:
-    """What a panel file does not say. `prefixed`: the robot's nodes have the panel's namespace in their
-    own names; else the bridge adds it."""
+    """The settings of a bridge that are not in a panel file. `prefixed`: the robot's nodes have the
+    panel's namespace in their own names; else the bridge adds it."""
 
     domain: int = 0
     listen: Sequence[str] = LISTEN
@@ -30,7 +30,7 @@ class BridgeOptions:
 
 
 def allowed(panel: Panel) -> dict[str, list[str]]:
-    """What the bridge has to let through, as the robot's nodes have it: kind of endpoint → names."""
+    """The names that the bridge must allow, by kind of endpoint, as the robot's nodes have them."""
     servers = [w for w in panel.widgets() if isinstance(w, ServerCommand)]
     nodes = {widget.node for widget in panel.parameters()}
     services = {w.service for w in servers if isinstance(w, Call)}
@@ -47,7 +47,7 @@ def allowed(panel: Panel) -> dict[str, list[str]]:
 
 
 def timeouts(panel: Panel) -> tuple[dict[str, float], dict[str, float]]:
-    """Services and actions that the panel gives more time than the bridge by itself: name → seconds."""
+    """Services and actions with a longer timeout than the bridge's default, by name in seconds."""
     services: dict[str, float] = {}
     actions: dict[str, float] = {}
     for widget in panel.widgets():

@@ -1,4 +1,4 @@
-"""What is sent of a joystick's deflection: pure.
+"""Shapes a joystick's deflection for its messages: shape, dead zone, ramp. Pure.
 
 A deflection is (x, y), each from -1 to 1: x to the right, y to the front, as the finger is.
 """
@@ -14,14 +14,14 @@ CENTRE: Final[Deflection] = (0.0, 0.0)
 
 
 def moved(of: Joystick, before: Deflection, deflection: Deflection) -> Deflection:
-    """What the next message has of a deflection, when the last one had `before`."""
+    """The deflection in the next message, if `before` was in the last one."""
     x, y = shaped(of, deflection)
     step = of.period_s / of.ramp_s if of.ramp_s else math.inf
     return ramped(before[0], x, step), ramped(before[1], y, step)
 
 
 def shaped(of: Joystick, deflection: Deflection) -> Deflection:
-    """Within the shape, and without the dead zone: what is outside of it begins with zero."""
+    """The deflection limited to the shape. It is zero in the dead zone and begins with zero outside."""
     x, y = (max(-1.0, min(1.0, one)) for one in deflection)
     if of.shape == "square":
         return _beyond(x, of.dead_zone), _beyond(y, of.dead_zone)
@@ -33,7 +33,7 @@ def shaped(of: Joystick, deflection: Deflection) -> Deflection:
 
 
 def ramped(before: float, wanted: float, step: float) -> float:
-    """Faster by `step` at most; slower, and to a stop, at once."""
+    """The next value on the way to `wanted`: faster by `step` at most, slower at once."""
     if before * wanted <= 0:
         before = 0.0
     if abs(wanted) <= abs(before) + step:
