@@ -67,6 +67,7 @@ class SlowLog:
 
     def __init__(self, happened: list[str]) -> None:
         self._happened = happened
+        self.begun = asyncio.Semaphore(0)  # released by each write that begins
         self.written = asyncio.Event()
         self.fails = False
         self.not_on_disk = ""
@@ -78,6 +79,7 @@ class SlowLog:
 
     async def pressed(self, entry: Entry) -> Entry | None:
         self._happened.append("written")
+        self.begun.release()
         await self.written.wait()
         if self.fails:
             raise LogError(FULL)
@@ -114,6 +116,7 @@ class Bench(FakeTransport):
         self.happened = happened
         self.robot = robot_there(panel)
         self.queries: list[asyncio.Future[bytes | None]] = []
+        self.queried = asyncio.Semaphore(0)  # released by each query
         permits(self.robot)
         self.presses = presses_of(
             panel, self.robot, self, press_log=PressLog(log, "arm", lambda: "board-3")
@@ -127,6 +130,7 @@ class Bench(FakeTransport):
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         self.happened.append("sent")
         self.queries.append(asyncio.get_running_loop().create_future())
+        self.queried.release()
         return self.queries[-1]
 
     async def press(self, widget: str = "guarded", press_id: str = "p1", **inputs: Any) -> Receipt:
@@ -164,7 +168,7 @@ def real(
 def test_a_press_is_written_then_sent_then_on_the_disk_then_answered() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         task = asyncio.create_task(bench.press())
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
         assert bench.happened == ["written"]
         log.written.set()
         assert (await task).outcome == "published"
@@ -176,7 +180,7 @@ def test_a_press_is_written_then_sent_then_on_the_disk_then_answered() -> None:
 def test_a_lock_that_arrives_while_the_disk_is_busy_wins() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         task = asyncio.create_task(bench.press())
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
         permits(bench.robot, False)
         log.written.set()
         receipt = await task
@@ -220,7 +224,7 @@ def test_a_receipt_says_when_it_is_not_on_the_disk() -> None:
 def test_a_double_press_of_one_id_is_written_and_sent_once() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         both = [asyncio.create_task(bench.press()) for _ in range(2)]
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
         log.written.set()
         first, second = await asyncio.gather(*both)
         assert first is second
@@ -232,7 +236,8 @@ def test_a_double_press_of_one_id_is_written_and_sent_once() -> None:
 def test_two_presses_of_one_service_wait_for_the_disk_and_one_is_sent() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         both = [asyncio.create_task(bench.press("light", press_id=f"p{n}")) for n in range(2)]
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
+        await log.begun.acquire()
         log.written.set()
         outcomes = [receipt.outcome for receipt in await asyncio.gather(*both)]
         assert outcomes == ["timed_out", "refused"]
@@ -264,14 +269,16 @@ def test_a_cancel_does_not_wait_for_the_log() -> None:
         )
         log.written.set()
         press = asyncio.create_task(bench.press("count"))
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
+        await bench.queried.acquire()
         accepted = {"accepted": True, "stamp": {"sec": 0, "nanosec": 0}}
         bench.queries[0].set_result(INTERFACES.encode(types.send_goal_response, accepted))
         assert (await press).outcome == "accepted"
         log.written.clear()
         bench.happened.clear()
         cancel = asyncio.create_task(bench.presses.cancel("count", KIM))
-        await asyncio.sleep(0.02)
+        await log.begun.acquire()
+        await bench.queried.acquire()
         assert sorted(bench.happened) == ["sent", "written"]  # its entry is still being written
         assert not log.written.is_set()
         bench.queries[-1].set_result(None)
@@ -301,7 +308,7 @@ def test_a_press_that_is_given_up_while_it_waits_is_closed_as_unknown() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         log.written.set()
         task = asyncio.create_task(bench.press("light"))
-        await asyncio.sleep(0.02)
+        await bench.queried.acquire()
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         assert [(e.kind, e.outcome) for e in log.entries] == [("pressed", ""), ("closed", "unknown")]
