@@ -2,6 +2,7 @@
 
 import re
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.support.browser.pages import place
-from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, live
+from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, live, until
 from tests.support.servers import ready
 
 Keep = Callable[[Server], Server]
@@ -70,7 +71,7 @@ def test_a_killed_bridge_is_named_with_what_it_locks(
         # A page that lost its server for a moment shows since when it has it again.
         expect(said(page, link, "since")).to_have_text(SINCE if link == "server" else MOMENT)
     joined_at = said(page, "bridge", "since").text_content() or ""
-    page.wait_for_timeout(1100)  # so that the next state's second is another
+    until(lambda: time.strftime("%Y-%m-%d %H:%M:%S") > joined_at, "the next state's second is another")
     own_bridge.kill()
     expect(said(page, "bridge", "locks")).to_have_text("Locks Publish, Publish1, Publish2.")
     expect(said(page, "bridge", "reason")).to_contain_text(
@@ -135,7 +136,7 @@ def test_a_frozen_server_is_lost_since_its_last_heartbeat(
             expect(said(page, link, "text")).to_have_text("unknown")
             for what in ("since", "locks", "reason"):
                 expect(said(page, link, what)).to_have_text("")
-        page.wait_for_timeout(1100)
+        until(lambda: time.strftime("%H:%M:%S") != last_beat, "the next beat's second is another")
         mine.process.send(signal.SIGCONT)
         expect(said(page, "server", "text")).to_have_text("ok")
         expect(said(page, "server", "since")).not_to_have_text(last_beat)

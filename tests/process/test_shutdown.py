@@ -7,13 +7,11 @@ import signal
 from collections.abc import Iterator
 from contextlib import ExitStack
 from types import FrameType
-from typing import Final
 
 import pytest
 
 from app.process.shutdown import graceful_shutdown
 
-SOON_S: Final = 0.05
 INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
@@ -40,10 +38,12 @@ class EndingProcess:
 
     def __init__(self) -> None:
         self.ending, self.may_end = asyncio.Event(), asyncio.Event()
+        self.is_over = asyncio.Event()
 
     async def end(self) -> None:
         self.ending.set()
         await self.may_end.wait()
+        self.is_over.set()
 
     async def by(self, number: signal.Signals, stack: ExitStack) -> None:
         stack.enter_context(graceful_shutdown(asyncio.get_running_loop(), self.end))
@@ -52,8 +52,9 @@ class EndingProcess:
             await self.ending.wait()
 
     async def ended(self) -> None:
+        """What follows `end` runs in its own step of the loop, before this one returns."""
         self.may_end.set()
-        await asyncio.sleep(SOON_S)
+        await self.is_over.wait()
 
 
 @pytest.mark.parametrize(("by", "later"), [(TERM, TERM), (INT, TERM), (HUP, HUP), (HUP, TERM)])
@@ -90,13 +91,16 @@ def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard
 def test_what_fails_in_it_is_logged_and_stops_nothing_else(
     heard: list[int], caplog: pytest.LogCaptureFixture
 ) -> None:
+    failed = asyncio.Event()
+
     async def fail() -> None:
+        failed.set()
         raise ValueError("a fault")
 
     async def run() -> None:
         with graceful_shutdown(asyncio.get_running_loop(), fail):
             signal.raise_signal(TERM)
-            await asyncio.sleep(SOON_S)
+            await failed.wait()
 
     with caplog.at_level(logging.ERROR, "kiosk"):
         asyncio.run(run())
