@@ -6,7 +6,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -31,6 +31,11 @@ TEMPLATE_FAULTS = {
     "{{ 1 + words }}": "unsupported operand",
 }
 STARTED_MS = 2000 * ENOUGH_S
+# Its scripts run and have an event of the server. A page whose scripts did not load never reloads.
+FOLLOWS = """() => {
+    const [{ responseEnd }] = performance.getEntriesByType("navigation");
+    return window.operatorPanel && operatorPanel.eventAgeMs() < performance.now() - responseEnd;
+}"""
 
 
 class Checkout:
@@ -56,6 +61,15 @@ class Checkout:
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new))
+
+    @contextmanager
+    def one_change(self) -> Iterator[None]:
+        """The watcher, which runs in the server's first process, finds all edits at once."""
+        self.server.process.send(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self.server.process.send(signal.SIGCONT)
 
 
 def made(**environment: str) -> str:
@@ -98,16 +112,18 @@ def test_an_open_browser_shows_what_is_saved_or_its_fault(checkout: Checkout, pa
     check_panels_fault(checkout, page)
     checkout.edit(PANEL, *reversed(FAULT))
     expect(page.get_by_role("button", name="Publish1")).to_be_visible(timeout=STARTED_MS)
+    page.wait_for_function(FOLLOWS, timeout=STARTED_MS)
     good = "<main>"
     for fault, words in TEMPLATE_FAULTS.items():
         checkout.edit(SCREEN, good, good := f"<main>{fault}")
         expect(page.locator("body")).to_contain_text(words, timeout=STARTED_MS)
         expect(page.locator("body")).to_contain_text(SCREEN)
-    checkout.edit(SCREEN, good, "<main>")
-    checkout.edit(SCREEN, ">{{ page.title }}</h2>", ">A new heading</h2>")
-    checkout.edit(PANEL, 'label = "Publish1"', 'label = "Pick up"')
-    checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
-    checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
+    with checkout.one_change():
+        checkout.edit(SCREEN, good, "<main>")
+        checkout.edit(SCREEN, ">{{ page.title }}</h2>", ">A new heading</h2>")
+        checkout.edit(PANEL, 'label = "Publish1"', 'label = "Pick up"')
+        checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
+        checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
     expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
     expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
     expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
