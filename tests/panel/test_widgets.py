@@ -329,9 +329,19 @@ def test_a_parameter_that_fits_has_no_fault(more: dict[str, Any]) -> None:
 @pytest.mark.parametrize("distro", DISTROS)
 def test_every_distribution_has_the_services_of_parameters(distro: str) -> None:
     interfaces = load_interfaces(distro)
-    for _, type_name in (GET, DESCRIBE, SET):
-        interfaces.service_types(type_name)
-    interfaces.require(EVENT_TYPE)
+
+    def fields(type_name: str) -> list[str]:
+        return [field.name for field in interfaces.structures[type_name].fields]
+
+    of_services = {
+        GET: (["names"], ["values"]),
+        DESCRIBE: (["names"], ["descriptors"]),
+        SET: (["parameters"], ["results"]),
+    }
+    for (_, type_name), (request, response) in of_services.items():
+        assert [fields(one) for one in interfaces.service_types(type_name)] == [request, response]
+    changes = ["new_parameters", "changed_parameters", "deleted_parameters"]
+    assert fields(EVENT_TYPE) == ["stamp", "node", *changes]
 
 
 @pytest.mark.parametrize(
