@@ -176,8 +176,10 @@ def test_nothing_is_waited_for_in_the_long_run(monkeypatch: pytest.MonkeyPatch) 
     async def pressed() -> list[Any]:
         desk = Desk(panel_of())
         await asyncio.gather(*(desk.press(press_id=f"p{n}") for n in range(200)))
-        await asyncio.sleep(0.1)
-        return desk.confirmations._waiting["heard"]
+        async with asyncio.timeout(5):
+            while waiting := desk.confirmations._waiting["heard"]:
+                await asyncio.sleep(0.01)
+        return waiting
 
     assert asyncio.run(pressed()) == []
 
