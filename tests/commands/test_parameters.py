@@ -13,6 +13,7 @@ from app.commands.parameters.values import check_value
 from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
+from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
@@ -22,7 +23,7 @@ from app.robot.parameter_state import UNKNOWN, ParameterState, allowed_range, en
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
 from tests.support.builders import BRIDGE, INTERFACES, NOW, FakeTransport, Table, panel_of, robot_there
-from tests.support.words import english
+from tests.support.words import coded, english
 
 SPEED: Table = {
     "id": "speed", "kind": "parameter", "label": "Speed", "node": "/arm", "parameter": "speed",
@@ -128,9 +129,9 @@ class Bench:
     def known(self, name: str = "speed") -> ParameterState:
         return self.robot.parameters.get(name, UNKNOWN)
 
-    def reason(self, name: str = "speed") -> str:
+    def reason(self, name: str = "speed") -> TextLike:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return str(judged(one, (), self.robot, NOW).reason or "")
+        return judged(one, (), self.robot, NOW).reason or ""
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -160,11 +161,11 @@ def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
     async def test(bench: Bench) -> None:
         bench.parameters.on_graph_change()
         assert bench.line.keys == []
-        assert "does not offer the parameters of /arm" in bench.reason()
+        assert bench.reason() == say("no_parameters", node="/arm")
         bench.offer()
         bench.parameters.on_graph_change()
         await bench.queried(1)
-        assert "waiting for /arm to report speed" in bench.reason()
+        assert coded(bench.reason(), "node", "name") == ("parameter_waiting", "/arm", "speed")
         await bench.tell(1, 0.5)
         assert (bench.known().state, bench.known().value, bench.reason()) == ("live", 0.5, "")
         await asyncio.sleep(0.05)
@@ -272,7 +273,7 @@ def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
         await bench.tell(1, 0.5)
         bench.lose(bridge_dialect.bridge_token(BRIDGE))
         assert (bench.known().state, bench.known().value) == ("cut", 0.5)
-        assert "waiting for /arm" in bench.reason()
+        assert coded(bench.reason(), "node", "name") == ("parameter_waiting", "/arm", "speed")
         bench.parameters.on_graph_change()
         await bench.tell(3, 0.6)
         assert (bench.known().state, bench.known().value) == ("live", 0.6)
@@ -288,18 +289,19 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
 
     async def test(bench: Bench) -> None:
         (one,) = bench.panel.parameters()
-        assert "does not offer" in str(bench.parameters.read_again(one))
+        assert bench.parameters.read_again(one) == say("no_parameters", node="/arm")
         bench.offer()
         await bench.queried(1)
         assert bench.parameters.read_again(one) == ""  # it is being asked
         await bench.until(lambda: bench.known().state == "silent")
-        assert english((bench.shown["askable"], bench.shown["note"])) == (False, "waiting for /arm")
+        assert bench.shown["askable"] is False
+        assert coded(bench.shown["note"], "node") == ("parameter_asking", "/arm")
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
         await bench.until(lambda: bench.shown["askable"])
         assert bench.known().state == "silent"
-        assert english(bench.shown["note"]) == "no response from /arm"
-        assert "Cyclone DDS" in bench.reason()
-        assert "“Read again” tries once more" in bench.reason()
+        assert coded(bench.shown["note"], "node") == ("parameter_unanswered", "/arm")
+        silent = say("parameter_silent", node="/arm", name="speed")
+        assert bench.reason() == joined([silent, say("cyclone_hint")])
         for _ in range(3):  # whatever it says by itself
             bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
             bench.parameters.on_graph_change()
@@ -403,7 +405,7 @@ def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> Non
         await bench.answer(5, GET, values=[value(DOUBLE, 0.5)])
         await bench.answer(6, GET, values=[])
         assert (bench.known().value, bench.known("count").state) == (0.5, "undeclared")
-        assert "/arm has no parameter count" in bench.reason("count")
+        assert coded(bench.reason("count"), "node", "name") == ("parameter_undeclared", "/arm", "count")
 
     run(test, SPEED, COUNT)
 
@@ -411,24 +413,25 @@ def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> Non
 @pytest.mark.parametrize(
     ("described", "held", "state", "reason"),
     [
-        (descriptor("", 0), value(DOUBLE, 0) | {"type": 0}, "undeclared", "has no parameter speed"),
-        (descriptor("speed", INTEGER), value(INTEGER, 1), "mistyped", "speed of /arm is integer"),
-        (descriptor("speed", 8), value(DOUBLE, 0) | {"type": 8}, "mistyped", "is double[]"),
-        (descriptor("speed", DOUBLE), value(DOUBLE, 0) | {"type": 0}, "missing", ""),
-        (descriptor("speed", 0, dynamic_typing=True), value(DOUBLE, 1), "live", ""),
-        (descriptor("speed", INTEGER, dynamic_typing=True), value(DOUBLE, 1), "live", ""),
-        (descriptor("speed", DOUBLE, read_only=True), value(DOUBLE, 1), "live", "Read only"),
+        (descriptor("", 0), value(DOUBLE, 0) | {"type": 0}, "undeclared", ("undeclared",)),
+        (descriptor("speed", INTEGER), value(INTEGER, 1), "mistyped", ("mistyped", "integer")),
+        (descriptor("speed", 8), value(DOUBLE, 0) | {"type": 8}, "mistyped", ("mistyped", "double[]")),
+        (descriptor("speed", DOUBLE), value(DOUBLE, 0) | {"type": 0}, "missing", ()),
+        (descriptor("speed", 0, dynamic_typing=True), value(DOUBLE, 1), "live", ()),
+        (descriptor("speed", INTEGER, dynamic_typing=True), value(DOUBLE, 1), "live", ()),
+        (descriptor("speed", DOUBLE, read_only=True), value(DOUBLE, 1), "live", ("read_only",)),
     ],
 )
 def test_what_a_node_says_locks_or_not(
-    described: dict[str, Any], held: dict[str, Any], state: str, reason: str
+    described: dict[str, Any], held: dict[str, Any], state: str, reason: tuple[str, ...]
 ) -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.answer(1, DESCRIBE, descriptors=[described])
         await bench.answer(2, GET, values=[held])
         assert bench.known().state == state
-        assert reason in bench.reason()
+        code, found = coded(bench.reason(), "found")
+        assert (code.removeprefix("parameter_"), found)[: len(reason)] == reason
         assert bool(reason) == bool(bench.reason())
 
     run(test)
@@ -439,9 +442,8 @@ def test_what_can_not_be_read_is_said() -> None:
         bench.offer()
         await bench.queried(1)
         bench.line.queries[0][2].set_result(b"\0\1\0\0\xff\xff")
-        await asyncio.sleep(0.005)
-        assert bench.known().state == "unreadable"
-        assert "cannot be read" in bench.reason()
+        await bench.until(lambda: bench.known().state == "unreadable")
+        assert coded(bench.reason(), "node", "name") == ("parameter_unreadable", "/arm", "speed")
 
     run(test)
 
@@ -458,7 +460,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
             )
         )
         await bench.queried(3)
-        assert bench.reason() == "In progress: waiting for the robot."
+        assert bench.reason() == say("busy")
         request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.queries[2][1])
         (sent,) = request.parameters
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
@@ -544,8 +546,9 @@ def test_a_panel_narrows_what_the_node_describes(
     assert english(limits_text(of, allowed_range(of, known))) == limits
     assert [check_value(of, known, one) for one in good] == good
     for one in bad:
-        with pytest.raises(InputError, match="it must be"):
+        with pytest.raises(InputError) as refused:
             check_value(of, known, one)
+        assert coded(refused.value.text, "label") == ("off_limits", "Speed")
 
 
 def test_no_value_that_both_allow_locks() -> None:
@@ -553,9 +556,8 @@ def test_no_value_that_both_allow_locks() -> None:
         bench.offer()
         limits = [{"from_value": 0.0, "to_value": 2.0, "step": 0.0}]
         await bench.tell(1, 0.5, floating_point_range=limits)
-        assert bench.reason() == (
-            "Locked: /arm accepts 0 to 2 for speed and this panel offers 3 or more. No value fits both."
-        )
+        about = coded(bench.reason(), "node", "name", "theirs", "ours")
+        assert about == ("parameter_apart", "/arm", "speed", "0 to 2", "3 or more")
 
     run(test, {**SPEED, "min": 3.0})
 
@@ -612,4 +614,4 @@ def test_a_value_shows_and_its_input_starts_from_it(
     (of,) = panel.parameters()
     shown = parameter(of, robot)
     assert english((shown["text"], shown["entry"])) == (text, entry)
-    assert "does not report changes" in english(shown["note"])  # no one publishes /parameter_events
+    assert coded(shown["note"]) == ("parameter_told",)  # no one publishes /parameter_events

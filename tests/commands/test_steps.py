@@ -9,6 +9,7 @@ import pytest
 from app.commands.confirmations import Confirmations
 from app.commands.receipts import Receipt
 from app.errors import PanelError
+from app.i18n import TextLike, say
 from app.panel import load_panel
 from app.panel.model import Panel
 from app.panel.widgets.step import Step
@@ -25,7 +26,7 @@ from tests.support.builders import (
     robot_there,
     says,
 )
-from tests.support.words import english
+from tests.support.words import coded, english
 
 FLOAT: Final = "std_msgs/msg/Float32"
 STEP: Final = {
@@ -69,6 +70,11 @@ class Desk:
     def shown(self) -> Any:
         return english(build_view(self.panel, self.robot, self.now).view["widgets"]["speed"])
 
+    def reason(self) -> TextLike | None:
+        """Why no step can be made."""
+        step = next(w for w in self.panel.commands if isinstance(w, Step))
+        return judged(step, (), self.robot, self.now).reason
+
     def press(self, value: Any, press_id: str = "p1") -> Receipt:
         return asyncio.run(self.presses.press("speed", {"speed": value}, press_id, FROM))
 
@@ -96,17 +102,19 @@ def test_steps_end_at_the_limits(speed: float, down: str, up: str) -> None:
 
 def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
     desk = Desk()
-    assert (desk.shown()["enabled"], desk.shown()["reason"]) == (False, "Locked: waiting for /speed.")
+    assert desk.shown()["enabled"] is False
+    assert desk.reason() == say("waiting", topic="/speed", wanted=FLOAT)
+    assert desk.shown()["reason"] == str(desk.reason())
     assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("", "")
     desk.reports(float("nan"))
-    assert desk.shown()["reason"] == "Locked: the last /speed has no data."
+    assert desk.reason() == say("missing", topic="/speed", field="data")
     desk.reports(120.0)
-    assert desk.shown()["reason"] == "Locked: the value is 120, which is not from 0 to 100."
+    assert coded(desk.reason(), "value", "low", "high") == ("step_outside", "120", "0", "100")
     desk.reports(40.0)
     step = next(w for w in desk.panel.commands if isinstance(w, Step))
     assert judged(step, (), desk.robot, desk.now).until == desk.now + 5
     desk.now += 6
-    assert desk.shown()["reason"] == "Locked: the last /speed is older than 5 s."
+    assert desk.reason() == say("stale", topic="/speed", limit="5")
     assert desk.press(50).outcome == "refused"
     assert desk.sent() == []
 
@@ -116,8 +124,7 @@ def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_report
         first = asyncio.create_task(desk.presses.press("speed", {"speed": 50}, "p1", FROM))
         while not desk.sent():
             await asyncio.sleep(0)
-        view = desk.shown()
-        assert (view["enabled"], view["reason"]) == (False, "In progress: waiting for the robot.")
+        assert (desk.shown()["enabled"], desk.reason()) == (False, say("busy"))
         second = await desk.presses.press("speed", {"speed": 50}, "p2", FROM)
         desk.reports(50.0)
         return await first, second
@@ -136,7 +143,7 @@ def test_a_press_that_is_no_step_from_the_reported_value_sends_nothing(given: An
     desk.reports(40.0)
     receipt = desk.press(given)
     assert receipt.outcome == "refused"
-    assert "Speed is 40 by now. Press again for a step from there." in str(receipt.reason)
+    assert coded(receipt.reason, "label", "value") == ("step_moved", "Speed", "40")
     assert desk.sent() == []
 
 

@@ -1,4 +1,4 @@
-"""Every ground on which a control is locked, with its sentence, and what permits."""
+"""Every ground on which a control is locked, with its code, and what permits."""
 
 import math
 from collections.abc import Callable
@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from app.dialect.bridge_dialect import bridge_token, server_token
+from app.i18n import say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
 from app.panel.widgets.publish import Publish
@@ -15,6 +16,7 @@ from app.permission.interlocks import (
     Verdict,
     interlock_verdict,
     link_verdict,
+    locked,
 )
 from app.permission.press_permission import judged
 from app.robot.state import RobotState, Sample
@@ -33,7 +35,6 @@ from tests.support.builders import (
     robot_there,
     small_panel,
 )
-from tests.support.words import english
 
 
 def verdict_of(robot: RobotState, interlock: Table = NOTHING, now: float = NOW) -> Verdict:
@@ -79,30 +80,15 @@ def joining(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
 
 
-SILENT = (
-    "No connection to the robot: its bridge does not respond. If this persists, restart the bridge."
-)
-WAYS: list[tuple[Callable[[RobotState], None], str, str]] = [
-    (no_link, "no_link", "No connection to the robot: its bridge cannot be reached."),
-    (
-        no_link_at,
-        "no_link",
-        "No connection to the robot: its bridge cannot be reached at tcp/robot1:7447.",
-    ),
-    (
-        no_link_at_many,
-        "no_link",
-        "No connection to the robot: its bridge cannot be reached at tcp/r0:1, tcp/r1:1, tcp/r2:1 "
-        "and 2 more.",
-    ),
-    (
-        no_bridge,
-        "no_bridge",
-        "No connection to the robot: Zenoh responds, but no ROS 2 bridge is running.",
-    ),
-    (bridge_silent, "bridge_silent", SILENT),
-    (bridge_unheard, "bridge_silent", SILENT),
-    (joining, "joining", "Connecting to the robot's topics. Please wait."),
+MANY = say("and_more", names=("tcp/r0:1", "tcp/r1:1", "tcp/r2:1"), number=2)
+WAYS: list[tuple[Callable[[RobotState], None], Verdict]] = [
+    (no_link, locked("no_link")),
+    (no_link_at, Verdict(False, "no_link", say("no_link_at", where=("tcp/robot1:7447",)))),
+    (no_link_at_many, Verdict(False, "no_link", say("no_link_at", where=MANY))),
+    (no_bridge, locked("no_bridge", name="")),
+    (bridge_silent, locked("bridge_silent")),
+    (bridge_unheard, locked("bridge_silent")),
+    (joining, Verdict(False, "joining", say("joining"), NOW + 1)),
 ]
 
 
@@ -112,13 +98,13 @@ def free() -> Publish:
     return widget
 
 
-@pytest.mark.parametrize(("broken", "code", "reason"), WAYS)
+@pytest.mark.parametrize(("broken", "verdict"), WAYS)
 def test_without_a_way_to_the_robot_everything_is_locked(
-    robot: RobotState, broken: Callable[[RobotState], None], code: str, reason: str
+    robot: RobotState, broken: Callable[[RobotState], None], verdict: Verdict
 ) -> None:
     broken(robot)
-    for verdict in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
-        assert english((verdict.permitted, verdict.code, verdict.reason)) == (False, code, reason)
+    for found in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
+        assert found == verdict
 
 
 def test_with_a_way_commands_can_reach_the_robot(robot: RobotState) -> None:
@@ -137,62 +123,40 @@ def test_a_robot_that_says_true_permits(robot: RobotState) -> None:
 
 def test_nothing_is_permitted_before_the_robot_said_so() -> None:
     verdict = verdict_of(robot_there(small_panel()))
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "waiting",
-        "Locked: waiting for /operation_enabled.",
-    )
+    assert verdict == locked("waiting", topic=ENABLED, wanted=BOOL)
 
 
 @pytest.mark.parametrize(("label", "name"), [(None, "operation"), ("Operation of the cell",) * 2])
 def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, name: str) -> None:
     permits(robot, False)
     verdict = verdict_of(robot, {"label": label})
-    assert (verdict.permitted, verdict.code) == (False, "forbidden")
-    assert english(verdict.reason) == f"The robot does not permit {name}."
+    assert verdict == locked("forbidden", name=name)
 
 
 def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
     robot.mark_bridge_lost(BRIDGE, 2)
     verdict = verdict_of(robot)
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "cut",
-        "Locked: the connection was lost. Waiting for a new /operation_enabled.",
-    )
+    assert verdict == locked("cut", topic=ENABLED, wanted=BOOL)
 
 
 @pytest.mark.parametrize("payload", [b"", b"true!", b"\0\1\0\0", b"\0\1\0\0\1\0\0\0\0\0\0\0"])
 def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
     robot.update(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "unreadable",
-        "Locked: /operation_enabled cannot be read. The data received is not std_msgs/msg/Bool.",
-    )
+    assert verdict == locked("unreadable", topic=ENABLED, wanted=BOOL)
 
 
 def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, TEXT)
     verdict = verdict_of(robot)
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "wrong_type",
-        "/operation_enabled is std_msgs/msg/String on the robot, "
-        "but this panel expects std_msgs/msg/Bool.",
-    )
+    assert verdict == locked("wrong_type", topic=ENABLED, found=TEXT, wanted=BOOL)
 
 
 @pytest.mark.parametrize("age", [2.0, 2.001, 1e6])
 def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     verdict = verdict_of(robot, {"max_age_s": 2}, NOW + age)
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "stale",
-        "Locked: the last /operation_enabled is older than 2 s.",
-    )
+    assert verdict == locked("stale", topic=ENABLED, limit="2")
 
 
 def test_a_fresh_permission_says_when_it_ends(robot: RobotState) -> None:
@@ -212,11 +176,7 @@ def test_a_new_sample_ends_staleness(robot: RobotState) -> None:
 
 def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
     verdict = verdict_of(robot, {"require_publisher": True})
-    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
-        False,
-        "no_publisher",
-        "Locked: no node of the robot publishes /operation_enabled.",
-    )
+    assert verdict == locked("no_publisher", topic=ENABLED)
     endpoint(robot, "MP", ENABLED, BOOL)
     assert verdict_of(robot, {"require_publisher": True}).permitted
 
@@ -235,10 +195,7 @@ def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", BOOL)
     verdict = judged(free(), (), robot, NOW)
-    assert english((verdict.code, verdict.reason)) == (
-        "wrong_type",
-        "/free is std_msgs/msg/Bool on the robot, but this panel expects std_msgs/msg/String.",
-    )
+    assert verdict == locked("wrong_type", topic="/free", found=BOOL, wanted=TEXT)
 
 
 def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
@@ -264,10 +221,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
     permits(robot)
     endpoint(robot, "MP", ENABLED, BOOL, qos=best_effort)
     verdict = interlock_verdict(small_panel().interlocks[0], robot, NOW)
-    assert (verdict.permitted, verdict.code) == (False, "publishes_best_effort")
-    assert english(verdict.reason) == (
-        "The robot publishes /operation_enabled as best effort, but this panel requires reliable."
-    )
+    assert verdict == locked("publishes_best_effort", topic=ENABLED)
     asks_less = small_panel({"qos": {"reliability": "best_effort"}}).interlocks[0]
     assert interlock_verdict(asks_less, robot, NOW).permitted
 
@@ -276,11 +230,7 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
     verdict = judged(free(), (), robot, NOW)
-    assert (
-        english(verdict.reason)
-        == "The robot requires /free as transient local, but this panel publishes it as volatile."
-    )
-    assert not verdict.permitted
+    assert verdict == locked("asks_for_transient_local", topic="/free")
 
 
 def test_a_service_that_has_just_come_is_not_called_yet() -> None:
@@ -290,12 +240,8 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     assert judged(call, (), robot, NOW).code == "no_service"
     robot.graph.apply_token(token, True, NOW)
     verdict = judged(call, (), robot, NOW)
-    assert english((verdict.permitted, verdict.code, verdict.reason, verdict.until)) == (
-        False,
-        "getting_ready",
-        "Locked: the robot has just started /reset. Connecting.",
-        NOW + SERVER_SETTLE_S,
-    )
+    ready_at = NOW + SERVER_SETTLE_S
+    assert verdict == Verdict(False, "getting_ready", say("getting_ready", name="/reset"), ready_at)
     assert judged(call, (), robot, NOW + SERVER_SETTLE_S).permitted
     robot.graph.apply_token(token, False)
     robot.graph.apply_token(token, True, NOW + 9)  # another node of this name

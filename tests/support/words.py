@@ -1,8 +1,9 @@
-"""Rendering of texts within any value."""
+"""Rendering of texts within any value, and what a reason says without its wording."""
 
 from typing import Any
 
-from app.i18n import Text, localized, render
+from app.commands.reason_codes import ADVICE, FRAMES
+from app.i18n import BETWEEN, Text, TextLike, localized, render
 
 
 def english(value: Any) -> Any:
@@ -14,3 +15,24 @@ def english(value: Any) -> Any:
     if isinstance(value, set | frozenset):
         return {english(one) for one in value}
     return [english(one) for one in value] if isinstance(value, list) else localized(value, "en")
+
+
+def why(reason: TextLike | None) -> TextLike:
+    """The sentence that says why, without what frames it and what follows."""
+    if not isinstance(reason, Text):
+        return reason or ""
+    about: dict[str, Any] = dict(reason.params)
+    if reason.code in BETWEEN:
+        return why([one for one in about["parts"] if getattr(one, "code", "") not in ADVICE][-1])
+    framed = about.get(FRAMES.get(reason.code, ""))
+    return why(framed) if framed else reason
+
+
+def coded(reason: TextLike | None, *names: str) -> tuple[Any, ...]:
+    """The code of the sentence that says why ("" for what is none), and some of its parameters in
+    English; None for one that it does not have."""
+    found = why(reason)
+    if not isinstance(found, Text):
+        return ("", *(None for _ in names))
+    about: dict[str, Any] = dict(found.params)
+    return (found.code, *(english(about.get(name)) for name in names))

@@ -111,13 +111,14 @@ def own_client(own_kiosk: Server) -> Iterator[Callable[..., Client]]:
 def test_a_press_needs_control(own_client: Callable[..., Client], own_kiosk: Server) -> None:
     ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
     free = ann.press()
-    assert (free.status_code, free.json()["outcome"]) == (409, "refused")
-    assert "No panel has control of the robot. Take control first." in free.json()["reason"]
+    assert (free.status_code, free.json()["outcome"], free.json()["code"]) == (
+        409, "refused", "control_free",
+    )  # fmt: skip
     assert ann.take()
     assert ann.press().json()["outcome"] == "published"
     refused = bob.press()
-    assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
-    assert "Panel 1 (192.0.2.1) has control of the robot." in refused.json()["reason"]
+    assert (refused.status_code, refused.json()["code"]) == (409, "control_held")
+    assert "Panel 1 (192.0.2.1)" in refused.json()["reason"]
     assert own_kiosk.press("operation", "no cookie at all").status_code == 409
     assert own_kiosk.by("socket").press("operation", "no cookie at all").status_code == 409
     address = {"x-forwarded-for": "192.0.2.1"}
@@ -186,7 +187,7 @@ def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Cl
     long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
     answer = late.control("take", at=long_ago)
     assert (answer.status_code, answer.json()["done"]) == (409, False)
-    assert "s to arrive. Press again." in answer.json()["reason"]
+    assert answer.json()["code"] == "late"
     assert answer.json()["control"]["holder"] == ""
 
     def taken_now() -> bool:
@@ -205,7 +206,7 @@ def test_a_denied_request(client: Callable[..., Client]) -> None:
     assert ann.control("keep", to=of_bob).json()["done"]
     again = bob.control("ask")
     assert (again.status_code, again.json()["done"]) == (409, False)
-    assert again.json()["reason"].startswith("The request was denied")
+    assert again.json()["code"] == "control_denied"
 
 
 def test_a_request_goes_through_without_a_touch_of_the_holder(
@@ -251,8 +252,9 @@ def test_the_panel_at_the_cell_takes_over(own_client: Callable[..., Client]) -> 
     ann, cell = own_client("192.0.2.1"), own_client()
     ann.take()
     assert cell.take()
-    reason = ann.press().json()["reason"]
-    assert "The panel at the cell has control of the robot." in reason
+    refused = ann.press().json()
+    assert refused["code"] == "control_held"
+    assert "The panel at the cell" in refused["reason"]
 
 
 def test_an_address_that_a_client_makes_up_is_not_the_cell(client: Callable[..., Client]) -> None:
@@ -444,7 +446,9 @@ def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
         assert bob.take()
         assert (ann.press().status_code, bob.press().status_code) == (200, 200)
         ann.http.base_url = httpx.URL(f"{kiosk.url}/robots/r2")
-        assert "Panel 2 (192.0.2.2) has control of Robot 2." in ann.press().json()["reason"]
+        refused = ann.press().json()
+        assert refused["code"] == "control_held"
+        assert "Panel 2 (192.0.2.2) has control of Robot 2." in refused["reason"]
         assert kiosk.http.post("/control/take", json={}).status_code == 404
     finally:
         ann.http.close()
