@@ -18,6 +18,7 @@ from playwright.sync_api import Locator, Page, expect
 from app.commands.service_calls import MAX_UNANSWERED
 from tests.support.browser.pages import widget
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
+from tests.support.panel_text import ADD
 from tests.support.parts import Bridge, Server, Stream, http_client, until
 from tests.support.servers import live_server
 
@@ -25,7 +26,8 @@ FIBONACCI = "example_interfaces/action/Fibonacci"
 
 ANSWER_S = 10.0  # for which /nowhere would be waited
 
-PANEL = """
+PANEL = (
+    """
 title = "Cyclone cell"
 mode = "live"
 
@@ -54,15 +56,9 @@ service = "/set_enabled"
 type = "std_srvs/srv/SetBool"
 request = { data = true }
 
-[[page.widget]]
-id = "add"
-kind = "call"
-label = "Add"
-service = "/add_two_ints"
-type = "example_interfaces/srv/AddTwoInts"
-request = { a = 40, b = 2 }
-answer = "the sum is {sum}"
-
+"""
+    + ADD
+    + """
 [[page.widget]]
 id = "slow"
 kind = "call"
@@ -112,6 +108,7 @@ action = "/fibonacci"
 type = "example_interfaces/action/Fibonacci"
 goal = { order = -1 }
 """
+)
 
 
 @pytest.fixture
