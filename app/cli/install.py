@@ -79,7 +79,7 @@ def make_parser(prog: str) -> Parser:
     )
     add = parser.add_argument
     add("wheel", nargs="?", type=Path, metavar="WHEEL", help="default: the wheel that this runs from")
-    add("--panel", type=Path, metavar="FILE", help="your panel file; default: the one that is there")
+    add("--panel", type=Path, metavar="FILE", help="your panel file; default: the installed one")
     add("--zenoh", type=Path, metavar="FILE", help="your Zenoh configuration")
     add("--no-screen", action="store_true", help="the server alone, for browsers elsewhere")
     add("--touch-matrix", default="", metavar="'A B C D E F'", help="libinput's calibration matrix")

@@ -1,6 +1,6 @@
-"""`operator-panel log verify [--data FOLDER] [--head HASH]`: is the operator's log as it was written?
+"""`operator-panel log verify [--data FOLDER] [--head HASH]`: was the operator's log changed?
 
-Exit status: 0 it is, 1 an entry was changed, removed, reordered or inserted, 2 it can't be read.
+Exit status: 0 it was not, 1 an entry was changed, removed, reordered or inserted, 2 it can't be read.
 """
 
 import sys
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(f"the operator's log can't be read: {error}", file=sys.stderr)
         return 2
     if found.fault:
-        print(f"not as it was written: {found.fault} ({found.count} entries are)")
+        print(f"the log was changed: {found.fault} ({found.count} entries verified)")
         return 1
     print(f"ok, {found.count} entries, head {found.head}")
     return 0
@@ -47,6 +47,9 @@ def make_parser(prog: str) -> Parser:
         "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
     )
     check.add_argument(
-        "--head", default="", metavar="HASH", help="a head that was noted once, and must be in it"
+        "--head",
+        default="",
+        metavar="HASH",
+        help="a hash saved earlier; the check fails if the log no longer contains it",
     )
     return parser

@@ -75,7 +75,8 @@ def make_parser(prog: str) -> Parser:
         action="append",
         dest="proxies",
         metavar="ADDRESS",
-        help="a proxy that is believed whom it speaks for; may be given several times (KIOSK_PROXIES)",
+        help="address of a trusted proxy: its X-Forwarded-For counts; may be given several times"
+        " (KIOSK_PROXIES)",
     )
     add("--log-level", choices=LOG_LEVELS, help="default: info (KIOSK_LOG_LEVEL)")
     add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")
