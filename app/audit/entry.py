@@ -37,7 +37,7 @@ class Entry(NamedTuple):
     never set, comparable within one `boot` of the server; `of` is the number of the press that it is
     about.
 
-    `values` is JSON, `verdict` the code of the permission's verdict, `board` the version of the view at
+    `values` is JSON, `verdict` the code of the permission's verdict, `board` the id of the view at
     that moment. `reason` is in English; `text` is the same as JSON with code and parameters, "" for a
     reason without a sentence of the catalogue. `seq`, `boot`, `prev` and `hash` are set when it is
     written.

@@ -48,11 +48,11 @@ class PendingEntry:
     optional."""
 
     def __init__(
-        self, log: Log, entry: Entry | None, board: Callable[[], str], fault: TextLike = ""
+        self, log: Log, entry: Entry | None, view_version: Callable[[], str], fault: TextLike = ""
     ) -> None:
         self._log = log
         self._entry = entry
-        self._board = board
+        self._view_version = view_version
         self._fault = fault
         self._verdict = {"verdict": "", "board": ""}
         self.corrected_to: Outcome | None = None
@@ -64,7 +64,7 @@ class PendingEntry:
 
     def set_verdict(self, verdict: str) -> None:
         """Sets the code of the permission's verdict, with the current version of the view."""
-        self._verdict = {"verdict": verdict, "board": self._board()}
+        self._verdict = {"verdict": verdict, "board": self._view_version()}
 
     async def close(self, outcome: str, reason: TextLike) -> TextLike:
         """Writes the result. Returns "" when it is on the disk, else why it is not."""
@@ -86,13 +86,13 @@ class PendingEntry:
 
 
 class PressLog:
-    """Writes the log entries of one robot's presses; `board` returns the current version of the
+    """Writes the log entries of one robot's presses; `view_version` returns the current version of the
     view."""
 
-    def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
+    def __init__(self, log: Log, robot: str = "", view_version: Callable[[], str] = str) -> None:
         self._log = log
         self._robot = robot
-        self._board = board
+        self._view_version = view_version
 
     def has_room(self, origin: Origin) -> bool:
         """Whether a refusal may have its own entry."""
@@ -113,7 +113,7 @@ class PressLog:
         """Writes the entry of a press before it is sent; LogError and Repeated as in `Log.pressed`."""
         entry = new_entry("pressed", origin, inputs, **self._columns(widget, press_id, action))
         written = await self._log.pressed(entry)
-        return PendingEntry(self._log, written, self._board, self._log.fault)
+        return PendingEntry(self._log, written, self._view_version, self._log.fault)
 
     async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
         """Writes the entry of a cancel if possible: a failing log never blocks a cancel."""
@@ -121,8 +121,8 @@ class PressLog:
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
-            return PendingEntry(self._log, None, self._board, error.text)
-        return PendingEntry(self._log, written, self._board, self._log.fault)
+            return PendingEntry(self._log, None, self._view_version, error.text)
+        return PendingEntry(self._log, written, self._view_version, self._log.fault)
 
     @property
     def is_bypassed(self) -> bool:
@@ -134,7 +134,7 @@ class PressLog:
     ) -> list[tuple[OpenPress, PendingEntry]]:
         """Presses without a known end, as in `Log.open_presses`, each with its log entry to correct."""
         found = await self._log.open_presses(self._robot, widgets, since)
-        return [(one, PendingEntry(self._log, one.press, self._board)) for one in found]
+        return [(one, PendingEntry(self._log, one.press, self._view_version)) for one in found]
 
     async def refused(
         self,

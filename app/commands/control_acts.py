@@ -18,7 +18,7 @@ from app.commands.press_context import PressGuard
 from app.commands.receipts import RECEIPTS_KEPT
 from app.errors import Cause, NotFound
 from app.i18n import TextLike, say
-from app.permission.control_authority import LIFE_S, ControlAuthority, Passing
+from app.permission.control_authority import LIFE_S, ControlAuthority, HandOver
 from app.permission.press_permission import cause_of
 from app.permission.principal import Principal
 from app.robot.command_status import OutcomeCode
@@ -118,11 +118,11 @@ class ControlActs:
         id."""
         return _receipt(request, act_id, "control_too_often", say("control_too_often"), "limit")
 
-    def log_passing(self, passing: Passing) -> None:
+    def log_hand_over(self, hand_over: HandOver) -> None:
         """Logs a change of control without an act, such as a timeout. Does not wait for the disk."""
-        who, other = passing.who, passing.other.title if passing.other else say("no_client")
-        reason = say(f"log_control_{passing.how}", name=who.title, other=other)
-        self._press_log.note(f"control_{passing.how}", origin_of(who), reason)
+        who, other = hand_over.who, hand_over.other.title if hand_over.other else say("no_client")
+        reason = say(f"log_control_{hand_over.how}", name=who.title, other=other)
+        self._press_log.note(f"control_{hand_over.how}", origin_of(who), reason)
 
     def _begin(
         self, request: ActRequest, act_id: str, at: float | None, life_s: float

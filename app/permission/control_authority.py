@@ -1,7 +1,7 @@
 """The single point of control (ISO 10218): one browser at a time may press for a robot.
 
-Pure, but for its clocks: acts and signs of life come in, a verdict for each press comes out. A
-browser that is not heard of loses what it held or asked for; that is checked before everything else.
+Pure, except for its clocks: acts and keepalives in, a verdict for each press out. A browser without a
+keepalive loses control, or its request for it; each call checks that first.
 """
 
 import math
@@ -17,7 +17,7 @@ from app.permission.control_authority_view import NO_CONTROL, ControlView, contr
 from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.principal import Principal
 
-LIFE_S: Final = 5.0  # without a sign of life; a page with scripts gives one every 1.5 s
+LIFE_S: Final = 5.0  # without a keepalive; a page with scripts sends one every 1.5 s
 ASK_AGAIN_S: Final = 10.0  # after a request was denied
 
 Refusal = Literal[
@@ -30,9 +30,9 @@ Refusal = Literal[
 ]
 
 
-class Passing(NamedTuple):
-    """A change of control without an act: `who` had it, took it or requested it, and `other` is in
-    control now."""
+class HandOver(NamedTuple):
+    """A change of control that no act made: `who` had, took or requested control, `other` has it
+    now."""
 
     how: Literal["lost", "idle", "first_page", "request_lost"]
     who: Principal
@@ -41,7 +41,8 @@ class Passing(NamedTuple):
 
 @dataclass(slots=True)
 class _Party:
-    """Who holds or asks; `since` counts the time to a takeover, `scripted` once its page answered."""
+    """The holder or the requester. `since` is when the time to a takeover began, `scripted` whether its
+    page has sent a keepalive."""
 
     who: Principal
     since: float
@@ -59,19 +60,19 @@ class ControlAuthority:
         *,
         monotonic: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,
-        tell: Callable[[str], None] = lambda _: None,
-        passed: Callable[[Passing], None] = lambda _: None,
+        log_line: Callable[[str], None] = lambda _: None,
+        on_hand_over: Callable[[HandOver], None] = lambda _: None,
     ) -> None:
-        """`robot` is its name, "" where there is only one; `tell` gets a line for each change, `passed`
-        each that no act made."""
+        """`robot` is its name, "" where there is only one; `log_line` is called with a line for each
+        change, `on_hand_over` with each change that no act made."""
         self.rules = rules
         self._robot: TextLike = robot or say("the_robot")
         self._now = monotonic
         self._wall = wall
-        self._tell = tell
-        self._passed = passed
+        self._log_line = log_line
+        self._on_hand_over = on_hand_over
         self._holder: _Party | None = None
-        self._asker: _Party | None = None
+        self._requester: _Party | None = None
         self._since = ""
         self._given_up = False
         self._denied: dict[str, float] = {}
@@ -84,14 +85,14 @@ class ControlAuthority:
     @property
     def requester(self) -> Principal | None:
         self.advance()
-        return self._asker.who if self._asker else None
+        return self._requester.who if self._requester else None
 
     @property
     def until(self) -> float:
         """When time alone would change who has control, where a panel asks for it."""
         if not self.rules.required:
             return float("inf")
-        times = [party.alive_until for party in (self._holder, self._asker) if party]
+        times = [party.alive_until for party in (self._holder, self._requester) if party]
         return min([*times, self._due()])
 
     def verdict(self, who: Principal) -> Verdict:
@@ -107,7 +108,7 @@ class ControlAuthority:
             return locked("control_held", name=holder.title, robot=self._robot)
         return locked("control_free", robot=self._robot)
 
-    # Acts: each answers why it was refused, "" where it was done. Done twice is done once.
+    # Acts: each returns why it was refused, "" where it was done. They are idempotent.
 
     def take(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
         """Takes what is free; the panel at the cell takes over."""
@@ -125,32 +126,32 @@ class ControlAuthority:
             return "control_stranger"
         if not self.holder or self._may_override(who) or _is(who, self.holder):
             return self.take(who, life_s)
-        if self._asker:
-            return "" if _is(who, self._asker.who) else "control_asked_by"
+        if self._requester:
+            return "" if _is(who, self._requester.who) else "control_asked_by"
         self._denied = {client: until for client, until in self._denied.items() if until > self._now()}
         if who.client.id in self._denied:
             return "control_denied"
-        self._asker = self._party(who, life_s)
-        self._tell(f"{who} asks for control")
+        self._requester = self._party(who, life_s)
+        self._log_line(f"{who} asks for control")
         return ""
 
     def give(self, who: Principal, to: str) -> Refusal:
         """The holder grants the request of the browser with the id `to`."""
-        asker = self.requester
-        if asker is None or asker.client.id != to or not _is(who, self.holder):
+        requester = self.requester
+        if requester is None or requester.client.id != to or not _is(who, self.holder):
             return "control_not_yours"
         self._pass_on(f"given by {who}")
         return ""
 
     def keep(self, who: Principal, to: str) -> Refusal:
         """The holder denies the request of the browser with the id `to`."""
-        asker = self.requester
-        if asker is None or asker.client.id != to or not _is(who, self.holder):
+        requester = self.requester
+        if requester is None or requester.client.id != to or not _is(who, self.holder):
             return "control_not_yours"
         self._denied[to] = self._now() + ASK_AGAIN_S
-        self._asker = None
+        self._requester = None
         self.touch(who)
-        self._tell(f"{who} keeps control: {asker} was denied")
+        self._log_line(f"{who} keeps control: {requester} was denied")
         return ""
 
     def release(self, who: Principal) -> Refusal:
@@ -165,10 +166,10 @@ class ControlAuthority:
             return "control_not_yours"
         return ""
 
-    # Signs of life.
+    # Keepalives.
 
     def keepalive(self, who: Principal, touched: bool) -> None:
-        """A page with scripts is there; `touched` by its operator since the last call."""
+        """A page with scripts is open; `touched`: by its operator since the last call."""
         for party in self._parties(who):
             party.scripted = True
             party.alive_until = self._now() + LIFE_S
@@ -189,22 +190,22 @@ class ControlAuthority:
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
         if by_hand and not self.holder and not self._given_up and self._may_override(who):
             self._hold(who, life_s, "taken at its first page")
-            self._passed(Passing("first_page", who))
+            self._on_hand_over(HandOver("first_page", who))
 
     def advance(self) -> None:
-        """What time alone has changed."""
+        """Applies what time alone has changed: a lost holder or requester, a takeover."""
         now = self._now()
-        if self._asker and now >= self._asker.alive_until:
-            asker = self._asker.who
+        if self._requester and now >= self._requester.alive_until:
+            requester = self._requester.who
             self._end_request()
-            self._passed(Passing("request_lost", asker))
+            self._on_hand_over(HandOver("request_lost", requester))
         if self._holder and now >= self._holder.alive_until:
             self._pass_by_time("lost", f"lost by {self._holder.who}")
         elif now >= self._due():
             self._pass_by_time("idle", "taken over for want of a touch")
 
     def view(self) -> ControlView:
-        """What the pages show."""
+        """The view of control, the same for all clients."""
         if not self.rules.required:
             return NO_CONTROL
         return control_view(self.rules, self._robot, self.holder, self.requester, self._since)
@@ -214,13 +215,13 @@ class ControlAuthority:
 
     def _due(self) -> float:
         """When the request goes through by itself: the holder has the whole time from its begin."""
-        if not self._holder or not self._asker:
+        if not self._holder or not self._requester:
             return math.inf
-        return max(self._holder.since, self._asker.since) + self.rules.takeover_after_s
+        return max(self._holder.since, self._requester.since) + self.rules.takeover_after_s
 
     def _parties(self, who: Principal) -> list[_Party]:
         self.advance()
-        both = (party for party in (self._holder, self._asker) if party)
+        both = (party for party in (self._holder, self._requester) if party)
         return [party for party in both if _is(who, party.who)]
 
     def _party(self, who: Principal, life_s: float) -> _Party:
@@ -228,7 +229,7 @@ class ControlAuthority:
 
     def _hold(self, who: Principal, life_s: float, how: str) -> None:
         self._install(self._party(who, life_s))
-        self._tell(f"control {how} by {who}")
+        self._log_line(f"control {how} by {who}")
 
     def _install(self, party: _Party | None) -> None:
         self._holder = party
@@ -237,27 +238,27 @@ class ControlAuthority:
             self._given_up = False
             now = datetime.fromtimestamp(self._wall(), UTC)
             self._since = now.isoformat(timespec="milliseconds")
-            if self._asker and _is(party.who, self._asker.who):
-                self._asker = None
+            if self._requester and _is(party.who, self._requester.who):
+                self._requester = None
 
     def _pass_on(self, how: str) -> None:
         """To the client that requests it, else to no one."""
-        heir, self._asker = self._asker, None
+        heir, self._requester = self._requester, None
         if heir:
             heir.since = self._now()
         self._install(heir)
-        self._tell(f"control {how}, now of {heir.who if heir else 'no one'}")
+        self._log_line(f"control {how}, now of {heir.who if heir else 'no one'}")
 
-    def _pass_by_time(self, how: Literal["lost", "idle"], log_line: str) -> None:
+    def _pass_by_time(self, how: Literal["lost", "idle"], line: str) -> None:
         before = self._holder
-        self._pass_on(log_line)
+        self._pass_on(line)
         if before:
-            self._passed(Passing(how, before.who, self._holder.who if self._holder else None))
+            self._on_hand_over(HandOver(how, before.who, self._holder.who if self._holder else None))
 
     def _end_request(self) -> None:
-        if self._asker:
-            self._tell(f"{self._asker.who} asks for control no more")
-        self._asker = None
+        if self._requester:
+            self._log_line(f"{self._requester.who} no longer asks for control")
+        self._requester = None
 
 
 def _is(who: Principal, other: Principal | None) -> bool:

@@ -44,17 +44,21 @@ NO_CONTROL: Final = ControlView(
 
 
 def control_view(
-    rules: ControlRules, robot: TextLike, holder: Principal | None, asker: Principal | None, since: str
+    rules: ControlRules,
+    robot: TextLike,
+    holder: Principal | None,
+    requester: Principal | None,
+    since: str,
 ) -> ControlView:
-    """The view for a robot's name; there is an asker only where there is a holder."""
+    """The view for a robot's name; a requester only where there is a holder."""
     if not rules.required:
         return NO_CONTROL
     view = ControlView(
         required=True,
         holder=holder.client.id if holder else "",
         holder_name=holder.title if holder else "",
-        asker=asker.client.id if asker else "",
-        asker_name=asker.title if asker else "",
+        asker=requester.client.id if requester else "",
+        asker_name=requester.title if requester else "",
         since=since,
         holder_text=say("control_mine", robot=robot),
         asker_text="",
@@ -64,9 +68,9 @@ def control_view(
     )
     if holder:
         view["text"] = say("control_held", name=holder.title, robot=robot)
-    if holder and asker:
+    if holder and requester:
         seconds = number(f"{rules.takeover_after_s:g}")
-        view["holder_text"] = say("control_asks", name=asker.title, robot=robot, seconds=seconds)
+        view["holder_text"] = say("control_asks", name=requester.title, robot=robot, seconds=seconds)
         view["asker_text"] = say("control_asked", name=holder.title, seconds=seconds)
     return view
 

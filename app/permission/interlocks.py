@@ -1,8 +1,8 @@
-"""What the robot has against a command: link, interlocks, its endpoints. Pure, from (robot, time) to a
-verdict with its reason; `press_permission` asks them in their order.
+"""Why a command is locked: the link, its interlocks, its topics and servers. Pure functions from
+(robot, time) to a verdict with its reason; `press_permission` calls them in their order.
 
-Nothing is permitted on a doubt: each ground must be there, and the first that is missing is the
-reason an operator reads.
+Unknown means locked: each condition must be known to be met. The first that is not is the reason that
+an operator reads.
 """
 
 import math
@@ -54,7 +54,7 @@ class Verdict:
 
 
 PERMITTED: Final = Verdict(True)
-# The codes of `way`.
+# The codes of a `link_verdict` that locks.
 NO_WAY: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
 )
@@ -88,7 +88,7 @@ def link_verdict(robot: RobotState, now: float) -> Verdict:
 
 @lru_cache(maxsize=64)
 def _no_link(endpoints: tuple[str, ...]) -> Verdict:
-    """With where the bridge was looked for, if that is known."""
+    """The reason names the configured endpoints, if there are any."""
     if not endpoints:
         return locked("no_link")
     named, more = endpoints[:MAX_ENDPOINTS], len(endpoints) - MAX_ENDPOINTS
@@ -97,7 +97,8 @@ def _no_link(endpoints: tuple[str, ...]) -> Verdict:
 
 
 def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
-    """Whether an interlock permits."""
+    """Whether an interlock permits: its topic has the type and QoS, a publisher where that is required,
+    and a value that is fresh and meets its conditions."""
     passable = link_verdict(robot, now)
     if not passable.permitted:
         return passable
@@ -124,8 +125,8 @@ def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Ve
 
 
 def _fresh_since(robot: RobotState, key: str) -> float:
-    """From when on a message was published when it came, and not sent again. Where a publisher is
-    latched, or may be, that is known some time after its first message only."""
+    """From when on a received message is a new one, not one that was replayed on joining. Where a
+    publisher is, or may be, transient local, that is known only some time after its first message."""
     joined = robot.settled_at + HISTORY_S
     return joined if robot.graph.is_volatile(key) else max(joined, robot.replayed.known_since(key))
 
@@ -142,9 +143,9 @@ def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
 
 
 def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:
-    """Why a command may not be sent, beside the link and its interlocks; None where nothing is known
-    against it."""
-    return find_row(AGAINST, widget)(widget, robot, now)
+    """Why a command may not be sent, beside the link and its interlocks; None where nothing locks
+    it."""
+    return find_row(COMMAND_CHECKS, widget)(widget, robot, now)
 
 
 def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
@@ -186,8 +187,8 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
 
 
 def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
-    """Why a service may not be called or a goal not be sent: its server is not there with its type,
-    or an answer is awaited."""
+    """Why a service may not be called or a goal not be sent: no server has its name and type, or
+    a response is awaited."""
     role, name = call.server_role, call.server_name
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
@@ -255,9 +256,8 @@ def _silent_parameter(node: str, name: str) -> TextLike:
 
 
 def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
-    """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
-    not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
-    or listen ("MS")."""
+    """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
+    not route it. `role` is what the panel does with it: publish ("MP") or subscribe ("MS")."""
     return _misfit(
         robot.graph,
         role,
@@ -285,8 +285,8 @@ def locked(code: str, **about: TextLike) -> Verdict:
     return Verdict(False, code, say(code, **about))
 
 
-# What the robot may have against a command, beside the way to it and its interlocks: by family.
-AGAINST: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
+# What may lock a command, beside the link and its interlocks: a check for each family of widgets.
+COMMAND_CHECKS: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
     PublishCommand: lambda of, robot, _: publish_blocked(of, robot),
     Step: step_blocked,
     ServerCommand: call_blocked,

@@ -93,8 +93,8 @@ class RobotSession:
         self.control = ControlAuthority(
             panel.control,
             self.robot.title,
-            tell=self._log.info,
-            passed=lambda passing: self.control_acts.log_passing(passing),
+            log_line=self._log.info,
+            on_hand_over=lambda hand_over: self.control_acts.log_hand_over(hand_over),
         )
         sources = ViewSources(self.control, operators_log, others, server.recordings, server.simulated)
         self.refresher = ViewRefresher(panel, self.robot, server.revision, sources)
@@ -130,7 +130,7 @@ class RobotSession:
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading
-        self.robot.keyed_entries.on_decoded = lambda key: self.refresher.values({key})
+        self.robot.keyed_entries.on_decoded = lambda key: self.refresher.refresh_values({key})
         self.frames = Frames(context, lambda: self.peer.on_graph_change(False))
         self._rosout = Rosout(
             self.robot, self.interfaces, self.link, asyncio.get_running_loop(), self._own_line
@@ -198,7 +198,7 @@ class RobotSession:
         key = self.robot.key(ROSOUT_TOPIC)
         if (lines := self.robot.log_lines.get(key)) is not None:
             lines.add(payload)
-            self.refresher.values({key})
+            self.refresher.refresh_values({key})
 
     def _trend_recorders(self) -> "list[TrendRecorder]":
         """The recorder of what trends show, if the panel has one."""

@@ -111,11 +111,11 @@ class Turn:
             self._confirm(key, reading)
         if updates.urgent or self._again:
             self._again = False
-            self._refresher.now()
+            self._refresher.refresh_now()
         elif updates.other:
-            self._refresher.soon()
+            self._refresher.refresh_next_frame()
         elif updates.values:
-            self._refresher.values(updates.values)
+            self._refresher.refresh_values(updates.values)
 
     def _confirm(self, key: str, reading: Reading) -> None:
         try:

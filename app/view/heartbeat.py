@@ -1,4 +1,4 @@
-"""The heartbeat of all streams of a board: one timer, and bytes that are prepared once for all."""
+"""The heartbeat of all streams of a publisher: one timer, one event for all streams of a language."""
 
 import asyncio
 import json
@@ -18,32 +18,32 @@ EARLY_S: Final = 0.15
 
 
 class Heartbeat:
-    """Beats while someone hears it; on the event loop only."""
+    """Beats while at least one stream is open; on the event loop only."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
-        """`wake` is called when a beat is due, and is to be sent."""
+        """`wake` is called when a beat is due: the streams then send it."""
         self.count = 0
         self._events: dict[str, bytes] = {}
         self._wake = wake
-        self._hearing = 0
+        self._open_streams = 0
         self._timer: asyncio.TimerHandle | None = None
 
     @contextmanager
     def heard(self) -> Iterator[None]:
-        """For as long as a stream is open."""
-        self._hearing += 1
+        """A context for as long as a stream is open."""
+        self._open_streams += 1
         if self._timer is None:
             self._plan()
         try:
             yield
         finally:
-            self._hearing -= 1
-            if not self._hearing and self._timer is not None:
+            self._open_streams -= 1
+            if not self._open_streams and self._timer is not None:
                 self._timer.cancel()
                 self._timer = None
 
     def along(self) -> None:
-        """Something is sent now: a beat that is nearly due goes with it."""
+        """Beats now if a beat is nearly due: it is sent with the event that is about to be sent."""
         timer = self._timer
         if timer is not None and timer.when() - asyncio.get_running_loop().time() <= EARLY_S:
             timer.cancel()
@@ -69,9 +69,9 @@ class Heartbeat:
 
 
 def beat(language: str = ENGLISH) -> bytes:
-    """The event: a page that misses it locks itself. It has no id: nothing has changed.
+    """The `beat` event, without an id. A page that misses it locks itself.
 
-    `clock` is to be shown; `now` is the server's own time, in milliseconds.
+    `clock` is the time as the page shows it; `now` is the server's own time, in milliseconds.
     """
     data = {
         "clock": render(format_time(time.time()), language),

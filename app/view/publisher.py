@@ -1,12 +1,12 @@
 """The latest view with a version, and the events that bring a browser from one to another.
 
-There is no queue: a stream remembers the view that it sent last and, whenever it can send, gets
-the difference to the newest. A client's role in control decides which view that is: there is one for
-each role. What is sent is encoded once for all streams of a language and a role: those that are equally
-far share the same bytes, the others those of each event that says all of something.
+There is no queue: a stream keeps the view that it sent last and, when it can send, gets the difference
+to the newest. There is a view for each role in control. Events are encoded once for all streams of a
+language and a role: streams at the same version share the bytes of the difference, all others those of
+each event that carries a whole section.
 
-A page gets what its own widgets show, and those of the frame: their locks, not the permissions behind
-them. Who names no page gets everything.
+A page gets the attributes of its own widgets and of the frame's, with their locks, but not the
+interlocks behind them. A client that names no page gets everything.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from app.view.view import View, for_role
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
 NO_PAGES: Final[Mapping[str, Collection[str]]] = {}
-# What some readers take for the end of a line, and JSON leaves as it is.
+# Line ends for some readers, which JSON does not escape.
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 
@@ -38,7 +38,7 @@ def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
 
 
 class ViewPublisher:
-    """Where the view is posted; changed on the event loop only."""
+    """The newest view, with its version; changed on the event loop only."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class ViewPublisher:
         without_control: Mapping[str, Attributes] = NOTHING,
         pages: Mapping[str, Collection[str]] = NO_PAGES,
     ) -> None:
-        """`revision` is of all that a page has loaded: one that differs makes it load again.
+        """`revision` is of all files that a page has loaded: a page with another one reloads.
         `without_control` has what is different for clients without control, `pages` the ids of the
         widgets that a page shows, by the page's."""
         self._pages = pages
@@ -57,7 +57,7 @@ class ViewPublisher:
         self.revision = revision
         self.heartbeat = Heartbeat(self._wake)
         self._changed = asyncio.Event()
-        self._news: Events = {}  # from the view before to this one
+        self._latest_events: Events = {}  # from the view before to this one
         self._without_control = without_control
         self._by_role: dict[tuple[Role, str], View] = {}
         # By the language, the version before, the roles then and now, and the page.
@@ -72,15 +72,15 @@ class ViewPublisher:
         return f"{self.boot}-{self.version}"
 
     def post(self, view: View, without_control: Mapping[str, Attributes] = NOTHING) -> None:
-        """A view as of now; nothing happens if it is the same as before."""
-        news = difference(self.view, view)
-        if not news and without_control == self._without_control:
+        """Publishes a view with a new version; does nothing if it is the same as the newest."""
+        events = difference(self.view, view)
+        if not events and without_control == self._without_control:
             return
         self.version += 1
-        for widget, changed in news.get("update", {}).items():
+        for widget, changed in events.get("update", {}).items():
             if "enabled" in changed:
                 self._lock_changes[widget] = self.version
-        self.view, self._news, self._without_control = view, news, without_control
+        self.view, self._latest_events, self._without_control = view, events, without_control
         self._by_role, self._prepared, self._whole = {}, {}, {}
         self.heartbeat.along()
         self._wake()
@@ -98,14 +98,14 @@ class ViewPublisher:
         changed, self._changed = self._changed, asyncio.Event()
         changed.set()
 
-    async def news(self, version: int, beats: int) -> None:
-        """Waits for a version after `version`, a heartbeat after `beats`, or the end."""
+    async def wait_for_change(self, version: int, beats: int) -> None:
+        """Waits until there is a later version, a later heartbeat, or the publisher is closed."""
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
     def for_role(self, role: Role = "", page: str = "") -> View:
-        """The newest view, as clients of this role get it on a page; of all pages with "", and with a
-        page that the panel does not have (any more)."""
+        """The newest view for clients of this role on a page. With "", or a page that the panel does
+        not have, it has the widgets of all pages."""
         key = role, page
         if key not in self._by_role:
             whole = for_role(self.view, self._without_control, role)
@@ -121,7 +121,7 @@ class ViewPublisher:
         """The `snapshot` event: everything that the page shows."""
         view = self.for_role(role, page)
         about = {"id": self.id, "revision": self.revision}
-        return self._all_of("snapshot", view, language, lambda: {**about, **view})
+        return self._shared_event("snapshot", view, language, lambda: {**about, **view})
 
     def events_since(
         self,
@@ -132,39 +132,39 @@ class ViewPublisher:
         role: Role = "",
         page: str = "",
     ) -> bytes:
-        """The events from a view that was posted as `version`, and sent to those whose role it `was`,
-        to the newest one; both as the page shows them."""
+        """The events that bring a page from `view`, which was posted as `version` and sent to a client
+        of the role `was`, to the newest view for `role`."""
         key = language, version, was, role, page if page in self._pages else ""
         prepared = self._prepared.get(key)
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
-            news = self._news if latest else difference(view, self.for_role(role, page))
+            events = self._latest_events if latest else difference(view, self.for_role(role, page))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, language)
                 if name == "update"
-                else self._all_of(name, data, language)
-                for name, data in self._shown(news, page).items()
+                else self._shared_event(name, data, language)
+                for name, data in self._shown(events, page).items()
             )
         return prepared
 
-    def _shown(self, news: Events, page: str) -> Events:
+    def _shown(self, events: Events, page: str) -> Events:
         """The events that a page gets, in their order: keys lock before the rest is shown."""
         if page not in self._pages:
-            return news
-        shown = {name: data for name, data in news.items() if not name.endswith(PERMISSION_EVENT)}
+            return events
+        shown = {name: data for name, data in events.items() if not name.endswith(PERMISSION_EVENT)}
         if own := self._of_page(dict(shown.pop("update", {})), page):
             shown = {"update": own, **shown}
         return shown
 
-    def _all_of(
+    def _shared_event(
         self,
         name: str,
         of: Mapping[str, Any],
         language: str,
         data: Callable[[], Mapping[str, Any]] | None = None,
     ) -> bytes:
-        """An event that is the same whatever was sent before: with `of`, a part of one of the newest
-        views, or `data` made of it."""
+        """An event that does not depend on what a stream sent before; encoded once. `of` is a part of
+        one of the newest views, `data` makes the event's data of it if they differ."""
         key = language, name, id(of)
         whole = self._whole.get(key)
         if whole is None:

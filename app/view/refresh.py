@@ -1,6 +1,6 @@
-"""When a robot's state is shown: permissions and the link at once, values as often as the panel says.
+"""When a view is published: permissions and the link at once, values at the panel's `display_hz`.
 
-Whatever time alone changes (an age, a request for control) is shown when it is due.
+What time alone changes (an age, a request for control) is published when it is due.
 """
 
 import asyncio
@@ -28,16 +28,16 @@ AGAIN_S: Final = 1.0  # after which a view that could not be built is built agai
 
 
 class OtherRobots(Protocol):
-    """What is needed of all robots of a panel, where there are several."""
+    """The other robots of the panel, as one robot's view needs them."""
 
     def link_statuses(self) -> Mapping[str, Lamp]:
-        """The lamp of each, by its id."""
+        """The lamp of each robot, by the robot's id."""
 
     def boots(self) -> Collection[str]:
-        """The boots of their boards."""
+        """The `boot` of each robot's publisher."""
 
     def show_but(self, robot: RobotState) -> None:
-        """One robot's lamp has changed: the others' pages show it."""
+        """Refreshes the views of the other robots: the lamp of `robot` has changed."""
 
 
 class NoOtherRobots:
@@ -53,7 +53,7 @@ class NoOtherRobots:
 
 
 class Recorded(Protocol):
-    """What is needed of the recordings."""
+    """The part of the recorder that a view needs."""
 
     @property
     def fault(self) -> TextLike:
@@ -62,7 +62,7 @@ class Recorded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ViewSources:
-    """What is shown beside the robot's state."""
+    """Where a view takes from what is not the robot's state."""
 
     control: ControlAuthority
     operators_log: Log
@@ -72,8 +72,8 @@ class ViewSources:
 
 
 class ViewRefresher:
-    """The view of one robot, and when it is published; on the event loop only. What it shows decides
-    nothing: a view that can't be built is logged, and built again."""
+    """Builds the view of one robot and posts it to its publisher; on the event loop only. A view that
+    can't be built is logged and built again: no command depends on it."""
 
     def __init__(self, panel: Panel, robot: RobotState, revision: str, sources: ViewSources) -> None:
         self._panel = panel
@@ -91,33 +91,33 @@ class ViewRefresher:
             self._current.view, revision, self._current.without_control, panel.widgets_by_page
         )
         self._shown_at = 0.0
-        self._spoke: set[str] = set()  # keys of topics that said something since
-        self._whole = False  # whether more than values is to be shown
+        self._updated_keys: set[str] = set()  # of topics with a sample since the last frame
+        self._whole = False  # whether the next frame builds the whole view
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf  # monotonic seconds; not every event loop's timers know theirs
         self._failed = False
         self._stopped = False
 
     def stop(self) -> None:
-        """Shows nothing any more."""
+        """Publishes no further view."""
         self._stopped = True
         if self._timer is not None:
             self._timer.cancel()
 
-    def now(self) -> None:
-        """Posts the state as of now to the board."""
+    def refresh_now(self) -> None:
+        """Builds the whole view now and posts it to the publisher."""
         self._whole = True
         self._frame()
 
-    def soon(self) -> None:
-        """The same when the next frame is due."""
+    def refresh_next_frame(self) -> None:
+        """Builds the whole view when the next frame is due."""
         self._whole = True
-        self._at(self.due)
+        self._schedule(self.due)
 
-    def values(self, keys: Collection[str]) -> None:
-        """Shows what these topics (their keys) said, when the next frame is due."""
-        self._spoke.update(keys)
-        self._at(self.due)
+    def refresh_values(self, keys: Collection[str]) -> None:
+        """Updates the displays of the topics with these keys when the next frame is due."""
+        self._updated_keys.update(keys)
+        self._schedule(self.due)
 
     @property
     def due(self) -> float:
@@ -138,36 +138,36 @@ class ViewRefresher:
             if not self._failed:
                 self._log.exception("the view could not be refreshed; it is tried again")
             self._failed = self._whole = True
-            self._at(self._shown_at + AGAIN_S)
+            self._schedule(self._shown_at + AGAIN_S)
             locked = lock_all(self._current, say("view_failed"))
             self.publisher.post(locked.view, locked.without_control)
         else:
             self._failed = self._whole = False
-            self._spoke = set()
-            self._at(self._current.until)
+            self._updated_keys = set()
+            self._schedule(self._current.until)
 
     def _refresh(self) -> None:
         now = self._shown_at
         if self._whole or now >= self._current.rest:
-            self._look()
+            self._rebuild()
         else:
             self._current = update_displays(self._current, self._stale(now), self._robot, now)
 
     def _stale(self, now: float) -> list[DisplayWidget]:
-        """The displays that a topic or time has changed."""
-        untils, spoke = self._current.displays, self._spoke
-        return [w for keys, w in self._displays if not keys.isdisjoint(spoke) or untils[w.id] <= now]
+        """The displays that a sample or time has changed."""
+        untils, updated = self._current.displays, self._updated_keys
+        return [w for keys, w in self._displays if not keys.isdisjoint(updated) or untils[w.id] <= now]
 
-    def _look(self) -> None:
-        """Builds the whole view."""
+    def _rebuild(self) -> None:
+        """Builds the whole view; twice if the robot's lamp changed, since the view shows it."""
         self._current = self._build()
         if self._current.robot != self.lamp:
             self.lamp = self._current.robot
             self._sources.others.show_but(self._robot)
             self._current = self._build()
 
-    def _at(self, when: float) -> None:
-        """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
+    def _schedule(self, when: float) -> None:
+        """Plans the next frame at `when` (monotonic seconds), or earlier if one is planned earlier."""
         if self._timer is not None:
             if self._due <= when:
                 return

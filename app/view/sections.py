@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal, NamedTuple
 
-Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
+Events = dict[str, Mapping[str, Any]]  # event name → its data, in the order of sending
 
-PERMISSION_EVENT: Final = "-enabled-updated"  # behind an interlock's id: for programs
+PERMISSION_EVENT: Final = "-enabled-updated"  # appended to an interlock's id; for programs
 
 
 class Section(NamedTuple):
-    """`name` is its key in a view and in a snapshot, `events` what brings a browser from one content
-    to another. `template` is its part of a page, in the header or below it (`place`), "" where the page
-    itself has it; `shown` says for which content that is there."""
+    """`name` is its key in a view and in a snapshot. `events` returns the events that update a page
+    from the old to the new content. `template` is its part of a page, in the header or below it (`place`),
+    "" if the page itself has it; `shown` returns whether the page has that part for a content."""
 
     name: str
     events: Callable[[str, Any, Any], Events]
@@ -21,7 +21,7 @@ class Section(NamedTuple):
 
 
 def whole(name: str, old: Any, new: Any) -> Events:
-    """One event with all of it."""
+    """One event with the whole section."""
     return {} if old == new else {name: new}
 
 
@@ -56,7 +56,7 @@ SECTIONS: Final = (
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
-    """What brings a browser from one view to another: nothing where they are the same."""
+    """The events that update a page from the old to the new view; none if they are the same."""
     events: Events = {}
     for section in SECTIONS:
         events |= section.events(section.name, old[section.name], new[section.name])

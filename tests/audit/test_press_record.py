@@ -119,7 +119,7 @@ class Bench(FakeTransport):
         self.queried = asyncio.Semaphore(0)  # released by each query
         permits(self.robot)
         self.presses = presses_of(
-            panel, self.robot, self, press_log=PressLog(log, "arm", lambda: "board-3")
+            panel, self.robot, self, press_log=PressLog(log, "arm", lambda: "boot-3")
         )
         for service in ("light",):
             self.robot.graph.apply_token(f"@/b1/@ros2_lv/SS/{service}/std_srvs§srv§SetBool", True)
@@ -330,7 +330,7 @@ def test_an_entry_says_who_what_where_and_by_which_state(tmp_path: Path) -> None
             "arm", "p1", "guarded", "press",
         )  # fmt: skip
         assert json.loads(entry.values) == {"message": "hi"}
-    assert (closed.outcome, closed.verdict, closed.board) == ("published", "permitted", "board-3")
+    assert (closed.outcome, closed.verdict, closed.board) == ("published", "permitted", "boot-3")
     assert closed.reason.startswith("Sent on /guarded at ")
 
 

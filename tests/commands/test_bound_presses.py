@@ -127,7 +127,7 @@ def test_a_press_has_its_time_and_the_panel_says_how_long(
 
 
 def guard_of(panel: Panel) -> PressGuard:
-    control = ControlAuthority(panel.control, "", tell=lambda *_: None)
+    control = ControlAuthority(panel.control, "", log_line=lambda *_: None)
     sources = ViewSources(control, NullLog(), NoOtherRobots())
     publisher = ViewRefresher(panel, robot_there(panel), "r1", sources).publisher
     return PressGuard(publisher, control, NullLog(), panel.press_expires_s, lambda: ())

@@ -60,10 +60,10 @@ class Bench:
             ControlRules(required=True),
             "Robot 1",
             monotonic=lambda: self.now,
-            passed=lambda passing: self.acts.log_passing(passing),
+            on_hand_over=lambda hand_over: self.acts.log_hand_over(hand_over),
         )
-        board = ViewPublisher(build_view(PANEL, robot_there(PANEL), NOW).view, "r1")
-        self.guard = PressGuard(board, self.control, self.log, 3.0, lambda: ())
+        publisher = ViewPublisher(build_view(PANEL, robot_there(PANEL), NOW).view, "r1")
+        self.guard = PressGuard(publisher, self.control, self.log, 3.0, lambda: ())
         press_log = PressLog(self.log, "Robot 1")
         self.acts = ControlActs(self.control, self.guard, press_log, "", self._show)
 

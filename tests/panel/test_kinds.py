@@ -6,7 +6,7 @@ from jinja2 import Environment, FileSystemLoader
 from app.commands.dispatch import Dispatcher
 from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCommand
 from app.panel.widgets.kinds import KINDS, find_row
-from app.permission.interlocks import AGAINST
+from app.permission.interlocks import COMMAND_CHECKS
 from app.settings import shipped_path
 from app.view.kinds import SHOWN
 from tests.support.builders import FakeTransport, panel_of, robot_there, sending_of
@@ -44,7 +44,7 @@ def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[BaseWidget]) -> None
 @EACH
 def test_a_command_is_judged_and_sent(kind: str, of: type[BaseWidget], dispatcher: Dispatcher) -> None:
     if issubclass(of, Command):
-        assert callable(find_row(AGAINST, widget(of, kind)))
+        assert callable(find_row(COMMAND_CHECKS, widget(of, kind)))
     if issubclass(of, PressCommand):
         assert callable(find_row(dispatcher.senders, widget(of, kind)))
         assert callable(find_row(dispatcher.refusals, widget(of, kind)))
@@ -54,4 +54,4 @@ def test_a_command_is_judged_and_sent(kind: str, of: type[BaseWidget], dispatche
 
 def test_a_kind_without_a_row_is_named() -> None:
     with pytest.raises(TypeError, match='no row for a widget of the kind "text"'):
-        find_row(AGAINST, widget(KINDS["text"], "text"))
+        find_row(COMMAND_CHECKS, widget(KINDS["text"], "text"))

@@ -37,7 +37,7 @@ class Room:
         self.now = 1000.0
         self.logged: list[str] = []
         self.control = ControlAuthority(
-            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.logged.append
+            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, log_line=self.logged.append
         )
 
     def pass_s(self, seconds: float, *alive: Principal, touched: bool = False) -> None:

@@ -233,7 +233,7 @@ def test_each_language_has_events_of_its_own_encoded_once(
 def test_who_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:
     permits(robot)
     publisher.post(view_of(robot))
-    run(publisher.news(1, 0))
+    run(publisher.wait_for_change(1, 0))
 
 
 def test_who_waits_is_woken_by_a_new_view(publisher: ViewPublisher, robot: RobotState) -> None:
@@ -242,7 +242,7 @@ def test_who_waits_is_woken_by_a_new_view(publisher: ViewPublisher, robot: Robot
 
     async def woken() -> None:
         asyncio.get_running_loop().call_soon(publisher.post, new)
-        await publisher.news(1, 0)
+        await publisher.wait_for_change(1, 0)
 
     run(woken())
     assert publisher.version == 2
@@ -254,7 +254,7 @@ def test_all_who_wait_are_woken(publisher: ViewPublisher, robot: RobotState) -> 
 
     async def woken() -> None:
         asyncio.get_running_loop().call_soon(publisher.post, new)
-        await asyncio.gather(*(publisher.news(1, 0) for _ in range(5)))
+        await asyncio.gather(*(publisher.wait_for_change(1, 0) for _ in range(5)))
 
     run(woken())
 
@@ -262,7 +262,7 @@ def test_all_who_wait_are_woken(publisher: ViewPublisher, robot: RobotState) -> 
 def test_who_waits_is_woken_by_the_heartbeat(publisher: ViewPublisher) -> None:
     async def woken() -> None:
         with publisher.heartbeat.heard():
-            await publisher.news(1, 0)
+            await publisher.wait_for_change(1, 0)
 
     run(woken())
     assert (publisher.version, publisher.heartbeat.count) == (1, 1)
@@ -271,7 +271,7 @@ def test_who_waits_is_woken_by_the_heartbeat(publisher: ViewPublisher) -> None:
 def test_the_end_wakes_who_waits(publisher: ViewPublisher) -> None:
     async def woken() -> None:
         asyncio.get_running_loop().call_soon(publisher.close)
-        await publisher.news(1, 0)
+        await publisher.wait_for_change(1, 0)
 
     run(woken())
     assert publisher.closed
@@ -279,7 +279,7 @@ def test_the_end_wakes_who_waits(publisher: ViewPublisher) -> None:
 
 def test_after_the_end_no_one_waits(publisher: ViewPublisher) -> None:
     publisher.close()
-    run(publisher.news(1, 0))
+    run(publisher.wait_for_change(1, 0))
 
 
 def test_the_board_knows_when_a_lock_has_last_turned(

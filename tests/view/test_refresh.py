@@ -88,14 +88,14 @@ def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[S
 
 
 def showing_of(panel: Panel, robot: RobotState) -> ViewRefresher:
-    control = ControlAuthority(panel.control, "", tell=lambda *_: None)
+    control = ControlAuthority(panel.control, "", log_line=lambda *_: None)
     return ViewRefresher(panel, robot, "r1", ViewSources(control, NullLog(), NoOtherRobots()))
 
 
 async def newer(publisher: ViewPublisher, version: int) -> None:
     async with asyncio.timeout(10):
         while publisher.version <= version:
-            await publisher.news(version, publisher.heartbeat.count)
+            await publisher.wait_for_change(version, publisher.heartbeat.count)
 
 
 def run(work: Coroutine[Any, Any, None]) -> None:
@@ -106,11 +106,11 @@ def test_values_wait_for_the_frame_and_come_together() -> None:
     async def shown() -> None:
         robot = there(SLOW)
         showing = showing_of(SLOW, robot)
-        showing.now()
+        showing.refresh_now()
         due, version = showing.due, showing.publisher.version
         for number in range(100):
             says(robot, "/heard", str(number))
-            showing.values({robot.key("/heard")})
+            showing.refresh_values({robot.key("/heard")})
         assert showing.publisher.version == version
         await newer(showing.publisher, version)
         assert time.monotonic() >= due
@@ -125,11 +125,11 @@ def test_a_permission_waits_for_no_frame_and_takes_the_values_along() -> None:
     async def shown() -> None:
         robot = there(SLOW)
         showing = showing_of(SLOW, robot)
-        showing.now()
+        showing.refresh_now()
         says(robot, "/heard", "hello")
-        showing.values({robot.key("/heard")})
+        showing.refresh_values({robot.key("/heard")})
         permits(robot, False)
-        showing.now()
+        showing.refresh_now()
         widgets = showing.publisher.view["widgets"]
         assert (widgets["guarded"]["enabled"], widgets["heard"]["text"]) == (False, "hello")
         showing.stop()

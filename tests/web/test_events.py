@@ -62,11 +62,11 @@ class Client:
 
 
 class Bench:
-    """A board with streams of it."""
+    """A publisher with its streams."""
 
     def __init__(self) -> None:
         self.robot = robot_there(PANEL)
-        self.board = ViewPublisher(view_of(self.robot), "r1")
+        self.publisher = ViewPublisher(view_of(self.robot), "r1")
         self.streams = Open()
 
     @property
@@ -75,12 +75,12 @@ class Bench:
 
     def says(self, text: str) -> None:
         says(self.robot, "/heard", text)
-        self.board.post(view_of(self.robot))
+        self.publisher.post(view_of(self.robot))
 
     @asynccontextmanager
     async def stream(self) -> AsyncIterator[tuple[Client, "asyncio.Task[None]"]]:
         client = Client()
-        answer = EventStream(self.board, b"", self.streams)
+        answer = EventStream(self.publisher, b"", self.streams)
         task = asyncio.create_task(answer(SCOPE, client.receive, client.send))
         await turns()
         try:
@@ -114,7 +114,9 @@ def test_it_begins_with_a_snapshot_and_a_beat_and_goes_on_with_changes() -> None
             assert [name for name, _, _ in events_in(first["body"].decode())] == ["snapshot", "beat"]
             bench.says("one")
             await turns()
-            assert client.events("update") == [{"heard": english(bench.board.view["widgets"]["heard"])}]
+            assert client.events("update") == [
+                {"heard": english(bench.publisher.view["widgets"]["heard"])}
+            ]
 
     run(work)
 
@@ -133,7 +135,7 @@ def test_who_does_not_read_costs_one_event_and_then_gets_the_newest() -> None:
             await turns()
             assert client.sending == sending
             assert len(other.got) > received  # no one else waits for it
-            assert len(bench.board._prepared) <= 2
+            assert len(bench.publisher._prepared) <= 2
             client.read(True)
             await turns()
             texts = [update["heard"]["text"] for update in client.events("update")]
@@ -147,7 +149,7 @@ def test_a_permission_is_sent_in_the_same_turn_to_all() -> None:
         bench = Bench()
         async with bench.stream() as (one, _), bench.stream() as (other, _):
             permits(bench.robot)
-            bench.board.post(view_of(bench.robot))
+            bench.publisher.post(view_of(bench.robot))
             await turns()
             for client in (one, other):
                 assert client.events("operation-enabled-updated") == [{"enabled": True, "reason": None}]
@@ -168,7 +170,7 @@ def test_a_browser_that_goes_leaves_nothing_behind() -> None:
             await task
             assert bench.open == 0
             assert asyncio.all_tasks() == {asyncio.current_task()}
-            assert bench.board.heartbeat._timer is None
+            assert bench.publisher.heartbeat._timer is None
 
     run(work)
 
@@ -177,7 +179,7 @@ def test_the_end_of_the_board_ends_it() -> None:
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (client, task):
-            bench.board.close()
+            bench.publisher.close()
             await task
             assert client.got[-1] == {"type": "http.response.body", "body": b"", "more_body": False}
 
@@ -191,7 +193,7 @@ def test_what_fails_ends_it_and_is_logged(monkeypatch: pytest.MonkeyPatch) -> No
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (_, task):
-            monkeypatch.setattr(bench.board, "events_since", fail)
+            monkeypatch.setattr(bench.publisher, "events_since", fail)
             bench.says("one")
             with pytest.raises(ExceptionGroup, match="TaskGroup"):
                 await task
@@ -211,12 +213,12 @@ def test_its_body_goes_past_the_layers_and_its_begin_through_them() -> None:
                 through.append(message["type"])
                 await send(message)
 
-            await EventStream(bench.board, b"", bench.streams)(scope, receive, wrapped)
+            await EventStream(bench.publisher, b"", bench.streams)(scope, receive, wrapped)
 
         scope = dict(SCOPE)
         task = asyncio.create_task(Direct(layer)(scope, client.receive, client.send))
         await turns()
-        bench.board.close()
+        bench.publisher.close()
         await task
         assert through == ["http.response.start"]
         assert len(client.events("snapshot")) == 1

@@ -44,7 +44,7 @@ class Room:
         permits(self.robot)
         self.control = ControlAuthority(RULES, "", monotonic=lambda: NOW)
         built = self.build()
-        self.board = ViewPublisher(built.view, "r1", built.without_control)
+        self.publisher = ViewPublisher(built.view, "r1", built.without_control)
         self._clients = Clients()
 
     def build(self) -> ViewWithDeadlines:
@@ -53,7 +53,7 @@ class Room:
 
     def post(self) -> None:
         built = self.build()
-        self.board.post(built.view, built.without_control)
+        self.publisher.post(built.view, built.without_control)
 
     def who(self, number: int) -> Principal:
         return Principal(self._clients.identify(f"{number:032x}", "192.0.2.1"))
@@ -61,7 +61,7 @@ class Room:
     async def stream(self, number: int, until: AsyncExitStack) -> Client:
         client, who = Client(), self.who(number)
         stream = EventStream(
-            self.board, b"", Open(), role=lambda: role(self.board.view["control"], who, RULES)
+            self.publisher, b"", Open(), role=lambda: role(self.publisher.view["control"], who, RULES)
         )
         task = asyncio.create_task(stream(SCOPE, client.receive, client.send))
 
@@ -137,5 +137,5 @@ def test_500_streams_share_what_is_encoded(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_without_control_in_the_panel_file_all_streams_are_one() -> None:
     room = Room()
-    assert room.board.for_role("") is room.board.view
-    assert room.board.for_role("held") is room.board.for_role("held")
+    assert room.publisher.for_role("") is room.publisher.view
+    assert room.publisher.for_role("held") is room.publisher.for_role("held")

@@ -42,20 +42,20 @@ async def events(
 ) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare. `page`: of its widgets
     only, and those of the frame; without one, or with one that the panel does not have, of all."""
-    board, rules = session.publisher, session.control.rules
+    publisher, rules = session.publisher, session.control.rules
     who, token = welcomed(request, state) if rules.required else (None, "")
     first = client_id_event(who.client.id) if who else b""
 
     def role_now() -> Role:
-        return role(board.view["control"], who, rules) if who else ""
+        return role(publisher.view["control"], who, rules) if who else ""
 
     answer: Response
     language = language_of(request)
     if once:
-        all_of_it = board.snapshot(language, role_now(), page) + first + beat(language)
+        all_of_it = publisher.snapshot(language, role_now(), page) + first + beat(language)
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, state.metrics.streams, language, role_now, page)
+        answer = EventStream(publisher, first, state.metrics.streams, language, role_now, page)
     return keep(answer, request, token)
 
 
@@ -65,7 +65,7 @@ def no_role() -> Role:
 
 
 class EventStream(Response):
-    """What one browser gets, until it goes or the board is closed. It waits while the browser does
+    """What one browser gets, until it goes or the publisher is closed. It waits while the browser does
     not read, and then skips to now."""
 
     media_type = MEDIA_TYPE
@@ -82,7 +82,7 @@ class EventStream(Response):
         """`first` comes with the snapshot; `streams` counts it while it is open; `role` is what its
         client is to who has control now, `page` the page that it is for."""
         self._page = page
-        self._board = publisher
+        self._publisher = publisher
         self._first = first
         self._streams = streams
         self._language = language
@@ -93,7 +93,7 @@ class EventStream(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
-        with self._streams.another(), self._board.heartbeat.heard():
+        with self._streams.another(), self._publisher.heartbeat.heard():
             async with asyncio.TaskGroup() as group:
                 # A task of its own: waking it wakes nothing of what the request came through.
                 writing = group.create_task(self._write(direct(scope, send)))
@@ -102,20 +102,22 @@ class EventStream(Response):
                 writing.cancel()
 
     async def _write(self, send: Send) -> None:
-        board, heartbeat, language = self._board, self._board.heartbeat, self._language
+        publisher, heartbeat, language = self._publisher, self._publisher.heartbeat, self._language
         page = self._page
         now = self._role()
-        version, view, beats = board.version, board.for_role(now, page), heartbeat.count
+        version, view, beats = publisher.version, publisher.for_role(now, page), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot(language, now, page) + self._first + beat(language)))
-        while not board.closed:
-            await board.news(version, beats)
+        await send(
+            _body(retry + publisher.snapshot(language, now, page) + self._first + beat(language))
+        )
+        while not publisher.closed:
+            await publisher.wait_for_change(version, beats)
             was, now = now, self._role()
-            newer = board.version > version
-            chunk = board.events_since(version, view, language, was, now, page) if newer else b""
+            newer = publisher.version > version
+            chunk = publisher.events_since(version, view, language, was, now, page) if newer else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event(language)
-            version, view, beats = board.version, board.for_role(now, page), heartbeat.count
+            version, view, beats = publisher.version, publisher.for_role(now, page), heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})

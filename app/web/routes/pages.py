@@ -204,7 +204,7 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
 def _context(
     request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
 ) -> PageContext:
-    board, rules = session.publisher, session.control.rules
+    publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = clock.server_now(), time.time()
@@ -218,10 +218,10 @@ def _context(
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=board.for_role(role(board.view["control"], who, rules)),
+        view=publisher.for_role(role(publisher.view["control"], who, rules)),
         sections=SECTIONS,
-        event_id=board.id,
-        revision=board.revision,
+        event_id=publisher.id,
+        revision=publisher.revision,
         clock=format_time(wall),
         loaded=format_datetime(wall),
         press_id=secrets.token_hex(8),
