@@ -27,12 +27,12 @@ from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
-from app.web.asgi import Application, StartErrorsInWords
+from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets
-from app.web.described import errors
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
+from app.web.openapi_parts import errors
 from app.web.page_templates import PageTemplates
 from app.web.proxies import Proxies
 from app.web.request_body import LONGEST
@@ -103,7 +103,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
     app.add_middleware(RequestGuard, hosts=settings.hosts)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
-    app.add_middleware(StartErrorsInWords)
+    app.add_middleware(ReadableStartupErrors)
 
 
 def _add_routes(app: FastAPI, dev: bool) -> None:

@@ -183,12 +183,12 @@ class ControlAuthority:
             self._holder.since = self._now()
             self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)
 
-    def loaded(self, who: Principal, life_s: float, by_hand: bool) -> None:
-        """A page was loaded; without scripts it comes again within `life_s`. With `by_hand` False
-        (a program, a browser that fetches ahead) nothing is taken."""
+    def loaded(self, who: Principal, life_s: float, opened_by_person: bool) -> None:
+        """A page was loaded; without scripts it reloads within `life_s`. Control is taken only with
+        `opened_by_person`, not for a program or a browser that prefetches."""
         for party in self._parties(who):
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
-        if by_hand and not self.holder and not self._given_up and self._may_override(who):
+        if opened_by_person and not self.holder and not self._given_up and self._may_override(who):
             self._hold(who, life_s, "taken at its first page")
             self._on_hand_over(HandOver("first_page", who))
 

@@ -10,8 +10,9 @@ PERMISSION_EVENT: Final = "-enabled-updated"  # appended to an interlock's id; f
 
 class Section(NamedTuple):
     """`name` is its key in a view and in a snapshot. `events` returns the events that update a page
-    from the old to the new content. `template` is its part of a page, in the header or below it (`place`),
-    "" if the page itself has it; `shown` returns whether the page has that part for a content."""
+    from the old to the new content. `template` is its part of a page, in the header or below it
+    (`place`), "" if the page itself has it; `shown` returns whether a content is
+    shown there."""
 
     name: str
     events: Callable[[str, Any, Any], Events]

@@ -1,4 +1,4 @@
-"""Wrappers around the ASGI application: HEAD, errors of the start in words, the server's own `send`."""
+"""ASGI layers: HEAD requests, the server's own `send`, startup errors without a traceback."""
 
 import asyncio
 import sys
@@ -14,9 +14,9 @@ KEY: Final = "panel.send"
 
 
 class Application(FastAPI):
-    """With `Heads` and `Direct` around all others: FastAPI has layers of its own around those added.
+    """A FastAPI application with `Heads` and `KeepServerSend` around FastAPI's own outer layers.
 
-    `state.server` is the configuration of the server from the start on; None where it is not uvicorn's.
+    `state.server` is the configuration of the server, set at startup; None if it is not uvicorn.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -25,7 +25,7 @@ class Application(FastAPI):
         await super().__call__(scope, receive, send)
 
     def build_middleware_stack(self) -> ASGIApp:
-        return Heads(Direct(super().build_middleware_stack()))
+        return Heads(KeepServerSend(super().build_middleware_stack()))
 
 
 class Heads:
@@ -68,8 +68,8 @@ class _Head:
             self._sent.set()
 
 
-class Direct:
-    """The outermost layer: keeps `send` in the scope for as long as the request is answered."""
+class KeepServerSend:
+    """Keeps the `send` of the server in the scope while the request is handled."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -79,26 +79,26 @@ class Direct:
         try:
             await self._app(scope, receive, send)
         finally:
-            del scope[KEY]  # a circle otherwise: who sends knows the scope
+            del scope[KEY]  # else a reference cycle: `send` refers to the scope
 
 
-def direct(scope: Scope, send: Send) -> Send:
-    """The server's own, where the application has that layer; else `send`."""
+def server_send(scope: Scope, send: Send) -> Send:
+    """The `send` that `KeepServerSend` kept, past all layers; without that layer `send` itself."""
     own: Send = scope.get(KEY, send)
     return own
 
 
-class StartErrorsInWords:
-    """Passes everything on, but for the tracebacks of the kiosk's own errors."""
+class ReadableStartupErrors:
+    """Replaces the traceback of a KioskError at startup by its message."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def in_words(message: Message) -> None:
-            error = sys.exception()  # Starlette sends while it handles what the lifespan raised
+        async def send_readable(message: Message) -> None:
+            error = sys.exception()  # Starlette sends while it handles the lifespan's error
             if message["type"] == "lifespan.startup.failed" and isinstance(error, KioskError):
                 message = {**message, "message": str(error)}
             await send(message)
 
-        await self._app(scope, receive, in_words if scope["type"] == "lifespan" else send)
+        await self._app(scope, receive, send_readable if scope["type"] == "lifespan" else send)

@@ -1,4 +1,4 @@
-"""Which browser asks: a cookie that the server gives it, never in a path."""
+"""The client of a request, by a cookie that the server sets. Its token is in no path."""
 
 import re
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ OTHER_SITES: Final = frozenset({"cross-site", "same-site"})
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who asks, as long as a connection lasts; `token` is "" without a cookie, or with none of ours."""
+    """The client of a connection; `token` is "" without a valid cookie."""
 
     token: str
     address: str
 
     def principal(self, state: AppState) -> Principal:
-        """Who this is now; without a token an anonymous client."""
+        """The principal at this moment; an anonymous one without a token."""
         if not self.token:
             return Principal(anonymous(self.address))
         return Principal(state.clients.identify(self.token, self.address))
@@ -37,28 +37,28 @@ def caller(request: HTTPConnection) -> Caller:
     return Caller(token if TOKEN.fullmatch(token) else "", address)
 
 
-def visitor(request: HTTPConnection, state: AppState) -> Principal:
-    """Who asks, by the cookie; without one, or with one that is not ours, an anonymous client."""
+def principal_of(request: HTTPConnection, state: AppState) -> Principal:
+    """The client of a request, by its cookie; an anonymous one without a valid cookie."""
     return caller(request).principal(state)
 
 
-def welcomed(request: Request, state: AppState) -> tuple[Principal, str]:
-    """Who asks, and the token that their browser gets with the answer, "" where it has one.
+def principal_with_new_token(request: Request, state: AppState) -> tuple[Principal, str]:
+    """The client of a request, and the token to set with the response, "" if it needs none.
 
-    With a link on another site's page a browser does not send the cookie that it may have: it
-    gets no second one: its next request has the first.
+    A browser that follows a link from another site does not send its cookie. It gets no second one,
+    since its next request has the first.
     """
-    who = visitor(request, state)
+    who = principal_of(request, state)
     if who.client.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return who, ""
     token = new_token()
-    if by_hand(request):
+    if opened_by_person(request):
         return Principal(state.clients.identify(token, who.client.address)), token
     return Principal(new_client(token, who.client.address)), token
 
 
-def keep(response: Response, request: Request, token: str) -> Response:
-    """The response, with the cookie where the browser gets one."""
+def set_client_cookie(response: Response, request: Request, token: str) -> Response:
+    """The response, with the cookie if `token` is not ""."""
     if token:
         response.set_cookie(
             COOKIE,
@@ -72,8 +72,8 @@ def keep(response: Response, request: Request, token: str) -> Response:
     return response
 
 
-def by_hand(request: Request) -> bool:
-    """Whether a person opened this page: no program, and no browser that fetches ahead."""
+def opened_by_person(request: Request) -> bool:
+    """Whether a person opened this page, not a program or a browser that prefetches."""
     headers = request.headers
-    ahead = re.search("prefetch|prerender", headers.get("sec-purpose", ""))
-    return headers.get("sec-fetch-dest") == "document" and not ahead
+    prefetch = re.search("prefetch|prerender", headers.get("sec-purpose", ""))
+    return headers.get("sec-fetch-dest") == "document" and not prefetch

@@ -344,14 +344,14 @@ def test_without_scripts_each_page_lasts_until_the_next(room: Room) -> None:
     room.control.take(ANN, FORM_LIFE_S)
     for _ in range(10):
         room.now += FORM_LIFE_S - 0.1
-        room.control.loaded(ANN, FORM_LIFE_S, by_hand=True)
+        room.control.loaded(ANN, FORM_LIFE_S, opened_by_person=True)
     assert room.may(ANN)
     room.now += FORM_LIFE_S
     assert not room.may(ANN)
 
 
 def test_a_page_with_scripts_is_lost_as_fast_after_a_page_load(held: Room) -> None:
-    held.control.loaded(ANN, FORM_LIFE_S, by_hand=True)
+    held.control.loaded(ANN, FORM_LIFE_S, opened_by_person=True)
     held.now += LIFE_S
     assert not held.may(ANN)
 
@@ -360,7 +360,7 @@ def test_a_page_with_scripts_is_lost_as_fast_after_a_page_load(held: Room) -> No
 
 
 def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) -> None:
-    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert room.may(CELL)
     room.control.keepalive(CELL, False)
     room.now += LIFE_S
@@ -368,32 +368,32 @@ def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) 
 
 
 @pytest.mark.parametrize(
-    ("who", "by_hand"), [(ANN, True), (CELL, False), (Principal(anonymous("::1")), True)]
+    ("who", "opened_by_person"), [(ANN, True), (CELL, False), (Principal(anonymous("::1")), True)]
 )
-def test_no_other_page_takes_anything(room: Room, who: Principal, by_hand: bool) -> None:
-    room.control.loaded(who, FORM_LIFE_S, by_hand)
+def test_no_other_page_takes_anything(room: Room, who: Principal, opened_by_person: bool) -> None:
+    room.control.loaded(who, FORM_LIFE_S, opened_by_person)
     assert room.control.holder is None
 
 
 def test_no_page_takes_what_another_has(held: Room) -> None:
-    held.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    held.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert held.control.holder == ANN
 
 
 def test_no_page_takes_where_local_is_off() -> None:
     room = Room(ControlRules(required=True, local=False))
-    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert room.control.holder is None
 
 
 def test_what_was_given_up_is_taken_by_a_button_only(room: Room) -> None:
     room.control.take(CELL)
     room.control.release(CELL)
-    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert room.control.holder is None
     room.control.take(CELL)
     room.now += LIFE_S
-    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert room.control.holder == CELL
 
 
@@ -539,14 +539,14 @@ class Everybody(RuleBasedStateMachine):
         self.room.control.keepalive(who, touched)
         self.heard(who)
 
-    @rule(who=WHO, by_hand=st.booleans())
-    def loads_a_page(self, who: Principal, by_hand: bool) -> None:
+    @rule(who=WHO, opened_by_person=st.booleans())
+    def loads_a_page(self, who: Principal, opened_by_person: bool) -> None:
         before = self.room.control.holder
-        self.room.control.loaded(who, FORM_LIFE_S, by_hand)
+        self.room.control.loaded(who, FORM_LIFE_S, opened_by_person)
         self.heard(who, FORM_LIFE_S)
         if who.client.local:
             self.wanted.add(who.client.id)
-        if before or not by_hand:
+        if before or not opened_by_person:
             assert self.room.control.holder == before
 
     @rule(who=WHO)

@@ -13,7 +13,7 @@ from starlette.types import Message, Receive, Scope, Send
 from app.robot.state import RobotState
 from app.view.publisher import ViewPublisher
 from app.view.view import View, build_view
-from app.web.asgi import Application, Direct, direct
+from app.web.asgi import Application, KeepServerSend, server_send
 from app.web.metrics import Open
 from app.web.routes.events import EventStream
 from tests.support.builders import NOW, permits, robot_there, says, small_panel
@@ -216,7 +216,7 @@ def test_its_body_goes_past_the_layers_and_its_begin_through_them() -> None:
             await EventStream(bench.publisher, b"", bench.streams)(scope, receive, wrapped)
 
         scope = dict(SCOPE)
-        task = asyncio.create_task(Direct(layer)(scope, client.receive, client.send))
+        task = asyncio.create_task(KeepServerSend(layer)(scope, client.receive, client.send))
         await turns()
         bench.publisher.close()
         await task
@@ -233,7 +233,7 @@ def test_none_of_the_applications_own_layers_is_between_a_body_and_the_server() 
 
         class Asking(Response):
             async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-                found.extend((direct(scope, send), send))
+                found.extend((server_send(scope, send), send))
                 await super().__call__(scope, receive, send)
 
         app = Application(max_body_size=1000)

@@ -18,9 +18,9 @@ from app.permission.control_authority_view import for_role, role
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.client_cookie import keep, visitor, welcomed
-from app.web.described import FORM, JSON, described_body, errors, fields
+from app.web.client_cookie import principal_of, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
+from app.web.openapi_parts import FORM, JSON, described_body, errors, fields
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.presses import STATUS
 
@@ -35,8 +35,8 @@ FORM_FIELDS_MOST: Final = 8
 
 
 class Acting(BaseModel):
-    """`to` is the id of who asks, for `give` and `keep`: the request that the operator saw; `at` is
-    when it was touched, in the server's own time. The same `id` again is the same act."""
+    """`to` is the id of the requester that the operator saw, for `give` and `keep`; `at` is when it was
+    touched, in the server's own time. The same `id` again is the same act."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -46,7 +46,7 @@ class Acting(BaseModel):
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
 
 
-class Here(BaseModel):
+class KeepAlive(BaseModel):
     """`touched`: the operator has touched the page since its last such message."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -77,11 +77,11 @@ class ControlAnswer(BaseModel):
     status_code=204,
     summary="The holder's or asker's page is still there",
     responses=errors(403, 404, 408, 413, 422),
-    openapi_extra=described_body(Here, None, required=False),
+    openapi_extra=described_body(KeepAlive, None, required=False),
 )
-async def here(request: Request, state: CurrentState, session: CurrentSession) -> Response:
+async def keep_alive(request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    session.control.keepalive(visitor(request, state), (await _given(Here, request)).touched)
+    session.control.keepalive(principal_of(request, state), (await _given(KeepAlive, request)).touched)
     return Response(status_code=204)
 
 
@@ -108,8 +108,9 @@ async def here(request: Request, state: CurrentState, session: CurrentSession) -
 )
 async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    who = visitor(request, state)
-    _, token = welcomed(request, state)  # without a cookie nothing is done yet, the next time it is
+    who = principal_of(request, state)
+    # Without a cookie the act is refused; with this one the next succeeds.
+    _, token = principal_with_new_token(request, state)
     form = kind_of(request) == FORM
     given = await _given(Acting, request)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
@@ -124,7 +125,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
                 requested, act_id, at, FORM_LIFE_S if form else LIFE_S
             )
     answer = _page(session, given.page, receipt) if form else _json(request, session, who, receipt)
-    return keep(answer, request, token)
+    return set_client_cookie(answer, request, token)
 
 
 def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Response:

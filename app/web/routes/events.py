@@ -13,11 +13,11 @@ from app.permission.control_authority_view import Role, role
 from app.view.heartbeat import beat
 from app.view.publisher import ViewPublisher, client_id_event
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.asgi import direct
-from app.web.client_cookie import keep, welcomed
-from app.web.described import TEXT, errors
+from app.web.asgi import server_send
+from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.language import language_of
 from app.web.metrics import Open
+from app.web.openapi_parts import TEXT, errors
 
 router = APIRouter()
 
@@ -43,7 +43,7 @@ async def events(
     """`once`: the snapshot alone, for a browser that has no stream to spare. `page`: of its widgets
     only, and those of the frame; without one, or with one that the panel does not have, of all."""
     publisher, rules = session.publisher, session.control.rules
-    who, token = welcomed(request, state) if rules.required else (None, "")
+    who, token = principal_with_new_token(request, state) if rules.required else (None, "")
     first = client_id_event(who.client.id) if who else b""
 
     def role_now() -> Role:
@@ -56,7 +56,7 @@ async def events(
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
         answer = EventStream(publisher, first, state.metrics.streams, language, role_now, page)
-    return keep(answer, request, token)
+    return set_client_cookie(answer, request, token)
 
 
 def no_role() -> Role:
@@ -96,7 +96,7 @@ class EventStream(Response):
         with self._streams.another(), self._publisher.heartbeat.heard():
             async with asyncio.TaskGroup() as group:
                 # A task of its own: waking it wakes nothing of what the request came through.
-                writing = group.create_task(self._write(direct(scope, send)))
+                writing = group.create_task(self._write(server_send(scope, send)))
                 while (await receive())["type"] != "http.disconnect":
                     pass
                 writing.cancel()

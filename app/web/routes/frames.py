@@ -28,8 +28,8 @@ from app.panel.widgets.camera import Camera
 from app.robot.pictures import NoPicture, Picture
 from app.runtime.frames import Feed, Frame
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.described import Described, errors
 from app.web.language import language_of
+from app.web.openapi_parts import Described, errors
 from app.web.request_body import received
 
 log = logging.getLogger("kiosk.web")

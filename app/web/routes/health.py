@@ -9,9 +9,9 @@ from pydantic import BaseModel
 
 from app.i18n import render
 from app.web.app_state import CurrentState
-from app.web.described import errors
 from app.web.language import language_of
 from app.web.metrics import Metrics
+from app.web.openapi_parts import errors
 
 router = APIRouter()
 

@@ -1,5 +1,5 @@
-"""A hold: one WebSocket from the press to its end, because its closing is seen at once.
-`app/web/hold_protocol.py` has what is said on it."""
+"""A hold: one WebSocket from the press to its end, since a closed socket is noticed at once.
+`app/web/hold_protocol.py` describes its messages."""
 
 import asyncio
 import json
@@ -24,7 +24,7 @@ from app.panel.template import needed_inputs
 from app.panel.widgets.joystick import Joystick
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import visitor
+from app.web.client_cookie import principal_of
 from app.web.hold_protocol import WHYS, Beat, Begin, End, Message, Said, read_message
 from app.web.language import language_of
 from app.web.request_body import received
@@ -32,7 +32,7 @@ from app.web.request_body import received
 router = APIRouter()
 
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
-SILENCE_S: Final = 2.0  # a hold is over long before: the client is gone
+SILENCE_S: Final = 2.0  # without a message the client is gone; its lease ends long before
 # 4000 + HTTP's
 CLOSE: Final[Mapping[str, int]] = {
     "interlock": 4409,
@@ -63,14 +63,14 @@ class _HoldSocket:
         self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._who = visitor(socket, state)
+        self._who = principal_of(socket, state)
         self._language = language_of(socket)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
         self._context = session.press_guard.context_for(widget, self._who)
         self._room = session.press_log.has_room(self._context.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
-        self._next: asyncio.Future[Received] | None = None  # what the browser says next
+        self._next: asyncio.Future[Received] | None = None  # the browser's next message
 
     async def run(self, widget: str) -> Receipt:
         """From the first message to the end; the receipt of the hold, of a refusal too."""
@@ -83,14 +83,14 @@ class _HoldSocket:
             await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
             await self._close(CLOSE[begun.cause])
             return begun
-        telling = asyncio.create_task(self._tell())
+        sending = asyncio.create_task(self._send_end())
         try:
             if not self._ended.done():
                 await self._say(state="held", lease=begun.lease.id, reason=begun.since)
             await self._listen(begun)
         finally:
             self._session.holds.end(begun, "hold_by_closing")
-            await asyncio.gather(telling, return_exceptions=True)
+            await asyncio.gather(sending, return_exceptions=True)
         return self._receipt or self._ended.result()
 
     async def _begun(self, widget: str) -> Receipt | ActiveHold:
@@ -113,7 +113,7 @@ class _HoldSocket:
             by = self._context = self._session.press_guard.context_for(widget, self._who, said.seen)
             if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
-            still_held = await self._written(widget, inputs, by)
+            still_held = await self._log_begin(widget, inputs, by)
         except InputError as error:
             return refuse(by, say("with_stop", said=error.text), "input")
         except LogError as error:
@@ -122,8 +122,8 @@ class _HoldSocket:
             return refuse(by, say("hold_let_go"))
         return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
 
-    async def _written(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
-        """The entry in the log, while the browser is listened to: whether it holds still."""
+    async def _log_begin(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
+        """Writes the log entry of the press; False if a message, as of an end, arrived before that."""
         own = needed_inputs(self._session.holds.widget(widget), inputs)
         writing = asyncio.ensure_future(
             self._session.press_log.pressed(widget, own, self._id, context.origin, "hold")
@@ -135,7 +135,7 @@ class _HoldSocket:
         return not let_go
 
     async def _refused(self, receipt: Receipt) -> Receipt:
-        """A hold that did not begin, in the operator's log."""
+        """Logs a hold that was refused; its receipt says if the log failed."""
         if self._pending is not None:
             return await self._closed(receipt)
         if receipt.cause == "limit":
@@ -149,25 +149,26 @@ class _HoldSocket:
         return with_log_fault(receipt, why)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
-        """Its end in the operator's log, on the disk before it is answered."""
+        """Logs the end of the hold, on the disk before the receipt is sent."""
         why = await self._pending.close(receipt.outcome, receipt.reason) if self._pending else ""
         return with_log_fault(receipt, why)
 
     async def _listen(self, holding: ActiveHold) -> None:
-        """Until the browser closes or says nothing any more: what is late gets its answer too."""
+        """Reads and answers messages, also after the end of the hold, until the browser closes the socket
+        or is silent for SILENCE_S."""
         with suppress(TimeoutError, WebSocketDisconnect):
             while True:
                 async with asyncio.timeout(SILENCE_S):
                     said = await self._read()
-                if self._hear(said, holding):
+                if self._process(said, holding):
                     self._session.control.touch(self._who)
-                    await self._say(state="held", **_moves(holding))
+                    await self._say(state="held", **_deflection_texts(holding))
                 elif isinstance(said, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
 
-    def _hear(self, said: Message | None, holding: ActiveHold) -> bool:
-        """Whether the hold goes on after what was said."""
+    def _process(self, said: Message | None, holding: ActiveHold) -> bool:
+        """Applies a message to the hold; False once it has ended."""
         holds = self._session.holds
         if isinstance(said, End) and said.lease in ("", holding.lease.id):
             holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
@@ -193,8 +194,8 @@ class _HoldSocket:
     def _sent(self, said: Said) -> float:
         return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
 
-    async def _tell(self) -> None:
-        """The end, as soon as it is there, whatever ended it; then the browser may close."""
+    async def _send_end(self) -> None:
+        """Waits for the end of the hold, whatever ends it, and sends its receipt."""
         receipt = await asyncio.shield(self._ended)
         if receipt.outcome != "unknown" and not await self._session.peer.flushed():
             receipt = self._session.holds.unconfirmed(receipt)
@@ -212,7 +213,7 @@ class _HoldSocket:
             await self._socket.close(code)
 
 
-def _moves(holding: ActiveHold) -> dict[str, Any]:
-    """What was sent of a joystick's deflection, as texts."""
+def _deflection_texts(holding: ActiveHold) -> dict[str, Any]:
+    """`moves`: the values published for a joystick's deflection, as texts; empty for other widgets."""
     widget = holding.widget
     return {"moves": widget.texts_at(*holding.moved)} if isinstance(widget, Joystick) else {}

@@ -12,8 +12,8 @@ from app.robot.log_lines import Line, Wanted
 from app.ros_logging import NODE_NAME
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession
-from app.web.described import errors
 from app.web.language import language_of
+from app.web.openapi_parts import errors
 
 router = APIRouter()
 

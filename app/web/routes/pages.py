@@ -32,11 +32,11 @@ from app.view.trend_plot import Plot, plot
 from app.view.view import View
 from app.web.app_state import AppState, CurrentState
 from app.web.assets import PICTURES
-from app.web.client_cookie import by_hand, keep, welcomed
-from app.web.described import PAGE, Described, errors
+from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
 from app.web.display_choice import Choice, Display, choices, display_of, language_choice
 from app.web.entry_words import ENTRY_WORDS
 from app.web.language import language_of
+from app.web.openapi_parts import PAGE, Described, errors
 from app.web.routes.log_lines import WORDS as LEVEL_WORDS
 from app.web.routes.log_lines import rendered
 
@@ -92,10 +92,8 @@ TREND_WORDS = (
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
-
-# How long after the start what a page is made of is compiled: when the port is open, and while the link
-# settles, which is waiting. Otherwise the first page takes that time.
-# Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
+# Templates are compiled this long after the start, while the link settles; else the first page takes
+# that time. One at a time, so that the event loop runs in between.
 COMPILED_AFTER_S = 0.1
 OTHER_PAGES = ("ask.html", "error.html", "gallery.html", "log.html")
 
@@ -189,16 +187,16 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
     typed = any(isinstance(widget, EntryWidget) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    who, token = welcomed(request, state)
+    who, token = principal_with_new_token(request, state)
     if session.control.rules.required:
-        session.control.loaded(who, refresh_s + GRACE_S, by_hand(request))
+        session.control.loaded(who, refresh_s + GRACE_S, opened_by_person(request))
         session.show()
     context, language = _context(request, state, session, page, who, refresh_s), language_of(request)
     widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
     pictures = state.fleet.panel.picture_files
     context["inside"] = state.templates.inside(page, pictures, language, **widgets)
     html = state.templates.render("screen.html", language, **context)
-    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
+    return set_client_cookie(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
 def _context(

@@ -7,8 +7,8 @@ from pydantic import BaseModel
 
 from app.i18n import render
 from app.web.app_state import CurrentSession
-from app.web.described import FORM, errors
 from app.web.language import language_of
+from app.web.openapi_parts import FORM, errors
 from app.web.request_body import body_of, kind_of
 from app.web.routes.press_forms import page_after
 

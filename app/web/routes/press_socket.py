@@ -1,13 +1,13 @@
 """Presses by WebSocket: a page opens one at its first touch, and sends all its presses there.
 
-A press is what a post has in its body, with its `widget`; its `id` is needed, for answers come when
-they are there, in any order. `status` is that of the answer to a post, with a receipt or an `error`:
+A press has the fields of a post's body, and `widget`. Its `id` is required, since answers come in any
+order. `status` is that of the answer to a post, with a receipt or an `error`:
 
     browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<boot>-<version>", "at": "…"}
     server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "code": "…", …}
     server   {"press": "5f…", "status": 404, "error": "…"}
 
-Who closes it loses the answers and nothing else: what was begun is brought to its end, and logged.
+A client that closes the socket loses only the answers: presses that were begun are finished and logged.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import caller
 from app.web.language import language_of
 from app.web.request_body import as_model, json_of, received
-from app.web.routes.presses import STATUS, Press, pressed
+from app.web.routes.presses import STATUS, Press, receipt_of_press
 
 log = logging.getLogger("kiosk.presses")
 
@@ -43,7 +43,7 @@ PLACE: Final = "the message"
 
 
 class SocketPress(Press):
-    """What a client says for one press."""
+    """The message of one press."""
 
     widget: str
     id: Annotated[str, Field(pattern=PRESS_ID)]
@@ -51,13 +51,13 @@ class SocketPress(Press):
 
 @router.websocket("/presses")
 async def presses(socket: WebSocket, state: CurrentState, session: CurrentSession) -> None:
-    """`kiosk`: where there is no such robot, there is no socket."""
+    """`session` is a dependency only to refuse the socket if there is no such robot."""
     await socket.accept()
     await _PressSocket(socket, state).run()
 
 
 class _PressSocket:
-    """One socket and its presses. What is known of the page is what each press has."""
+    """One socket and its presses. Each press names the view that its page shows."""
 
     __slots__ = ("_caller", "_language", "_refused", "_socket", "_state", "_under_way")
 
@@ -70,18 +70,18 @@ class _PressSocket:
         self._refused = 0  # one after the other
 
     async def run(self) -> None:
-        """Until it is closed, and all that was pressed has come to its end."""
+        """Reads presses until the socket is closed, then waits until all have ended."""
         try:
             while (message := await received(self._socket))["type"] == "websocket.receive":
-                await self._hear(message)
+                await self._begin(message)
                 if self._refused >= MOST_REFUSED:
                     await self._socket.close(POLICY_VIOLATION)
                     break
         finally:
             await asyncio.gather(*self._under_way)
 
-    async def _hear(self, message: Message) -> None:
-        """Begins a press, and waits for none."""
+    async def _begin(self, message: Message) -> None:
+        """Starts the press of a message, without waiting for its receipt."""
         given: Any = None
         try:
             text = message.get("text")
@@ -103,7 +103,8 @@ class _PressSocket:
         state, socket = self._state, self._socket
         try:
             session = state.fleet.session(socket.path_params.get("robot"))
-            receipt = await pressed(state, session, self._caller.principal(state), said.widget, said)
+            who = self._caller.principal(state)
+            receipt = await receipt_of_press(state, session, who, said.widget, said)
         except KioskError as error:
             await self._answer(said.id, error.status, error=error.text)
         except Exception:

@@ -17,8 +17,10 @@ from app.i18n import localized
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import visitor
-from app.web.described import (
+from app.web.client_cookie import principal_of
+from app.web.display_choice import display_of
+from app.web.language import language_of
+from app.web.openapi_parts import (
     FORM,
     JSON,
     PAGE,
@@ -29,8 +31,6 @@ from app.web.described import (
     errors,
     fields,
 )
-from app.web.display_choice import display_of
-from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import Reader, page_after, pressed_by_form
 
@@ -113,11 +113,11 @@ async def press(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     session.presses.widget(widget)
-    who = visitor(request, state)
+    who = principal_of(request, state)
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
-        receipt = await pressed(state, session, who, widget, as_model(Press, json_of(body)))
+        receipt = await receipt_of_press(state, session, who, widget, as_model(Press, json_of(body)))
         return _answer(request, receipt)
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
@@ -136,7 +136,7 @@ async def cancel(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     session.presses.widget(widget)
-    who = visitor(request, state)
+    who = principal_of(request, state)
     body, kind = await body_of(request), kind_of(request)
     form = kind == FORM
     of = ""
@@ -153,10 +153,10 @@ async def cancel(
     return _answer(request, receipt)
 
 
-async def pressed(
+async def receipt_of_press(
     state: AppState, session: RobotSession, who: Principal, widget: str, given: Press
 ) -> Receipt:
-    """What comes of a press that was given as JSON, by whatever way."""
+    """The receipt of a press in JSON, from HTTP or from a WebSocket."""
     session.presses.widget(widget)
     press_id = given.id or secrets.token_hex(8)
     if not state.limits.admit(who):

@@ -16,7 +16,7 @@ from app.panel.widgets.trend import Trend
 from app.robot.history import Column
 from app.view.trend_plot import pen_columns
 from app.web.app_state import CurrentSession
-from app.web.described import JSON, errors
+from app.web.openapi_parts import JSON, errors
 
 router = APIRouter()
 

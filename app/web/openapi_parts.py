@@ -1,4 +1,4 @@
-"""What openapi.json says of what several routes have in common: errors, and bodies that they read."""
+"""Parts of openapi.json that several routes share: error responses and request bodies."""
 
 from typing import Any, Final
 
