@@ -240,7 +240,7 @@ class TopicQos(Description):
 
 
 class HasTopic(Protocol):
-    """Whatever names a topic with its type and QoS."""
+    """Anything with a topic, its type and its QoS."""
 
     @property
     def topic(self) -> str: ...

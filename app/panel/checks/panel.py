@@ -23,14 +23,12 @@ from app.panel.widgets.families import (
     DisplayWidget,
     EntryWidget,
     Input,
-    KeyCommand,
     TopicSource,
     TopicWidget,
 )
 from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.publish import Confirm, PublishPress
-from app.panel.widgets.service_action import Action
 from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
 
 
@@ -155,7 +153,7 @@ def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]
 def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str]) -> Iterator[Fault]:
     for w, widget in enumerate(panel.frame.widgets):
         place = f"frame.widget[{w}]"
-        if isinstance(widget, KeyCommand) and not isinstance(widget, Action):
+        if widget.allowed_in_frame:
             yield from widget.faults(place, checking)
         elif widget.id not in faulty:
             what = (

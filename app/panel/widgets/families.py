@@ -79,6 +79,8 @@ class BaseWidget(Description):
     why_needed: ClassVar[Mapping[str, str]] = {}
     # The types that the server needs for this kind.
     required_types: ClassVar[tuple[str, ...]] = ()
+    # Whether the frame around the pages may have it.
+    allowed_in_frame: ClassVar[bool] = False
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         """Faults of a widget whose keys and types are valid; `place` is its place in the panel file."""
@@ -237,6 +239,8 @@ class Command(BaseWidget):
 
 class KeyCommand(Command):
     """A command with a key of its own; its colour is one that IEC 60204-1 has for its role."""
+
+    allowed_in_frame: ClassVar[bool] = True
 
     role: KeyRole = "neutral"
     colour: KeyColour | None = None

@@ -94,6 +94,7 @@ class Action(ServerCommand):
     template_key: ClassVar[str] = "goal"
     server_role: ClassVar[ServerRole] = "AS"
     required_types: ClassVar[tuple[str, ...]] = ACTION_SERVER_TYPES
+    allowed_in_frame: ClassVar[bool] = False
 
     @property
     def template(self) -> dict[str, Any]:

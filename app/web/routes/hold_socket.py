@@ -154,8 +154,8 @@ class _HoldSocket:
         return with_log_fault(receipt, why)
 
     async def _listen(self, holding: ActiveHold) -> None:
-        """Reads and answers messages, also after the end of the hold, until the browser closes the socket
-        or is silent for SILENCE_S."""
+        """Reads and answers messages until the browser closes the socket or is silent for SILENCE_S,
+        after the end of the hold too."""
         with suppress(TimeoutError, WebSocketDisconnect):
             while True:
                 async with asyncio.timeout(SILENCE_S):
