@@ -33,8 +33,8 @@ from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
 from app.web.openapi_parts import errors
-from app.web.page_templates import PageTemplates
 from app.web.proxies import Proxies
+from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
 from app.web.routes import audit_log as log_routes
 from app.web.routes import (

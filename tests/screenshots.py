@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 from app.panel import load_panel
 from app.settings import PACKAGE
-from app.web.display_choice import CHOICES, COOKIE
+from app.web.rendering.display_choice import CHOICES, COOKIE
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, Server, until
 
 EXAMPLE: Final = ROOT / "docs/examples/palletizer.toml"

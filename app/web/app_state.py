@@ -17,7 +17,7 @@ from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
 from app.web.metrics import Metrics
-from app.web.page_templates import PageTemplates
+from app.web.rendering.page_templates import PageTemplates
 
 
 @dataclass(slots=True)

@@ -14,8 +14,8 @@ from app.errors import KioskError, TooMany, TooSlow
 from app.i18n import TextLike, render, say
 from app.printable import printable
 from app.web.app_state import site_of
-from app.web.display_choice import display_of
 from app.web.language import language_of
+from app.web.rendering.display_choice import display_of
 
 TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 

@@ -12,8 +12,8 @@ from playwright.sync_api import Browser, Page, ViewportSize, expect
 from app.i18n.catalogue import files as files_of_languages
 from app.panel import load_panel
 from app.settings import PACKAGE
-from app.web.display_choice import CHOICES, COOKIE
 from app.web.language import COOKIE as LANGUAGE
+from app.web.rendering.display_choice import CHOICES, COOKIE
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.line import Line
 from tests.support.browser.pages import DRAWN, place

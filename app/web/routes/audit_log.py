@@ -22,10 +22,10 @@ from app.panel.model import Panel
 from app.panel.widgets.families import Command, EntryWidget
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
-from app.web.display_choice import Display, display_of
 from app.web.language import language_of
-from app.web.log_words import OUTCOMES, date_of, outcome_of, time_of, values_of, who_of, word
 from app.web.openapi_parts import TEXT, errors
+from app.web.rendering.display_choice import Display, display_of
+from app.web.rendering.log_words import OUTCOMES, date_of, outcome_of, time_of, values_of, who_of, word
 
 log = logging.getLogger("kiosk.log")
 

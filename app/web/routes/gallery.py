@@ -11,13 +11,13 @@ from markupsafe import Markup
 
 from app.i18n import say
 from app.web.app_state import CurrentState
-from app.web.display_choice import CHOICES, Choice, Display, choices, display_of
 from app.web.gallery import PARTS, PICTURE
 from app.web.gallery.displays import LINES
 from app.web.gallery.examples import Example
 from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
-from app.web.routes.pages import TREND_WORDS, WORDS
+from app.web.rendering.display_choice import CHOICES, Choice, Display, choices, display_of
+from app.web.rendering.page_words import TREND_WORDS, WORDS
 
 router = APIRouter(include_in_schema=False)
 

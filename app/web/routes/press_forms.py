@@ -17,8 +17,8 @@ from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
-from app.web.display_choice import Display
-from app.web.routes.pages import ask_of
+from app.web.rendering.display_choice import Display
+from app.web.rendering.page_words import ask_of
 
 
 class Reader(NamedTuple):

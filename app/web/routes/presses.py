@@ -18,7 +18,6 @@ from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import principal_of
-from app.web.display_choice import display_of
 from app.web.language import language_of
 from app.web.openapi_parts import (
     FORM,
@@ -31,6 +30,7 @@ from app.web.openapi_parts import (
     errors,
     fields,
 )
+from app.web.rendering.display_choice import display_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import Reader, page_after, pressed_by_form
 

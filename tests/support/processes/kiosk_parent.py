@@ -24,7 +24,7 @@ from jinja2 import Environment, FileSystemBytecodeCache
 
 from app.cli.command_table import COMMANDS
 from app.panel import load_panel
-from app.web import page_templates
+from app.web.rendering import page_templates
 from tests.support.operator_log import wait_for_the_disk
 from tests.support.processes.fork_parent import ForkParent
 

@@ -1,0 +1,1 @@
+"""What a page is rendered from: templates, words, choices of display, and their context."""

@@ -1,0 +1,119 @@
+"""The context of `screen.html`, the template of every page."""
+
+import secrets
+import time
+from collections.abc import Sequence
+from typing import Any, Final, TypedDict
+from urllib.parse import urlencode
+
+from fastapi import Request
+from markupsafe import Markup
+
+from app import clock
+from app.clock import format_datetime, format_time
+from app.commands.receipts import Receipt
+from app.i18n import Text, TextLike, say
+from app.panel.layout import Page
+from app.panel.model import Panel
+from app.permission.control_authority_view import role
+from app.permission.principal import Principal
+from app.printable import printable_texts
+from app.runtime.robot_session import RobotSession
+from app.view.sections import SECTIONS, Section
+from app.view.view import View
+from app.web.app_state import AppState
+from app.web.assets import PICTURES
+from app.web.language import language_of
+from app.web.rendering.display_choice import Choice, Display, choices, display_of, language_choice
+from app.web.rendering.page_words import page_words
+
+RELOADED: Final = "reloaded"  # by itself, without a tap
+RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a press on it is refused
+TOO_OFTEN: Final = "control_too_often"
+
+
+class PageContext(TypedDict):
+    """The variables of `screen.html`."""
+
+    site: AppState
+    display: Display
+    choices: Sequence[Choice]
+    panel: Panel
+    page: Page
+    inside: Markup | None
+    base: str
+    robot: str
+    view: View
+    sections: Sequence[Section]
+    event_id: str
+    revision: str
+    clock: Text
+    loaded: Text
+    press_id: str
+    receipt: Receipt | None
+    inputs: dict[str, Any]
+    words: dict[str, Any]
+    lost: Text
+    lost_short: Text
+    locks_all: Text
+    unknown: Text
+    unsure: Text
+    refresh_s: int
+    now: int
+    since: float | None
+    again: str
+    until: float
+    browser: str
+    refused: TextLike
+
+
+def page_context(
+    request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
+) -> PageContext:
+    """The context of a page for one request. `inside` is None: the page's own template needs the rest."""
+    publisher, rules = session.publisher, session.control.rules
+    receipt = session.presses.receipt(request.query_params.get("receipt", ""))
+    again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
+    now, wall = clock.server_now(), time.time()
+    panel, language = state.fleet.panel, language_of(request)
+    display = display_of(request, panel)
+    return PageContext(
+        site=state,
+        display=display,
+        choices=[*language_choice(panel, language), *choices(display)],
+        panel=panel,
+        page=page,
+        inside=None,
+        base=session.base,
+        robot=session.entry.id if session.entry else "",
+        view=publisher.for_role(role(publisher.view["control"], who, rules)),
+        sections=SECTIONS,
+        event_id=publisher.id,
+        revision=publisher.revision,
+        clock=format_time(wall),
+        loaded=format_datetime(wall),
+        press_id=secrets.token_hex(8),
+        receipt=receipt,
+        inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
+        words=page_words(session, page, f"/static/{state.assets.revision}/{PICTURES}", language),
+        lost=say("server_lost"),
+        lost_short=say("lost"),
+        locks_all=say("locks_all"),
+        unknown=say("unknown"),
+        unsure=say("server_unsure"),
+        refresh_s=refresh_s,
+        now=round(now * 1000),
+        since=None if RELOADED in request.query_params else round(now, 3),
+        again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
+        until=round(now + refresh_s + RELOADED_S, 3),
+        browser=who.client.id,
+        refused=_refused(session, request.query_params.get("control", "")),
+    )
+
+
+def _refused(session: RobotSession, query: str) -> TextLike:
+    """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
+    if query == TOO_OFTEN:
+        return say(TOO_OFTEN)
+    receipt = session.control_acts.receipt(query)
+    return receipt.reason if receipt else ""

@@ -1,0 +1,90 @@
+"""The words of a page, by their names in its templates, and the questions before its presses."""
+
+import time
+from typing import Any, Final, TypedDict
+
+from app.i18n import Text, say
+from app.panel.layout import Page
+from app.panel.template import input_ids
+from app.panel.widgets.families import EntryWidget, PressCommand
+from app.panel.widgets.log_view import LogView
+from app.panel.widgets.trend import Trend
+from app.runtime.robot_session import RobotSession
+from app.view.trend_plot import Plot, plot
+from app.web.rendering.entry_words import ENTRY_WORDS
+from app.web.rendering.log_lines import LEVEL_WORDS, newest_lines
+
+WORDS: Final = (
+    "menu",
+    "whole",
+    "phone",
+    "cancel",
+    "robots",
+    "control",
+    "set",
+    "read_again",
+    "back",
+    "empty",
+    "hold_cut",
+    "hold_scripts",
+    "camera_none",
+    "camera_late",
+    "camera_undrawn",
+    "rosout_level",
+    "rosout_node",
+    "rosout_search",
+    "rosout_pause",
+    *(word.code for word in LEVEL_WORDS.values()),
+    "clean",
+    "cleaning",
+)
+TREND_WORDS: Final = (
+    "trend_earlier",
+    "trend_later",
+    "trend_longer",
+    "trend_shorter",
+    "trend_pause",
+    "trend_live",
+    "trend_paused",
+)
+LINK_WORDS: Final = ("links", "link_state", "link_since", "link_locks")
+CONTROL_ACTS: Final = ("take", "ask", "give", "keep", "release", "withdraw")
+
+
+class Ask(TypedDict):
+    """The question before a press: what it will do, and the inputs that it takes."""
+
+    sentence: Text
+    inputs: list[EntryWidget]
+
+
+def page_words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
+    """The `words` of a page's context; `pictures` is the path of the panel's picture files."""
+    own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
+    own |= {"asks": asks_of(session, page), "trends": trends_on(session, page)}
+    logs = (widget for widget in page.widgets if isinstance(widget, LogView))
+    own |= {"lines": {log.id: newest_lines(session, log, language) for log in logs}}
+    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
+    return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
+
+
+def trends_on(session: RobotSession, page: Page) -> dict[str, Plot]:
+    """The plots of the trends of a page, by the ids of their widgets."""
+    now, wall = time.monotonic(), time.time()
+    shown = (widget for widget in page.widgets if isinstance(widget, Trend))
+    return {widget.id: plot(widget, session.robot, now, wall) for widget in shown}
+
+
+def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
+    """The questions before presses of a page, by the ids of the widgets that need one."""
+    shown = (*page.widgets, *session.panel.frame.widgets)
+    pressed = (w for w in shown if isinstance(w, PressCommand) and w.confirm_press)
+    return {widget.id: ask_of(session, widget) for widget in pressed}
+
+
+def ask_of(session: RobotSession, widget: PressCommand) -> Ask:
+    """The question before a press of `widget`; it names the robot if the panel has several."""
+    inputs = {w.id: w for w in session.panel.widgets() if isinstance(w, EntryWidget)}
+    robot = session.entry.name if session.entry else ""
+    sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in input_ids(widget)])
