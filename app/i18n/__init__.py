@@ -1,6 +1,7 @@
-"""What a person reads: a sentence is its code and what it is about, until it is rendered for a reader.
+"""The texts that a person reads: a sentence is a code with parameters until it is rendered in a
+reader's language.
 
-Codes are stable names for tests and logs; `catalogue` has the sentences of each language by them.
+Codes are stable names for tests and logs; `catalogue` has the sentences of each language by code.
 """
 
 from app.i18n.catalogue import ENGLISH, sentences

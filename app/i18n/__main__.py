@@ -1,7 +1,8 @@
-"""`python -m app.i18n`: is each catalogue whole, and does each translation fill in what English does?
-Has its language a name, and the keypad the decimal sign of its numbers?
+"""`python -m app.i18n`: checks each catalogue: whether it is complete, its translations have the
+placeholders of the English sentences, its language has a name, and the keypad has the decimal sign of
+its numbers.
 
-Exit status: 0 they are, 1 they are not, with a line for each fault.
+Exit status: 0 without a fault, 1 with a line for each fault.
 """
 
 import sys
@@ -19,7 +20,7 @@ DECIMAL: Final = "keypad_decimal"
 
 
 def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
-    """What is wrong with catalogues, each by its language; English is the measure."""
+    """The faults of the catalogues, each with its language; English is the reference."""
     english = translations(catalogues[ENGLISH])
     for language, path in catalogues.items():
         try:
@@ -53,7 +54,7 @@ def _fault(english: str | None, sentence: str) -> str:
 
 
 def placeholders(sentence: str) -> frozenset[str]:
-    """What a sentence is about, as it is written between braces; ValueError for a brace alone."""
+    """The names between braces in a sentence; ValueError for a single brace."""
     parsed = Formatter().parse(sentence)
     return frozenset(
         name + (f"!{conversion}" if conversion else "") + (f":{form}" if form else "")

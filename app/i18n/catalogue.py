@@ -1,7 +1,7 @@
 """The sentences of each language, by their codes: gettext catalogues, `<language>.po`.
 
-A language is a tag of BCP 47, such as "en" or "pt-BR". `msgid` is the code, `msgstr` the sentence, with
-`{name}` where a parameter stands. What a catalogue lacks is said in English.
+A language is a BCP 47 tag, such as "en" or "pt-BR". `msgid` is the code, `msgstr` the sentence, with
+`{name}` for a parameter. A sentence that a catalogue lacks is rendered in English.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -19,8 +19,7 @@ _forget_made: list[Callable[[], None]] = []
 
 @contextmanager
 def catalogues_in(folder: Path) -> Iterator[None]:
-    """The catalogues of one more folder count too, before others of the same language, while this
-    lasts."""
+    """A context in which the catalogues of `folder` are used before others of the same language."""
     _folders.append(folder)
     _forget()
     try:
@@ -31,7 +30,8 @@ def catalogues_in(folder: Path) -> Iterator[None]:
 
 
 def when_changed(forget: Callable[[], None]) -> None:
-    """`forget` is called when other catalogues count: what was made of those before is void."""
+    """Calls `forget` when the catalogues change: what was cached from the earlier ones is then
+    invalid."""
     _forget_made.append(forget)
 
 

@@ -19,9 +19,9 @@ ISO_DATE: Final = "y-MM-dd"
 
 
 class Symbols(NamedTuple):
-    """`numbers` are the signs of a number by those that Python writes, without those that are the same;
-    `decimal` is what stands before decimals, `time` between hours, minutes and seconds, `date` is a
-    pattern of CLDR."""
+    """`numbers` maps the signs that Python writes in a number to those of the language, where they
+    differ; `decimal` is the decimal separator, `time` the separator of hours, minutes and seconds,
+    `date` a CLDR date pattern."""
 
     numbers: Mapping[int, str]
     decimal: str
@@ -39,7 +39,7 @@ OWN_NAMES: Final = {"de": "Deutsch", "en": "English", "ja": "日本語"}
 
 @cache
 def locale_of(language: str) -> "Locale | None":
-    """What Babel knows of a language; None if it does not know it."""
+    """Babel's locale of a language; None if Babel does not know it."""
     from babel import Locale, UnknownLocaleError
 
     try:
@@ -50,8 +50,8 @@ def locale_of(language: str) -> "Locale | None":
 
 @cache
 def symbols(language: str) -> Symbols:
-    """Those of a language. Dates in English are as ISO 8601 has them: else no one could tell day from
-    month. Times have 24 hours everywhere."""
+    """The symbols of a language. English dates are ISO 8601, since others confuse day and month. Times
+    have 24 hours in every language."""
     locale = None if language == ENGLISH else locale_of(language)
     if locale is None:
         return PLAIN
@@ -64,14 +64,14 @@ def symbols(language: str) -> Symbols:
 
 
 def number_in(text: str, language: str) -> str:
-    """A number as Python writes it ("-1,234.5", "1e-07"), as this language does."""
+    """A number as Python writes it ("-1,234.5", "1e-07"), in the notation of this language."""
     return text.translate(symbols(language).numbers)
 
 
 def number_from(text: str, language: str) -> str:
-    """What was typed as a number in this language, as Python reads it: with a decimal point, and a
-    hyphen for a minus sign. A text with both decimal signs, or with several, keeps them: one of them
-    may separate thousands."""
+    """A number that was typed in this language, in Python's notation: a decimal point, a hyphen for
+    minus. A text with both decimal signs, or with several, is returned with them: one may separate
+    thousands."""
     decimal, text = symbols(language).decimal, text.replace(MINUS, "-")
     if decimal == "." or "." in text or text.count(decimal) != 1:
         return text
@@ -100,13 +100,13 @@ def date_time_in(text: str, language: str) -> str:
 
 
 def own_name(language: str) -> str:
-    """What a language is called in itself: "Deutsch"."""
+    """The name of a language in itself: "Deutsch"."""
     return OWN_NAMES.get(language) or babel_name(language)
 
 
 @cache
 def babel_name(language: str) -> str:
-    """What a language is called in itself, by Babel; its tag where Babel does not know it."""
+    """Babel's name of a language in itself; its tag if Babel does not know it."""
     locale = locale_of(language)
     name = locale.get_display_name() if locale is not None else None
     return f"{name[0].upper()}{name[1:]}" if name else language

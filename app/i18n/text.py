@@ -29,7 +29,7 @@ PANEL, PARTS, NUMBER, TIME, DATE_TIME = "=panel", "=parts", "=number", "=time", 
 class Text:
     """A sentence by its `code` in the catalogue; `params` are (name, value) in the order of names.
 
-    Immutable and hashable; equal where code and parameters are. It says nothing of a language.
+    Immutable and hashable; equal if code and parameters are. It has no language.
     """
 
     __slots__ = ("_hash", "code", "params")
@@ -67,11 +67,11 @@ class Text:
 
     @property
     def is_sentence(self) -> bool:
-        """Whether it is one of the catalogue, or several of them."""
+        """Whether it is a sentence of the catalogue, or several joined."""
         return self.code not in _WRITERS
 
     def as_json(self) -> dict[str, Any]:
-        """As JSON has it: `{"code": …, "params": {…}}`."""
+        """As a JSON value: `{"code": …, "params": {…}}`."""
         return {"code": self.code, "params": {name: _as_json(value) for name, value in self.params}}
 
 
@@ -81,13 +81,13 @@ TextLike = Text | str
 
 
 def say(code: str, **about: Param) -> Text:
-    """The sentence with this code, about these parameters."""
+    """The sentence with this code and these parameters."""
     return Text(code, tuple(sorted(about.items())))
 
 
 def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> TextLike:
-    """Several texts, one after the other, without those that are ""; one alone is itself. `between` is
-    the code of how two of them are written."""
+    """Texts in sequence, without those that are ""; a single one is returned as it is. `between` is the
+    code of the pattern that joins two of them."""
     given = tuple(part for part in parts if part != "")
     if len(given) > 1:
         return Text(between, (("parts", given),))
@@ -95,7 +95,7 @@ def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> Tex
 
 
 def render(text: TextLike, language: str = ENGLISH) -> str:
-    """As a reader of this language reads it."""
+    """The text in a language."""
     return text if isinstance(text, str) else _rendered(text, language)
 
 
@@ -108,7 +108,7 @@ when_changed(_rendered.cache_clear)
 
 
 def _filled(text: Text, language: str) -> str:
-    """A KeyError is a mistake of the programmer's: a test finds each code that the catalogue lacks."""
+    """A KeyError is a programming error: a test finds each code that the catalogue lacks."""
     code = text.code
     if code in _WRITERS:
         return _WRITERS[code](dict(text.params), language)
@@ -134,7 +134,7 @@ def _in_a_row(parts: Iterable[Param], pattern: str, language: str) -> str:
 
 
 def _panel_text(params: Mapping[str, Any], language: str) -> str:
-    """In the reader's language, else in the panel's own, whose tag is under ""."""
+    """A text of the panel file in this language, else in the panel's own, whose tag is under ""."""
     others = (text for tag, text in params.items() if tag)
     found = params.get(language) or params.get(params[""]) or next(others)
     return str(_written(found, language))
@@ -176,7 +176,7 @@ def _as_json(value: Param) -> Any:
 
 
 def text_in(given: str) -> Text:
-    """From the JSON of `as_json`; ValueError for what is none."""
+    """The text in JSON of `as_json`; ValueError if it is not one."""
     return _text_in(json.loads(given))
 
 

@@ -1,4 +1,4 @@
-"""Values that each language writes in its own way: texts of the panel file, numbers, times."""
+"""Values whose notation depends on the language: texts of the panel file, numbers, times."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -7,8 +7,8 @@ from app.i18n.text import DATE_TIME, NUMBER, PANEL, PARTS, TIME, Text, TextLike,
 
 
 class PanelText(Text):
-    """A text of the panel file in several languages. A reader of another one gets it in `own`, the
-    panel's language."""
+    """A text of the panel file in several languages. A reader of another language gets the text in
+    `own`, the panel's language."""
 
     __slots__ = ()
 
@@ -50,7 +50,7 @@ def changed(text: str | PanelText, change: Callable[[str], str]) -> str | PanelT
 
 
 def together(parts: Iterable[TextLike]) -> TextLike:
-    """Texts that are one, with nothing between them."""
+    """Texts joined to one, with nothing between them."""
     given = tuple(part for part in parts if part != "")
     texts = [part for part in given if isinstance(part, str)]
     return "".join(texts) if len(texts) == len(given) else Text(PARTS, (("parts", given),))
@@ -62,8 +62,8 @@ def filled_in(text: PanelText, fill: Callable[[str], TextLike]) -> Text:
 
 
 def number(text: str, unit: TextLike = "") -> TextLike:
-    """A number as Python writes it ("-1,234.5", "1e-07", "NaN"), and its unit. One that all languages
-    write alike is a plain text."""
+    """A number as Python writes it ("-1,234.5", "1e-07", "NaN"), and its unit. A number that has the
+    same notation in all languages is a plain text."""
     if isinstance(unit, str) and not ("." in text or "," in text or "-" in text):
         return f"{text} {unit}" if unit else text
     return Text(NUMBER, (("text", text), ("unit", unit)))
@@ -75,7 +75,7 @@ def after_space(unit: str | PanelText) -> str | PanelText:
 
 
 def with_unit(text: str, unit: str | PanelText) -> TextLike:
-    """A text that is no number, or a list of them, and the unit after it, "" without one."""
+    """A text that is not a number, or a list of numbers, followed by the unit if it is not ""."""
     return changed(unit, lambda one: f"{text} {one}") if unit else text
 
 
@@ -90,5 +90,5 @@ def date_and_time(at: str) -> Text:
 
 
 def longest(text: TextLike) -> int:
-    """The characters of a text of the panel file in the language in which it has most."""
+    """The length in characters of a text of the panel file in the language in which it is longest."""
     return max(map(len, each_language(text).values()))

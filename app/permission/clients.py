@@ -1,6 +1,7 @@
-"""Who presses: one identity per browser, by a random token that it keeps, with a short name.
+"""The clients that press: one identity for each browser, by a random token that it keeps, with a short
+name.
 
-It distinguishes browsers, not operators: there are no users here.
+It distinguishes browsers, not operators: there are no users.
 """
 
 import hashlib
@@ -27,8 +28,9 @@ TITLES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Client:
-    """`id` may be shown to all, the token that it comes from is the browser's own; "" is one that
-    keeps no token. `local`: it runs on the kiosk's own machine. `number` is no other's."""
+    """`id` is public, the token that it is derived from is known to the browser only; "" for a client
+    without a token. `local`: it runs on the kiosk's own machine. `number` distinguishes it
+    from other such clients."""
 
     id: str
     address: str
@@ -60,7 +62,7 @@ class Client:
 
 
 class Clients:
-    """The browsers that came lately, by their tokens; forgets those not seen for the longest time."""
+    """The known browsers, by their tokens; forgets those not seen for the longest time."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[str, Client] = OrderedDict()
@@ -84,13 +86,14 @@ class Clients:
 
 
 def anonymous(address: str) -> Client:
-    """Who came without a token and gets none: a program, mostly."""
+    """The client of a request without a token that gets none: mostly a program."""
     address, local = where(address)
     return Client("", address, local, 0)
 
 
 def new_client(token: str, address: str) -> Client:
-    """Who is given this token just now: it is counted when it comes back with it."""
+    """The client of a token that is being given out; it gets its number when the browser returns with
+    the token."""
     address, local = where(address)
     return Client(public_id(token), address, local, 0)
 
@@ -100,13 +103,13 @@ def new_token() -> str:
 
 
 def public_id(token: str) -> str:
-    """What others may know of a token: the same after a restart, and no way back."""
+    """The public id of a token: stable across restarts; the token can't be derived from it."""
     return hashlib.sha256(token.encode()).hexdigest()[:12]
 
 
 @lru_cache(BROWSERS_KEPT)
 def where(address: str) -> tuple[str, bool]:
-    """The address as it is shown, and whether it is of this machine."""
+    """The address as it is shown, and whether it is this machine's."""
     try:
         found = ip_address(address.partition("%")[0])
     except ValueError:

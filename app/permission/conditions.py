@@ -1,4 +1,4 @@
-"""Whether a value of the robot's permits by an interlock, and the sentence where it does not: pure."""
+"""Whether the value of an interlock's field permits, and the sentence if it does not: pure."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
@@ -22,7 +22,7 @@ HOLDS: Final[Mapping[str, Callable[[Any, Any], bool]]] = {
 
 
 def permits(interlock: Interlock, value: Any) -> bool:
-    """Whether this value permits; None is one that is not there. NaN never does."""
+    """Whether this value permits. None, a value that is missing, never does; nor does NaN."""
     conditions = interlock.conditions
     if not conditions:
         return value is True

@@ -1,4 +1,4 @@
-"""Who has control, as the pages show it: one view for all, and one for each role."""
+"""The view of control: one for all clients, and one for each role."""
 
 from typing import Final, Literal, TypedDict
 
@@ -12,8 +12,8 @@ IN_CONTROL: Final = frozenset[Role]({"", "holding", "asked"})
 
 
 class ControlView(TypedDict):
-    """What is known of control; a client's own part is its `role` and the text that is `shown` to it,
-    "" in the view for all. An id or a name is "" where there is none; `since` is RFC 3339."""
+    """The state of control. `role` and `shown`, the text for that role, are "" in the view for all. An
+    id or a name is "" if there is none; `since` is RFC 3339."""
 
     required: bool
     holder: str
@@ -76,7 +76,7 @@ def control_view(
 
 
 def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
-    """What a client is to who has control; pages show their buttons by it."""
+    """The role of a client in control; pages show their buttons by it."""
     if not control["required"]:
         return ""
     if not control["holder"]:
@@ -89,7 +89,7 @@ def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
 
 
 def for_role(control: ControlView, role: Role) -> ControlView:
-    """The view as a client of this role gets it."""
+    """The view for a client of this role."""
     if role == "asking":
         shown = control["asker_text"]
     elif role in ("holding", "asked"):

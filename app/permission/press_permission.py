@@ -1,8 +1,8 @@
 """May this client press this command now? An ordered table of checks; the first that locks decides.
 
-Everything that can be pressed is judged here: what the view shows as locked, presses, holds, calls,
-actions and parameters. A check is a row of `CHECKS`: a pure function from a question to a verdict, or
-None where it has nothing to say.
+It judges everything that can be pressed: what the view shows as locked, presses, holds, calls, actions
+and parameters. A check is a row of `CHECKS`: a pure function from a question to a verdict, or None if
+it does not apply.
 """
 
 import math
@@ -29,10 +29,10 @@ from app.robot.state import RobotState
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
-    """What the server itself has against a press, beside the robot.
+    """Why the server itself locks a press.
 
-    `ending` while it shuts down, `log_lock` why the operator's log locks ("" where it does not),
-    `control` whether who presses has control; `who` is None in a question for all clients.
+    `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
+    whether the client has control. `who` is None in a question for all clients.
     """
 
     control: Verdict = PERMITTED
@@ -57,8 +57,8 @@ class Question(NamedTuple):
 
 
 class Check(NamedTuple):
-    """`judge` gives a verdict, or None. Where a check locks `alone`, no later one is made; else what
-    later ones lock is listed beside it."""
+    """`judge` returns a verdict, or None. If a check with `alone` locks, no later check is made; else
+    their locks are listed beside it."""
 
     name: str
     judge: Callable[[Question], Verdict | None]
@@ -116,7 +116,7 @@ def judged(
 
 
 def combined(verdicts: Sequence[Verdict]) -> Verdict:
-    """The verdict of what all have to permit: the first that does not comes first."""
+    """The verdict of several that must all permit: the first that locks, with the others beside it."""
     if not verdicts:
         return PERMITTED
     if len(verdicts) == 1:

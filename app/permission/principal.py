@@ -11,10 +11,10 @@ UserRole = Literal["operator"]
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Who asks for something: everything that is permitted, limited or logged is so for a principal.
+    """Who asks for something: permissions, limits and log entries are per principal.
 
-    `client` is the browser or program. `user` is the name of who is logged in, "" while there are no
-    users; then everyone is an operator.
+    `client` is the browser or program. `user` is the name of the user who is logged in, "" while there
+    are no users; then everyone is an operator.
     """
 
     client: Client

@@ -46,8 +46,8 @@ class FieldOf(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FieldState:
-    """What is known of a field: its `value`, if there is one; `until` (monotonic seconds) is when time
-    alone changes it."""
+    """The state of a field: its `value`, None if there is none; `until` (monotonic seconds) is when
+    time alone changes the state."""
 
     state: State
     note: TextLike
@@ -63,7 +63,7 @@ class ShownTopic(HasTopic, Protocol):
 
 
 def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState:
-    """What is known of a topic at `now`, without a value: a state other than "missing"."""
+    """The state of a topic at `now`, without a value; never "missing"."""
     topic = widget.topic
     if doubt := topic_mismatch("MS", widget, robot):
         return FieldState("unreadable", doubt.reason or "")
@@ -81,7 +81,7 @@ def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState
 
 
 def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState:
-    """What is known of a field at `now`; the panel must listen to its topic and read the field."""
+    """The state of a field at `now`; the panel must subscribe to its topic and read the field."""
     field = topic_state(widget, robot, now)
     if field.state in ("unreadable", "waiting"):
         return field
@@ -95,7 +95,7 @@ def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState
 
 
 def _dated(reading: Reading, field: FieldState, max_age_s: float | None, now: float) -> FieldState:
-    """What is known of a message that was received, by its age."""
+    """The state of a received message, by its age."""
     if reading.status == "cut":
         return replace(field, state="old", note=say("readout_cut", time=format_time(reading.wall)))
     if max_age_s is None:
@@ -107,8 +107,7 @@ def _dated(reading: Reading, field: FieldState, max_age_s: float | None, now: fl
 
 
 def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
-    """Attributes of any display: `state`, `text` (its value as it is) and `note`; and when they
-    change."""
+    """Attributes of any display: `state`, `text` (the plain value) and `note`; and when they change."""
     field = field_state(widget, robot, now)
     return {"state": field.state, "text": shown_value(field.value), "note": field.note}, field.until
 

@@ -1,4 +1,5 @@
-"""How each kind of widget is shown: pure, from (widget, robot, verdict, time). A row for each."""
+"""The attributes of each kind of widget: pure, from (widget, robot, verdict, time). A row for each
+kind."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -51,8 +52,8 @@ class Enabled(TypedDict):
 
 
 def show(widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
-    """The attributes of a widget at `now` (monotonic seconds), and when time alone would change them;
-    `verdict` is that of a command: a change of it is no change by time alone."""
+    """The attributes of a widget at `now` (monotonic seconds), and when time alone changes them;
+    `verdict` is that of a command, whose own deadline is not counted here."""
     return find_row(SHOWN, widget)(widget, robot, verdict, now)
 
 

@@ -1,7 +1,7 @@
-"""The three links of the way to the robot, each with what it locks: pure, from (panel, robot, time).
+"""The three links between browser and robot, each with what it locks: pure, from (panel, robot, time).
 
-Browser to server, server to bridge, bridge to the robot's nodes. What a control is locked by is shown
-by its verdict's code.
+Browser to server, server to bridge, bridge to the robot's nodes. The code of a verdict decides to which
+link it belongs.
 """
 
 import math
@@ -62,8 +62,8 @@ class Lamp(TypedDict):
 
 
 class LinkStatus(Lamp):
-    """A link: `since` is when it came to this state, "" where that is not known; `locks` says which
-    controls it locks, `reason` why it is as it is and what helps, "" where there is nothing to say."""
+    """A link: `since` is when it came to this state, "" if that is not known; `locks` names the
+    controls that it locks, `reason` is why it is in this state and what helps, "" for none."""
 
     since: TextLike
     locks: TextLike
@@ -73,8 +73,9 @@ class LinkStatus(Lamp):
 def link_statuses(
     panel: Panel, robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], now: float
 ) -> tuple[dict[str, LinkStatus], float]:
-    """The three links, and when (monotonic seconds) time alone would change them; `verdicts` are those
-    of all that can be pressed, by its id. The server's link is "ok" wherever it says so itself."""
+    """The three links, and when (monotonic seconds) time alone changes them; `verdicts` are those of
+    all commands, by their ids. The server's link is always "ok": the browser overrides it when the
+    server is lost."""
     state, text = BRIDGE_LAMPS[passable.code]
     silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
     bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""
@@ -88,7 +89,7 @@ def link_statuses(
 
 
 def summary(name: TextLike, link: Mapping[str, Lamp]) -> Lamp:
-    """One light for a robot: what is wrong on the way to it, or how its nodes are."""
+    """One lamp for a robot: the bridge's link if it is not ok, else that of its nodes."""
     shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
     return Lamp(name=name, state=shown["state"], text=shown["text"])
 
@@ -119,9 +120,9 @@ def _node(
 
 
 def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float]:
-    """Why a node is taken for silent: its publisher is there by its token, but what it permits is
-    older than the panel allows. "" where none is; and when that may change. A topic that
-    is only displayed may be published on events, and its display shows its age."""
+    """Why a node counts as silent, and when that may change: its publisher has a liveliness token, but
+    the last message of an interlock is older than the panel allows. "" if no node is silent. A topic
+    that is only displayed may be published on events; its display shows its age."""
     until = math.inf
     for of in panel.interlocks:
         if of.max_age_s is None:
@@ -147,7 +148,7 @@ def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str])
 
 
 def locks(names: Sequence[TextLike]) -> Text:
-    """Which controls a link locks, in words; of a long list the rest is counted."""
+    """The controls that a link locks, as a text; a long list is cut, and the rest counted."""
     if not names:
         return say("locks_nothing")
     lengths = [longest(name) + len(", ") for name in names]
@@ -189,7 +190,7 @@ class LinkTimes:
         self._dated: dict[str, LinkStatus] = {}
 
     def dated(self, links: Mapping[str, LinkStatus]) -> dict[str, LinkStatus]:
-        """The same, with `since` for those that the server knows of."""
+        """The same links with `since`, except the browser's own link."""
         if links != self._plain:
             self._plain = links
             self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}

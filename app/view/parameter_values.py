@@ -113,7 +113,7 @@ def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Tex
 
 
 def reports_changes(robot: RobotState) -> bool:
-    """Whether changes that others make are heard, by what the graph shows."""
+    """Whether the panel receives changes by other clients, according to the graph."""
     key, graph = robot.key(EVENTS), robot.graph
     heard = graph.has_endpoint("MP", key) and not graph.is_unrouted(key)
     return heard and graph.mismatched_type("MS", key, EVENT_TYPE) is None

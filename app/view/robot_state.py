@@ -14,16 +14,15 @@ State = Literal["ready", "online", "locked", "unknown", "lost"]
 
 
 class RobotWord(TypedDict):
-    """`state` is "ready" where all interlocks permit, "online" where the panel has none, "locked"
-    where one forbids, "unknown" where one is not known now, "lost" where nothing reaches the robot."""
+    """`state` is "ready" if all interlocks permit, "online" if the panel has none, "locked" if one
+    forbids, "unknown" if one is unknown, "lost" without a connection to the robot."""
 
     state: State
     text: TextLike
 
 
 def robot_word(passable: Verdict, interlocks: Collection[Verdict]) -> RobotWord:
-    """The word for the link's verdict and those of all interlocks. What forbids counts before what is
-    unknown: it is known to lock."""
+    """The word for the verdicts of the link and of all interlocks. "locked" goes before "unknown"."""
     refused = [one for one in interlocks if not one.permitted]
     if not passable.permitted:
         return _word("unknown" if passable.code in ("joining", "catching_up") else "lost")

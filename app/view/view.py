@@ -1,8 +1,7 @@
-"""What the page shows: pure, from (panel, robot, time); the same for HTML and for events.
+"""The view: the state that pages and events show. Pure, from (panel, robot, time).
 
-A view is JSON values and, where a person reads, texts (`i18n`): they are rendered for each language in
-use, as an event or as a page. The browser puts texts and attributes where they belong and composes
-nothing.
+A view has JSON values, and texts (`i18n`) where a person reads; these are rendered for each language in
+use when an event or a page is sent. The browser sets texts and attributes and composes none.
 """
 
 import math
@@ -24,15 +23,15 @@ from app.view.robot_state import UNKNOWN, RobotWord, robot_word
 
 
 class Notice(TypedDict):
-    """What stands above everything; "" where there is nothing to say."""
+    """The lines above all else on a page; "" for none."""
 
     banner: TextLike
     fault: TextLike
 
 
 class View(TypedDict):
-    """Everything that can change on a page; `widgets` has the attributes of each by its id, `robots`
-    the lamp of each where there are several."""
+    """Everything that can change on a page; `widgets` has the attributes of each widget by its id,
+    `robots` the lamp of each robot if the panel has several."""
 
     link: dict[str, LinkStatus]
     interlocks: dict[str, Enabled]
@@ -47,9 +46,10 @@ NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
 class ViewWithDeadlines(NamedTuple):
-    """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
-    change what the displays show, by their ids, and the `rest`. `without_control` are the attributes of
-    what can be pressed, by their ids, for clients without control; none where all have it."""
+    """A view and its deadlines in monotonic seconds: `displays` is when time alone changes a display,
+    by its id, `rest` the same for all else. `robot` is the robot's lamp on the pages of others.
+    `without_control` has the attributes of commands for clients without control, by their ids; it is
+    empty if all clients have control."""
 
     view: View
     robot: Lamp
@@ -59,7 +59,7 @@ class ViewWithDeadlines(NamedTuple):
 
     @property
     def until(self) -> float:
-        """When time alone would change it."""
+        """When time alone changes the view."""
         return min(self.rest, *self.displays.values()) if self.displays else self.rest
 
 
@@ -76,9 +76,9 @@ def build_view(
     control_lock: Verdict = PERMITTED,
     control_until: float = math.inf,
 ) -> ViewWithDeadlines:
-    """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
-    pressed, where they are not "". `control_lock` locks for clients without control; time alone would
-    change `control` at `control_until`."""
+    """The view at `now` (monotonic seconds). `fault` is shown above the page, `lock` locks all
+    commands; "" for none. `control_lock` locks for clients without control; time alone changes
+    `control` at `control_until`."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
     grounds = Grounds(log_lock=lock) if lock else NO_GROUNDS
@@ -108,13 +108,13 @@ def build_view(
 
 
 def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:
-    """The same commands, asked for a client that has no control."""
+    """The attributes of these commands for a client without control."""
     others = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
     return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in others}
 
 
 def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
-    """The same with every interlock and command locked for one reason."""
+    """The view with every interlock and command locked for one reason."""
     overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
 
     def locked(attributes: Mapping[str, Any]) -> Any:
@@ -133,7 +133,7 @@ def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
 def update_displays(
     current: ViewWithDeadlines, displays: Iterable[DisplayWidget], robot: RobotState, now: float
 ) -> ViewWithDeadlines:
-    """The same with these displays as of `now`, where nothing else has changed."""
+    """The view with these displays as of `now`; nothing else may have changed."""
     widgets, untils = dict(current.view["widgets"]), dict(current.displays)
     for widget in displays:
         widgets[widget.id], untils[widget.id] = show(widget, robot, now)
@@ -141,7 +141,7 @@ def update_displays(
 
 
 def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:
-    """The view as clients of this role get it: without control, what can be pressed is locked."""
+    """The view for clients of this role; without control, commands are locked."""
     if not role:
         return view
     control = control_for_role(view["control"], role)

@@ -1,4 +1,4 @@
-"""What the routes share: the application's state, typed."""
+"""The application's state, typed, as the routes get it."""
 
 from collections.abc import Awaitable
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from app.web.rendering.page_templates import PageTemplates
 
 @dataclass(slots=True)
 class AppState:
-    """All that a request needs."""
+    """The state that requests need."""
 
     fleet: Fleet
     assets: Assets
@@ -35,7 +35,8 @@ class AppState:
 
     @property
     def banner(self) -> TextLike:
-        """What stands above a page of no robot: that one is simulated."""
+        """The banner of a page that belongs to no robot: that one of the robots is simulated; "" for
+        none."""
         banners = (session.publisher.view["notice"]["banner"] for session in self.fleet.sessions)
         return next((banner for banner in banners if banner), "")
 
@@ -67,4 +68,4 @@ CurrentSession = Annotated[RobotSession, Depends(_of_robot)]
 
 
 async def named_robot(robot: Annotated[str, Path(description="The id of a [[robot]]")]) -> None:
-    """What every path of one of several robots has in it."""
+    """Describes the path parameter of a robot, for the paths of a panel with several."""

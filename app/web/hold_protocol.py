@@ -49,7 +49,7 @@ Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
 
 
 class Said(BaseModel):
-    """What every message of a browser has."""
+    """The fields of every message of a browser."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -72,7 +72,7 @@ class Beat(Said):
 
     @property
     def deflection(self) -> Deflection | None:
-        """A joystick's, where both axes are given."""
+        """The deflection of a joystick, if both axes are given."""
         return None if self.x is None or self.y is None else (self.x, self.y)
 
 
@@ -87,7 +87,7 @@ _message: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def read_message(text: str) -> Message | None:
-    """A message of a browser's; None for what is none."""
+    """The message in a browser's text; None if it is invalid."""
     try:
         return _message.validate_python(json_of(text))
     except (InputError, ValidationError):

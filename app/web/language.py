@@ -1,7 +1,7 @@
-"""In which language a reader is answered: the one place for this.
+"""The language of a response; nothing else decides it.
 
-The browser's cookie, which a choice on the page sets, counts before its settings (Accept-Language, RFC
-9110, 12.5.4), and these before the panel file's `language`. Only a language that the panel has counts.
+The cookie that a choice on the page sets goes before Accept-Language (RFC 9110, 12.5.4), and that
+before the panel file's `language`. Only languages of the panel count.
 """
 
 import re
@@ -25,7 +25,7 @@ _accepted: Final = re.compile(
 
 
 def language_of(connection: HTTPConnection) -> str:
-    """The language of who reads the answer: one of the panel's."""
+    """The language of the response to a request, one of the panel's."""
     panel = site_of(connection).fleet.panel
     available = panel.readers_languages
     found = panel.language
@@ -37,8 +37,8 @@ def language_of(connection: HTTPConnection) -> str:
 
 
 class LanguageHeaders:
-    """Says of each answer in a reader's language which that is, and what it was chosen by (RFC 9110,
-    8.5 and 12.5.5)."""
+    """Sets Content-Language and Vary on each response whose language was negotiated (RFC 9110, 8.5 and
+    12.5.5)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -56,7 +56,7 @@ class LanguageHeaders:
 
 @lru_cache(maxsize=256)
 def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
-    """The available language that suits best; "" where none does."""
+    """The available language that fits best; "" if none does."""
     by_name = {tag.lower(): tag for tag in available}
     preferred = [*([chosen] if chosen else []), *_preferred(accepted)]
     found = negotiate_locale(preferred, available, sep="-")
@@ -64,7 +64,7 @@ def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
 
 
 def _preferred(accepted: str) -> list[str]:
-    """The tags of the header, the most wanted first."""
+    """The tags of the header, by falling weight."""
     found = [match for one in accepted.split(",") if (match := _accepted.fullmatch(one))]
     weighted = [(float(match["weight"] or 1), match["tag"]) for match in found]
     return [tag for weight, tag in sorted(weighted, key=lambda one: -one[0]) if weight > 0]

@@ -12,7 +12,7 @@ Described = dict[int | str, dict[str, Any]]
 
 
 class ErrorAnswer(BaseModel):
-    """What is wrong, in a sentence; who asks for `text/html` gets a page of it."""
+    """What is wrong, in a sentence; a client that accepts `text/html` gets it as a page."""
 
     error: str
 
@@ -30,7 +30,7 @@ PAGE: Final = {"text/html": {"schema": TEXT}}
 
 
 def errors(*statuses: int) -> Described:
-    """The answers of a route that are errors."""
+    """The error responses of a route."""
     content = {JSON: {"schema": ErrorAnswer.model_json_schema()}, **PAGE}
     return {status: {"description": REASONS[status], "content": content} for status in statuses}
 
@@ -38,7 +38,7 @@ def errors(*statuses: int) -> Described:
 def described_body(
     model: type[BaseModel] | None, form: dict[str, Any] | None, *, required: bool
 ) -> dict[str, Any]:
-    """JSON, a form or either, by what there is a schema of: as a route's `openapi_extra`."""
+    """The `openapi_extra` of a route that reads JSON, a form or either."""
     content = {JSON: {"schema": model.model_json_schema()}} if model else {}
     if form is not None:
         content[FORM] = {"schema": form}

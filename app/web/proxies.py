@@ -1,5 +1,5 @@
-"""Who is behind a proxy: `X-Forwarded-For` and `X-Forwarded-Proto` count from proxies that are named,
-and from no one else."""
+"""The client behind a proxy: `X-Forwarded-For` and `X-Forwarded-Proto` count from the named proxies
+only."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -13,7 +13,7 @@ PEER: Final = "panel.peer"  # of the connection, in the scope
 
 
 class Proxies:
-    """The layer that puts the client's address in the place of a named proxy's."""
+    """An ASGI layer that replaces the address of a named proxy by the client's."""
 
     def __init__(self, app: ASGIApp, named: Sequence[str]) -> None:
         """`named` are addresses and networks."""

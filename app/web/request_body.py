@@ -1,4 +1,5 @@
-"""What a client sends, as JSON in a body or on a socket or as a form: read in one way everywhere."""
+"""What clients send: JSON in a body or on a socket, or a form. All routes read it with these
+functions."""
 
 import asyncio
 import json
@@ -20,7 +21,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 async def body_of(request: Request) -> bytes:
-    """The whole body; TooSlow where it takes longer than any client needs for so little."""
+    """The whole body; TooSlow after `BODY_WITHIN_S`."""
     try:
         async with asyncio.timeout(BODY_WITHIN_S):
             return await request.body()
@@ -50,8 +51,8 @@ def form_of(body: bytes, most: int = FIELDS_MOST) -> dict[str, str]:
 
 
 async def received(socket: WebSocket) -> Message:
-    """The next message; a socket that sends too large a one is closed at once, as its server does
-    where it knows the limit."""
+    """The next message. A message that is too large closes the socket, as the server does if it has the
+    limit."""
     message = await socket.receive()
     said = message.get("text") or message.get("bytes") or ""
     if len(said) > LONGEST:
@@ -61,7 +62,7 @@ async def received(socket: WebSocket) -> Message:
 
 
 def json_of(text: str | bytes, place: str = "the body") -> Any:
-    """What stands in it; InputError for what is not JSON, or has text that is not Unicode."""
+    """The value of a JSON text; InputError if it is not JSON, or has text that is not Unicode."""
     try:
         text = text.decode("utf-8-sig") if isinstance(text, bytes) else text
         given = _decoder.decode(text)
@@ -75,7 +76,7 @@ def json_of(text: str | bytes, place: str = "the body") -> Any:
 
 
 def as_model(model: type[Model], given: object, place: str = "the body") -> Model:
-    """The same as a model; InputError names the first fault and its place."""
+    """A value as a model; InputError names the first fault and its place."""
     try:
         return model.model_validate(given)
     except ValidationError as error:

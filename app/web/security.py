@@ -1,8 +1,8 @@
-"""Who may come in: the Host that the panel is known by, and no page but its own.
+"""The checks of Host, Origin and Sec-Fetch-Site, and the security headers.
 
-Pure ASGI, so that the event stream passes through without a task of its own. The checks follow
-what browsers send with every request: Host (DNS rebinding), Origin and Sec-Fetch-Site (requests
-made by other sites' pages).
+Only the panel's own names and its own pages are allowed. Pure ASGI, so that the event stream passes
+through without a task of its own. The checks use what browsers send with every request: Host (DNS
+rebinding), Origin and Sec-Fetch-Site (requests made by other sites' pages).
 """
 
 import re

@@ -27,8 +27,8 @@ OPTIONS: Final[dict[str, Any]] = {
 
 
 def bounded(receive: Receive) -> Config | None:
-    """The configuration of the server that starts the application, by the lifespan's `receive`, when it
-    is bounded; None where it is not uvicorn's."""
+    """Applies the limits to the server that starts the application, and returns its configuration,
+    found by the lifespan's `receive`; None if it is not uvicorn."""
     server = getattr(getattr(receive, "__self__", None), "config", None)
     if not isinstance(server, Config):
         return None
@@ -37,7 +37,7 @@ def bounded(receive: Receive) -> Config | None:
 
 
 def bound(server: Config) -> None:
-    """A server that does not listen yet takes no more than `OPTIONS`; what is tighter stays."""
+    """Limits a server that does not listen yet to `OPTIONS`; a tighter limit stays."""
     server.ws_max_size = min(server.ws_max_size, OPTIONS["ws_max_size"])
     server.ws_max_queue = min(server.ws_max_queue, OPTIONS["ws_max_queue"])
     server.ws_per_message_deflate = OPTIONS["ws_per_message_deflate"]
@@ -62,9 +62,10 @@ def urls(
 
 
 def check_port(server: Config | None) -> None:
-    """SettingsError where the server won't be able to listen: uvicorn would find out last of all.
+    """SettingsError if the server will not be able to listen; uvicorn would find that out only at the
+    end of the startup.
 
-    A socket that it was given, or that its reloader has opened, is there already.
+    A socket that it was given, or that its reloader has opened, is open already.
     """
     if server and not (server.uds or server.fd is not None or server.use_subprocess):
         check_port_free(server.host, server.port)

@@ -1,4 +1,4 @@
-"""How a browser's pages look: what was chosen in it, else what the panel file says."""
+"""The look of a browser's pages: chosen in that browser, else the panel file's."""
 
 from typing import Final, NamedTuple, TypedDict, get_args
 
@@ -48,7 +48,7 @@ class Choice(TypedDict):
 
 
 def display_of(connection: HTTPConnection, panel: Panel) -> Display:
-    """How the pages of this browser look."""
+    """The look of this browser's pages."""
     return Display(*(_chosen(connection, panel, name) for name in Display._fields))
 
 
@@ -65,7 +65,7 @@ def _usual(panel: Panel, name: str) -> str:
 
 
 def language_choice(panel: Panel, now: str) -> list[Choice]:
-    """The choice of a language, each named in itself; none where there is one only."""
+    """The choice of a language, each with its own name; empty if the panel has one only."""
     tags = panel.readers_languages
     options = [Option(value=tag, label=own_name(tag), chosen=tag == now, lang=tag) for tag in tags]
     return [Choice(name=LANGUAGE, label=say("display_language"), options=options)] if tags[1:] else []

@@ -1,4 +1,4 @@
-"""What the page of the operator's log shows of an entry, in the language of who reads it."""
+"""The texts of an entry on the page of the operator's log, in the reader's language."""
 
 import json
 import re
@@ -22,7 +22,7 @@ def _time(ms: int) -> datetime:
 
 
 def time_of(ms: int, language: str) -> str:
-    """With milliseconds, by the language's own sign."""
+    """The time of day with milliseconds, in the language's notation."""
     at = _time(ms)
     return f"{time_in(at.strftime('%H:%M:%S'), language)}{number_in(at.strftime('.%f')[:-3], language)}"
 
@@ -41,7 +41,7 @@ def outcome_of(outcome: str) -> TextLike:
 
 
 def who_of(who: str) -> TextLike:
-    """A client's name, which entries have in English."""
+    """The name of a client in the reader's language; entries have it in English."""
     for name, code in _names():
         if found := name.fullmatch(who):
             return say(code, **found.groupdict())
@@ -50,13 +50,13 @@ def who_of(who: str) -> TextLike:
 
 @cache
 def _names() -> list[tuple[re.Pattern[str], str]]:
-    """How English writes the names of clients without users."""
+    """Patterns of the English names of clients without users, with their codes."""
     written = [(re.escape(render(say(code, number="0"))), code) for code in NAMES]
     return [(re.compile(text.replace("0", "(?P<number>[0-9]+)")), code) for text, code in written]
 
 
 def values_of(text: str, language: str) -> list[tuple[str, str]]:
-    """The values of an entry as (name, text), but those that are empty."""
+    """The values of an entry that are not empty, as (name, text)."""
     values = json.loads(text).items()
     return [(printable(name), _value_of(value, language)) for name, value in values if value != ""]
 

@@ -70,7 +70,7 @@ class PageContext(TypedDict):
 def page_context(
     request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
 ) -> PageContext:
-    """The context of a page for one request. `inside` is None: the page's own template needs the rest."""
+    """The context of a page for one request, but `inside`, which the page's own template renders."""
     publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})

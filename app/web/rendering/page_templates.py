@@ -1,7 +1,7 @@
-"""The templates of the pages, each with the texts in them rendered in one language.
+"""The templates of the pages, with their texts rendered in one language.
 
-A page with a template of its own is rendered in two steps: that one is made in its sandbox, with the
-widgets from the same macros as everywhere, then put into the frame.
+A page with its own template is rendered in two steps: that template in its sandbox, with the widgets of
+the usual macros, then the frame around it.
 """
 
 from collections.abc import Collection
@@ -19,7 +19,7 @@ from app.panel.screen import CLEANING_S
 
 
 class PageTemplates:
-    """An environment for each language in use; a template is compiled when it is first needed."""
+    """An environment for each language in use; a template is compiled at its first use."""
 
     def __init__(self, folder: Path, own: Collection[Path] = ()) -> None:
         """`own` are the templates of the panel's pages."""
@@ -41,7 +41,7 @@ class PageTemplates:
             self._own = {path: compile_template(path) for path in own}
 
     def environment(self, language: str) -> Environment:
-        """That of a language with a catalogue."""
+        """The environment of a language that has a catalogue."""
         if language not in self._environments:
 
             def shown(value: Any) -> Any:
@@ -64,7 +64,7 @@ class PageTemplates:
     def inside(
         self, page: Page, pictures: Collection[str], language: str, **context: Any
     ) -> Markup | None:
-        """What a page's own template makes; None where it has none. `context` is what a widget's macro
+        """The HTML of a page's own template; None if it has none. `context` has what a widget's macro
         takes (`_cell.html`)."""
         if page.template is None:
             return None

@@ -1,1 +1,1 @@
-"""HTTP, and nothing but HTTP: each module is a router of one part of the contract."""
+"""The HTTP routes: each module is a router of one part of the contract."""

@@ -1,4 +1,4 @@
-"""The operator's log, to read, to filter and to take away as CSV."""
+"""The operator's log as a page with a filter, and as CSV."""
 
 import asyncio
 import logging
@@ -84,7 +84,7 @@ class Wanted(BaseModel):
 
 
 class LogContext(TypedDict):
-    """What `log.html` gets."""
+    """The variables of `log.html`."""
 
     site: AppState
     panel: Panel
@@ -171,8 +171,8 @@ async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted
 
 
 class Exported(Response):
-    """An export, handed on piece by piece. One that breaks off, or that no client reads, is not
-    terminated, so that no client takes it for whole."""
+    """The response with an export, sent piece by piece. An export that fails, or that no client reads,
+    is not terminated: no client takes it for complete."""
 
     media_type = "text/csv"
 

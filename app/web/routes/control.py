@@ -1,4 +1,4 @@
-"""Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
+"""Take, request, give and release control of a robot: JSON for scripts, forms without them."""
 
 import secrets
 from typing import Annotated, Final, TypeVar
@@ -129,7 +129,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
 
 
 def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Response:
-    """Back to the page, which shows why it was refused."""
+    """A redirect to the page, which shows why the act was refused."""
     page = session.panel.page(page_id or "") or session.panel.pages[0]
     if receipt.cause == "limit":
         query = f"?control={receipt.code}"

@@ -60,13 +60,13 @@ async def events(
 
 
 def no_role() -> Role:
-    """Of all clients, where control is not required."""
+    """The role of all clients if control is not required."""
     return ""
 
 
 class EventStream(Response):
-    """What one browser gets, until it goes or the publisher is closed. It waits while the browser does
-    not read, and then skips to now."""
+    """The event stream of one browser, until it disconnects or the publisher is closed. While the
+    browser does not read, the stream waits, and then continues with the newest view."""
 
     media_type = MEDIA_TYPE
 
@@ -79,8 +79,8 @@ class EventStream(Response):
         role: Callable[[], Role] = no_role,
         page: str = "",
     ) -> None:
-        """`first` comes with the snapshot; `streams` counts it while it is open; `role` is what its
-        client is to who has control now, `page` the page that it is for."""
+        """`first` is sent with the snapshot; `streams` counts the open streams; `role` returns the
+        client's role in control, `page` is the id of its page."""
         self._page = page
         self._publisher = publisher
         self._first = first

@@ -1,4 +1,4 @@
-"""For monitoring: is it up, can commands reach the robot, how much of what."""
+"""For monitoring: `/healthz`, `/readyz` and `/metrics`."""
 
 import asyncio
 from collections.abc import Callable

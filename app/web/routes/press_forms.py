@@ -22,7 +22,7 @@ from app.web.rendering.page_words import ask_of
 
 
 class Reader(NamedTuple):
-    """In which language, and how, the pages of a browser are."""
+    """The language and the display choices of a browser."""
 
     language: str
     display: Display
@@ -41,7 +41,8 @@ async def pressed_by_form(
     inputs: dict[str, str],
     reader: Reader,
 ) -> Response:
-    """Back to the page, with the receipt on it; or the question that comes first."""
+    """The response to a press: a redirect to the page with its receipt, or the question before the
+    press."""
     too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
     shown_on = inputs.pop("_page", "")
     asks = session.presses.widget(widget).confirm_press
@@ -74,7 +75,7 @@ def _ask(
     reader: Reader,
     shown_on: str,
 ) -> Response:
-    """Asks a browser without scripts whether it is meant: the answer is the press."""
+    """The page that asks before a press; its answer is the press."""
     pressed = session.presses.widget(widget)
     html = state.templates.render(
         "ask.html",
