@@ -1,12 +1,10 @@
 // Sliders with their values, and step buttons for gloves. Without this script the same inputs are number
 // fields.
-
-// Of the page's language. What an input holds has a point.
-const decimal = document.documentElement.dataset.decimal ?? ".";
+import { DECIMAL, numberText } from "./number-text.js";
 
 // A browser in another language would leave out the comma, and take 1,5 for 15.
 const isOwnComma = new Intl.NumberFormat(navigator.language).format(0.5).includes(",");
-if (decimal === "," && !isOwnComma) {
+if (DECIMAL === "," && !isOwnComma) {
   addEventListener("beforeinput", (event) => {
     if (event.data !== "," || event.target.type !== "number") return;
     event.preventDefault();
@@ -46,7 +44,7 @@ function step(input, times) {
 function equip(input) {
   const root = input.closest("[data-widget]");
   const output = root.querySelector("output");
-  const show = () => output && (output.value = input.value.replace("-", "−").replace(".", decimal));
+  const show = () => output && (output.value = numberText(input.value));
   if (output) {
     input.type = "range";
     setWidth(output, input);

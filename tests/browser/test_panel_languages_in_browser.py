@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support.browser.pages import asked
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
 from tests.support.servers import ready
 from tests.web.test_panel_languages import APP, PANEL
@@ -56,6 +57,13 @@ def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -
     expect(entry).to_have_value("0.5")
     page.locator('[data-widget="asked"] button[type=submit]').click()
     expect(page.locator('dialog [data-value-of="limit"]')).to_have_text("0,5")
+
+
+def test_a_question_shows_a_negative_number_with_a_true_minus_sign(page: Page, kiosk: Server) -> None:
+    page.goto(kiosk.url)
+    page.locator('[data-widget="limit"] input').fill("-1.5")
+    asked(page.locator('[data-widget="asked"] button[type=submit]'))
+    expect(page.locator('dialog [data-value-of="limit"]')).to_have_text("−1.5")
 
 
 def test_without_scripts_the_language_changes_too(without_scripts: Page, kiosk: Server) -> None:

@@ -1,6 +1,7 @@
 // The keypad: a number is entered beside its field and goes there with Set, if the limits permit.
 import { Draft, isWhole, judged } from "./draft.js";
 import { Sheet } from "./sheet.js";
+import { numberText } from "../number-text.js";
 import { setText } from "../show.js";
 
 const SHAPES = ["tall", "wide", "narrow"];
@@ -40,12 +41,12 @@ export class Entry {
     const { min, max, value, dataset } = this.input;
     const named = this.input.labels[0] ?? document.getElementById(this.input.getAttribute("aria-labelledby"));
     setText(this.#find("h2"), named.textContent);
-    setText(this.#find(".sheet-head b"), shown(value));
+    setText(this.#find(".sheet-head b"), numberText(value));
     setText(this.#find("small"), dataset.unit ?? "");
     for (const [name, limit] of [["min", min], ["max", max]]) {
       const key = this.#find(`[data-key=${name}]`);
       key.disabled = limit === "";
-      setText(key.querySelector("b"), shown(limit));
+      setText(key.querySelector("b"), numberText(limit));
     }
     // A parameter is set by the page's own key of that name.
     if (this.input.matches("[data-entry]")) for (const label of [".name", ".label"]) setText(this.#find(`.finish ${label}`), this.#sheet.root.dataset.enter);
@@ -53,8 +54,8 @@ export class Entry {
     this.#find('[data-key="."]').disabled = isWhole(this.input);
     const isRange = min !== "" && max !== "";
     this.#find(".scale").hidden = !isRange;
-    setText(this.#find(".low"), shown(min));
-    setText(this.#find(".high"), shown(max));
+    setText(this.#find(".low"), numberText(min));
+    setText(this.#find(".high"), numberText(max));
   }
 
   #clicked(button) {
@@ -92,7 +93,7 @@ export class Entry {
     const { dataset } = this.#sheet.root;
     const { value, problem } = judged(this.#draft.text, this.input);
     const isOut = problem !== null && problem !== "empty";
-    setText(this.#find("output"), shown(this.#draft.text, dataset.decimal));
+    setText(this.#find("output"), numberText(this.#draft.text));
     this.#find(".entered p").hidden = !isOut;
     setText(this.#find(".entered p b"), isOut ? dataset[problem] : "");
     setText(this.#find(".entered p span"), isOut ? this.#limits() : "");
@@ -114,7 +115,7 @@ export class Entry {
     const scale = this.#find(".scale");
     scale.style.setProperty("--at", `${Math.min(Math.max(at, 0), 100)}%`);
     scale.classList.toggle("none", !isNumber);
-    setText(scale.querySelector("b"), at > 26 && at < 74 ? shown(String(value)) : ""); // else it would lie on a limit
+    setText(scale.querySelector("b"), at > 26 && at < 74 ? numberText(String(value)) : ""); // else it would lie on a limit
   }
 
   #set() {
@@ -125,9 +126,4 @@ export class Entry {
     this.input.dispatchEvent(new Event("change", { bubbles: true }));
     this.cancel();
   }
-}
-
-// With a true minus sign, and the decimal sign of the panel's language.
-function shown(text, decimal = document.getElementById("keypad").content.firstElementChild.dataset.decimal) {
-  return text.replace("-", "−").replace(".", decimal);
 }

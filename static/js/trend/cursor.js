@@ -1,5 +1,5 @@
 // The cursor of a trend: a line that a finger or a keyboard sets, and the values there.
-import { written } from "./plot.js";
+import { numberText } from "../number-text.js";
 
 const NEAR = 0.02; // of the plot's width: how far from the cursor a value may be
 const STEP = 0.02; // of the plot's width, by a key
@@ -71,7 +71,7 @@ export class Cursor {
     const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);
     if (!nearest || distance(nearest) > this.#drawn.width + NEAR * this.#drawn.span) return NOTHING;
     const [, low, high] = nearest;
-    const text = (value) => written(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
+    const text = (value) => numberText(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
     return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();
   }
 }

@@ -1,5 +1,7 @@
 // Draws a trend's columns into the elements that the server has rendered (templates/widgets/trend.html); the same as
 // app/view/trend_plot.py.
+import { numberText } from "../number-text.js";
+
 const SIZE = 1000;
 const PER_COLUMN_PX = 1.5;
 const VALUE_TICK_PX = 45;
@@ -52,7 +54,7 @@ export class Plot {
     const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
     const named = limits.map((limit) => ({ ...limit, place: y(limit.at) / 10 })).filter(({ place }) => place >= 0 && place <= 100);
-    part(".limit-names").innerHTML = named.map(({ letter, at, place }) => `<text x="6" y="${place}%" dy="${isNamedAbove(letter, place) ? -5 : 15}">${letter} ${written(String(at))}</text>`).join("");
+    part(".limit-names").innerHTML = named.map(({ letter, at, place }) => `<text x="6" y="${place}%" dy="${isNamedAbove(letter, place) ? -5 : 15}">${letter} ${numberText(String(at))}</text>`).join("");
     part(".bands").innerHTML = this.pens.filter((pen) => pen.normal).map(({ normal: [from, to] }) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`).join("");
     for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
   }
@@ -128,13 +130,8 @@ function* valueTicks(low, high, most) {
   for (let number = Math.ceil(low / step - 1e-9); number <= high / step + 1e-9; number++) {
     const value = number * step;
     const text = Math.max(Math.abs(low), Math.abs(high)) < 1e6 ? value.toFixed(Math.min(digits, 20)) : Number(value.toPrecision(4)).toString();
-    yield [value, written(text)];
+    yield [value, numberText(text)];
   }
-}
-
-// A number as the panel's language writes it, with a true minus sign.
-export function written(text) {
-  return text.replace("-", "−").replace(".", document.documentElement.dataset.decimal ?? ".");
 }
 
 // Seconds as "2 d 03:04:05".
