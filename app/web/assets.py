@@ -16,10 +16,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from app.panel.widgets.families import BaseWidget, Input
+from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.joints import Joints
+from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.parameter import Parameter
+
 LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys", "floor")
-OF_KINDS: Final = {
-    "entries": frozenset({"text", "number", "slider", "select", "toggle", "parameter"}),
-    "marks": frozenset({"gauge", "joints"}),
+# Which kinds and families of widgets need a stylesheet.
+OF_FAMILIES: Final[Mapping[str, tuple[type[BaseWidget], ...]]] = {
+    "entries": (Input, Parameter),
+    "marks": (Gauge, Joints),
 }
 OWN_PAGES: Final = ("gallery", "log")
 LATER: Final = "keypad"  # comes with the script that needs it
@@ -95,7 +102,8 @@ def load_assets(
     widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
     layer, so that they win, and as they are written.
     """
-    needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
+    widgets = [KINDS[kind] for kind in kinds]
+    needed = [name for name, of in OF_FAMILIES.items() if any(issubclass(one, of) for one in widgets)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     sheet = asset(b"".join([*layers, millimetre]), ".css")

@@ -2,12 +2,14 @@
 
 import gzip
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.numbers import Numeric
 from app.settings import shipped_path
-from app.web.assets import LATER, LAYERS, OF_KINDS, OWN_PAGES, Assets, load_assets
+from app.web.assets import LATER, LAYERS, OF_FAMILIES, OWN_PAGES, Assets, load_assets
 from tests.support.parts import ROOT
 
 
@@ -16,7 +18,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, *OF_KINDS, *OWN_PAGES, LATER):
+    for layer in (*LAYERS, *OF_FAMILIES, *OWN_PAGES, LATER):
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")
@@ -57,17 +59,28 @@ def test_the_stylesheet_has_what_the_panels_widgets_need(
     assert (".entries a" in sent) is needed
 
 
+def test_a_new_kind_of_input_has_the_styles_of_its_family(
+    static: Path, templates: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Dial(Numeric):
+        kind: Literal["dial"]
+
+    monkeypatch.setattr("app.web.assets.KINDS", {**KINDS, "dial": Dial})
+    sent = loaded(static, templates, 0.25, "dial").files["kiosk.css"].content.decode()
+    assert ".entries a" in sent
+
+
 def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates: Path) -> None:
     for suffix in ("css", "js"):
         (static / suffix / "kinds").mkdir()
-    (static / "css/kinds/dial.css").write_text(".dial {}\n")
-    (static / "js/kinds/dial.js").write_text("dial();\n")
-    assets = loaded(static, templates, 0.25, "dial")
-    assert b".dial" not in assets.files["kiosk.css"].content
-    assert assets.files["kinds/dial.css"].content == b".dial{}"
-    assert assets.files["kinds/dial.js"].content == b"dial();\n"
-    assert assets.styles == {"dial"}
-    assert assets.scripts == {"dial"}
+    (static / "css/kinds/gauge.css").write_text(".gauge {}\n")
+    (static / "js/kinds/gauge.js").write_text("gauge();\n")
+    assets = loaded(static, templates, 0.25, "gauge")
+    assert b".gauge" not in assets.files["kiosk.css"].content
+    assert assets.files["kinds/gauge.css"].content == b".gauge{}"
+    assert assets.files["kinds/gauge.js"].content == b"gauge();\n"
+    assert assets.styles == {"gauge"}
+    assert assets.scripts == {"gauge"}
 
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
