@@ -1,9 +1,8 @@
 // Control of the robot: the bar that shows its holder, and the holder's keep-alive. The server locks the
 // buttons of a client without control. Loaded only where the panel requires control.
-import { newId } from "./press.js";
+import { newId, TAP_AGAIN_MS } from "./press.js";
 import { setText } from "./show.js";
 
-const TAP_AGAIN_MS = 700; // as in press.js
 const RESPONSE_TIMEOUT_MS = 5000;
 const BEATS_PER_KEEP_ALIVE = 3; // two heartbeats a second; the server releases a holder after 5 s of silence
 const TOUCH_INTERVAL_MS = 1000;
@@ -13,7 +12,7 @@ export class Control {
   #bar;
   #beats = 0;
   #touchedAt = -Infinity;
-  #to = ""; // who asked when the finger went down
+  #asker = ""; // who requested control when the finger went down
   #busy = false;
   #timeOf;
 
@@ -52,7 +51,7 @@ export class Control {
   }
 
   #touch() {
-    this.#to = this.#bar.elements.to.value;
+    this.#asker = this.#bar.elements.to.value;
     const now = performance.now();
     if (!IN_CONTROL.includes(this.#bar.dataset.role) || now - this.#touchedAt < TOUCH_INTERVAL_MS) return;
     this.#touchedAt = now;
@@ -70,13 +69,13 @@ export class Control {
     this.#busy = true;
     this.#bar.setAttribute("aria-busy", "true");
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
-    const said = this.#bar.querySelector(".refused");
+    const refusal = this.#bar.querySelector(".refused");
     try {
       const act = button.getAttribute("formaction").split("/").at(-1);
-      const answer = await (await this.#post(act, { to: this.#to, at, id: newId() })).json();
-      said.textContent = answer.reason ?? answer.error;
+      const answer = await (await this.#post(act, { to: this.#asker, at, id: newId() })).json();
+      refusal.textContent = answer.reason ?? answer.error;
     } catch {
-      said.textContent = document.body.dataset.unsure;
+      refusal.textContent = document.body.dataset.unsure;
     }
     await pause;
     this.#busy = false;

@@ -1,7 +1,7 @@
-// Hold-to-run, of a key or a joystick: what acts while it is held. Every event that may mean a release ends the hold, and only
-// a new press starts another one. The page shows the server's response, nothing else.
+// Hold-to-run, by a key or a joystick: acts while it is held. Every event that may mean a release ends the hold, and
+// only a new press starts another one. The page shows the server's response, nothing else.
 import { enteredValues } from "./entries.js";
-import { onEnd } from "./hold-end.js";
+import { listenForEnd } from "./hold-end.js";
 
 // On the page's own thread on purpose: a page that stalls must not keep a hold alive.
 const BEAT_MS = 80;
@@ -30,19 +30,19 @@ export class Holding {
     // A long touch must not open a menu; pointer events arrive all the same.
     this.button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     this.button.addEventListener("dragstart", (event) => event.preventDefault());
-    onEnd(this.button, () => this.pointer, () => this.key, (why) => this.end(why));
+    listenForEnd(this.button, () => this.pointer, () => this.key, (why) => this.end(why));
   }
 
   // What each heartbeat has in it; a joystick has its deflection.
-  said() {
+  heartbeatData() {
     return {};
   }
 
-  // What the server says of each heartbeat.
-  answered() {}
+  // The server's response to a heartbeat: the texts of what it has sent to the robot.
+  onResponse() {}
 
-  // It is not held any more.
-  released() {}
+  // The hold has ended.
+  onEnd() {}
 
   get busy() {
     return this.#socket !== null || this.button.disabled || document.hidden;
@@ -86,11 +86,11 @@ export class Holding {
   // Between the regular ones too, where there is news.
   beat(socket = this.#socket) {
     if (performance.now() - this.#stampedAt > SILENCE_MS) this.end("silence");
-    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.said() });
+    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.heartbeatData() });
   }
 
   #held(socket, { lease, moves }) {
-    if (moves) this.answered(moves);
+    if (moves) this.onResponse(moves);
     if (!lease) return;
     this.#lease = lease;
     this.beat(socket); // on a slow network the next one may be too late
@@ -133,7 +133,7 @@ export class Holding {
     this.#socket = this.pointer = this.key = null;
     delete this.root.dataset.hold;
     this.button.setAttribute("aria-pressed", "false");
-    this.released();
+    this.onEnd();
   }
 
   #show(outcome, reason) {

@@ -1,5 +1,5 @@
 // Shows the attributes and receipts of widgets: texts and element properties, in place. Composes no sentence.
-import { releaseEntry, showBounds, showEntry } from "./entries.js";
+import { releaseEntry } from "./entries.js";
 
 export function setText(element, text) {
   if (!element) return;
@@ -52,10 +52,6 @@ const SHOW = {
     const bar = root.querySelector("progress");
     if (bar) bar.hidden = !value;
   },
-  askable: (root, value) => (root.querySelector(".read").disabled = !value),
-  entry: showEntry,
-  bounds: showBounds,
-  settable: (root, value) => (root.querySelector(".setting").inert = !value),
   progress: (root, value) => {
     const bar = root.querySelector("progress");
     if (value === null) bar?.removeAttribute("value");
@@ -68,33 +64,33 @@ export function addShow(functions) {
   Object.assign(SHOW, functions);
 }
 
-// Widgets that this page itself locks, while something lies over it, with what the server says of them.
-const barred = new WeakMap();
+// Widgets that this page itself locks, while something lies over it: how often, and what the server says of the lock.
+const localLocks = new WeakMap();
 const LOCK = ["enabled", "reason", "reasons", "more"];
 
 // Locks the key of a widget for a reason of this page's own.
-export function bar(root, reason) {
-  if (barred.has(root)) {
-    barred.get(root).times += 1;
+export function lockLocally(root, reason) {
+  if (localLocks.has(root)) {
+    localLocks.get(root).times += 1;
     return;
   }
   const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
-  const said = { enabled: keysOf(root).some((key) => !key.disabled), reason: text("reason"), reasons: text("reasons"), more: text("more") };
+  const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), reason: text("reason"), reasons: text("reasons"), more: text("more") };
   for (const [name, value] of Object.entries({ enabled: false, reason, reasons: reason, more: "" })) showAttribute(root, name, value);
-  barred.set(root, { said, times: 1 });
+  localLocks.set(root, { fromServer, times: 1 });
 }
 
-// Once for each time that it was locked: then what the server says by now shows again.
-export function unbar(root) {
-  const lock = barred.get(root);
+// Once for each time that it was locked: after the last one the server's lock shows again, as it is by now.
+export function unlockLocally(root) {
+  const lock = localLocks.get(root);
   if (!lock || --lock.times) return;
-  barred.delete(root);
-  for (const [name, value] of Object.entries(lock.said)) showAttribute(root, name, value);
+  localLocks.delete(root);
+  for (const [name, value] of Object.entries(lock.fromServer)) showAttribute(root, name, value);
 }
 
 export function showAttribute(root, name, value) {
-  if (barred.has(root) && LOCK.includes(name)) {
-    barred.get(root).said[name] = value;
+  if (localLocks.has(root) && LOCK.includes(name)) {
+    localLocks.get(root).fromServer[name] = value;
     return;
   }
   if (name in SHOW) SHOW[name](root, value);

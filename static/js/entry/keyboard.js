@@ -35,14 +35,14 @@ export class Entry {
   cancel() {
     if (this.input.value !== this.#before) {
       this.input.value = this.#before;
-      this.#say("input");
+      this.#dispatch("input");
     }
     if (!this.#wasTouched) releaseEntry(this.input.closest("[data-widget]"));
     this.#close();
   }
 
   #done() {
-    if (this.input.value !== this.#before) this.#say("change");
+    if (this.input.value !== this.#before) this.#dispatch("change");
     this.#close();
   }
 
@@ -68,8 +68,8 @@ export class Entry {
     const { key } = button.dataset;
     if (button.matches(".cancel-entry")) this.cancel();
     else if (button.matches(".set-entry")) this.#done();
-    else if (key === "shift") this.#turn({ shift: SHIFTS[(SHIFTS.indexOf(this.#shift) + 1) % SHIFTS.length] });
-    else if (key === "signs") this.#turn({ signs: !this.#signs });
+    else if (key === "shift") this.#setMode({ shift: SHIFTS[(SHIFTS.indexOf(this.#shift) + 1) % SHIFTS.length] });
+    else if (key === "signs") this.#setMode({ signs: !this.#signs });
     else this.#edit(key);
   }
 
@@ -81,15 +81,15 @@ export class Entry {
     }
     const from = key === "delete" && start === end ? Math.max(0, start - 1) : start;
     this.input.setRangeText(key === "delete" ? "" : key, from, end, "end");
-    this.#say("input");
-    if (this.#shift === "once" && key !== "delete") this.#turn({ shift: "off" });
+    this.#dispatch("input");
+    if (this.#shift === "once" && key !== "delete") this.#setMode({ shift: "off" });
   }
 
-  #say(name) {
+  #dispatch(name) {
     this.input.dispatchEvent(new Event(name, { bubbles: true }));
   }
 
-  #turn({ shift = this.#shift, signs = this.#signs }) {
+  #setMode({ shift = this.#shift, signs = this.#signs }) {
     this.#shift = shift;
     this.#signs = signs;
     this.#draw();

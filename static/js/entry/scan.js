@@ -5,13 +5,13 @@ const SHORTEST = 3; // characters: two keys of a hand may be as near
 const EDITABLE = "input:not([type=checkbox], [type=range]), select, textarea";
 
 const field = document.querySelector("[data-scan]");
-const said = document.getElementById(field.getAttribute("aria-describedby"));
+const message = document.getElementById(field.getAttribute("aria-describedby"));
 let burst = "";
 let lastAt = -Infinity;
 
 function deliver(text) {
   const isTooLong = [...text].length > field.maxLength;
-  said.textContent = isTooLong ? said.dataset.tooLong : "";
+  message.textContent = isTooLong ? message.dataset.tooLong : "";
   if (isTooLong) return;
   field.value = text;
   for (const name of ["input", "change"]) field.dispatchEvent(new Event(name, { bubbles: true }));

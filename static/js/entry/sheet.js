@@ -1,5 +1,5 @@
 // A sheet over the page in which something is entered: one at a time, and hold-to-run keys are locked.
-import { bar, unbar } from "../show.js";
+import { lockLocally, unlockLocally } from "../show.js";
 import { place } from "./place.js";
 import { TAP_AGAIN_MS } from "../press.js";
 
@@ -42,7 +42,7 @@ export class Sheet {
     this.root.setAttribute("aria-label", label);
     document.body.append(this.root);
     input.closest("[data-widget]").dataset.entering = "";
-    for (const hold of document.querySelectorAll(HOLDS)) bar(hold, this.root.dataset.locks);
+    for (const hold of document.querySelectorAll(HOLDS)) lockLocally(hold, this.root.dataset.locks);
     if (this.#place()) settle();
     addEventListener("resize", this.#placed);
     this.#watch.observe(input);
@@ -55,7 +55,7 @@ export class Sheet {
     this.root.remove();
     document.querySelector("main").toggleAttribute("data-lifted", false);
     delete this.#input.closest("[data-widget]").dataset.entering;
-    for (const hold of document.querySelectorAll(HOLDS)) unbar(hold);
+    for (const hold of document.querySelectorAll(HOLDS)) unlockLocally(hold);
   }
 
   #place() {

@@ -6,7 +6,7 @@ const TOUCHED = ":is(input[type=number], input[type=text], output)";
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
 let open = null; // what is open now
-let turn = 0; // counts touches: a module that comes late opens nothing
+let touches = 0; // counts them: a module that arrives after the next touch opens nothing
 
 // Without a system keyboard, where there is one of the page's own.
 function prepare() {
@@ -22,10 +22,10 @@ async function openFor(place) {
   const input = place.matches("output") ? place.parentElement.querySelector("input") : place;
   if (open?.input === input) return;
   open?.cancel();
-  const mine = ++turn;
+  const touch = ++touches;
   try {
     const module = await KINDS[input.type === "text" ? "keyboard" : "keypad"]();
-    if (mine !== turn) return;
+    if (touch !== touches) return;
     open = new module.Entry(input, () => (open = null));
   } catch {
     input.inputMode = input.dataset.inputmode ?? ""; // the next touch has the browser's own

@@ -1,6 +1,6 @@
 // The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
 import { shield } from "./shield.js";
-import { bar, unbar } from "../show.js";
+import { lockLocally, unlockLocally } from "../show.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;
@@ -27,7 +27,7 @@ export class Cleaning {
     this.#endsAt = performance.now() + ms;
     shield.raise();
     // A hold that goes on ends with its lock.
-    for (const hold of document.querySelectorAll(HOLDS)) bar(hold, over.querySelector("p").textContent.trim());
+    for (const hold of document.querySelectorAll(HOLDS)) lockLocally(hold, over.querySelector("p").textContent.trim());
     document.activeElement?.blur();
     document.getElementById("menu").hidePopover();
     over.showPopover();
@@ -44,7 +44,7 @@ export class Cleaning {
   #end() {
     sessionStorage.removeItem(UNTIL);
     over.hidePopover();
-    for (const hold of document.querySelectorAll(HOLDS)) unbar(hold);
+    for (const hold of document.querySelectorAll(HOLDS)) unlockLocally(hold);
     shield.lower();
   }
 }

@@ -1,4 +1,4 @@
-// A camera: asks for the next picture once the last is drawn, and only while it is seen.
+// A camera: requests the next picture when the last one is drawn, and only while the widget is visible.
 
 const RETRY_MS = 1000;
 const WATCH_MS = 100;
@@ -12,7 +12,7 @@ class Camera {
   #socket = null;
   #onScreen = false;
   #retry = 0;
-  #about = null; // of the bytes that come next
+  #header = null; // of the bytes that come next
   #drawnAt = 0;
 
   constructor(root) {
@@ -20,15 +20,15 @@ class Camera {
     this.#canvas = root.querySelector("canvas");
     new IntersectionObserver((entries) => {
       this.#onScreen = entries.at(-1).isIntersecting;
-      this.#follow();
+      this.#update();
     }).observe(root);
-    document.addEventListener("visibilitychange", () => this.#follow());
+    document.addEventListener("visibilitychange", () => this.#update());
     addEventListener("pagehide", () => this.#close());
-    addEventListener("pageshow", () => this.#follow());
+    addEventListener("pageshow", () => this.#update());
     setInterval(() => this.#watch(), WATCH_MS);
   }
 
-  #follow() {
+  #update() {
     if (this.#onScreen && !document.hidden) this.#open();
     else this.#close();
   }
@@ -41,15 +41,15 @@ class Camera {
     socket.binaryType = "blob";
     this.#socket = socket;
     this.#drawnAt = performance.now();
-    socket.onopen = () => this.#ask(socket);
+    socket.onopen = () => this.#requestPicture(socket);
     socket.onmessage = ({ data }) => {
-      if (typeof data === "string") this.#about = JSON.parse(data);
-      else this.#draw(socket, data, this.#about);
+      if (typeof data === "string") this.#header = JSON.parse(data);
+      else this.#draw(socket, data, this.#header);
     };
     socket.onclose = () => {
       if (socket !== this.#socket) return;
       this.#socket = null;
-      this.#retry = setTimeout(() => this.#follow(), RETRY_MS);
+      this.#retry = setTimeout(() => this.#update(), RETRY_MS);
     };
   }
 
@@ -59,7 +59,7 @@ class Camera {
     this.#socket = null;
   }
 
-  #ask(socket) {
+  #requestPicture(socket) {
     if (socket.readyState === WebSocket.OPEN) socket.send('{"next": true}');
   }
 
@@ -81,7 +81,7 @@ class Camera {
       this.#root.dataset.broken = "";
     }
     // The next one with the next frame of the screen, which a hidden page does not have.
-    requestAnimationFrame(() => this.#ask(socket));
+    requestAnimationFrame(() => this.#requestPicture(socket));
   }
 
   // The robot may send, and this browser get nothing: then its picture is old all the same.

@@ -1,5 +1,5 @@
-// A joystick: a hold whose heartbeats have the deflection. It follows one finger, wherever that goes, and shows what
-// the server has sent of it.
+// A joystick: a hold whose heartbeats have the deflection. It follows one finger, wherever that goes, and shows the
+// values that the server has sent to the robot.
 import { Holding } from "../holding.js";
 
 const APART_MS = 40; // between two heartbeats of a finger that moves
@@ -19,20 +19,20 @@ class Joystick extends Holding {
     super(root, source);
     this.#knob = root.querySelector(".knob");
     this.button.addEventListener("pointerdown", (event) => this.#down(event));
-    this.button.addEventListener("pointermove", (event) => event.pointerId === this.pointer && this.#follow(event));
+    this.button.addEventListener("pointermove", (event) => event.pointerId === this.pointer && this.#moveTo(event));
     this.button.addEventListener("keydown", (event) => this.#keyDown(event));
     window.addEventListener("keyup", (event) => this.#keyUp(event), { capture: true });
   }
 
-  said() {
+  heartbeatData() {
     return { x: this.#x, y: this.#y };
   }
 
-  answered(moves) {
+  onResponse(moves) {
     for (const [axis, text] of Object.entries(moves)) this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
   }
 
-  released() {
+  onEnd() {
     this.#arrows.clear();
     this.#deflect(0, 0);
     for (const value of this.root.querySelectorAll("[data-axis]")) value.textContent = "";
@@ -43,11 +43,11 @@ class Joystick extends Holding {
     this.button.setPointerCapture(event.pointerId);
     this.pointer = event.pointerId;
     this.begin();
-    this.#follow(event);
+    this.#moveTo(event);
   }
 
   // From the middle of the pad, as far as the knob goes.
-  #follow({ clientX, clientY }) {
+  #moveTo({ clientX, clientY }) {
     const { left, top, width, height } = this.root.querySelector(".pad").getBoundingClientRect();
     const reach = (Math.min(width, height) - this.#knob.offsetWidth) / 2;
     this.#deflect((clientX - left - width / 2) / reach, (top + height / 2 - clientY) / reach);
@@ -74,16 +74,16 @@ class Joystick extends Holding {
       this.begin();
     }
     this.#arrows.add(event.key);
-    this.#push();
+    this.#deflectByArrows();
   }
 
   #keyUp(event) {
     if (!this.#arrows.delete(event.key)) return;
-    if (this.#arrows.size) this.#push();
+    if (this.#arrows.size) this.#deflectByArrows();
     else this.end("released");
   }
 
-  #push() {
+  #deflectByArrows() {
     const held = [...this.#arrows].map((key) => ARROWS[key]);
     const sum = (axis) => held.reduce((all, arrow) => all + arrow[axis], 0);
     this.#deflect(sum(0), sum(1));

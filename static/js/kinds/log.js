@@ -12,17 +12,17 @@ export const equip = (root) => logs.set(root, new Log(root));
 export const show = {
   count(root, value) {
     root.dataset.count = value;
-    logs.get(root)?.follow();
+    logs.get(root)?.update();
   },
 };
 
 class Log {
   #root;
   #lines;
-  #last = 0; // the number of the newest line that was asked for
-  #askedAt = -Infinity;
+  #last = 0; // the number of the newest line at the last response
+  #queriedAt = -Infinity;
   #timer = 0;
-  #asking = null; // the request under way
+  #request = null; // the request under way
   #onScreen = false;
   #paused = false;
 
@@ -31,57 +31,57 @@ class Log {
     this.#lines = root.querySelector(".lines");
     const wanted = root.querySelector(".wanted");
     wanted.hidden = false;
-    wanted.querySelector(".level").addEventListener("change", () => this.#again());
+    wanted.querySelector(".level").addEventListener("change", () => this.#restart());
     for (const input of wanted.querySelectorAll("input")) {
-      input.addEventListener("input", () => this.#again(SETTLE_MS));
+      input.addEventListener("input", () => this.#restart(SETTLE_MS));
       input.addEventListener("keydown", (event) => event.key === "Enter" && event.preventDefault()); // no press
     }
     const pause = wanted.querySelector(".pause");
     pause.addEventListener("click", () => {
       this.#paused = !this.#paused;
       pause.setAttribute("aria-pressed", this.#paused);
-      this.follow();
+      this.update();
     });
     new IntersectionObserver((entries) => {
       this.#onScreen = entries.at(-1).isIntersecting;
-      this.follow();
+      this.update();
     }).observe(root);
-    document.addEventListener("visibilitychange", () => this.follow());
-    this.#again();
+    document.addEventListener("visibilitychange", () => this.update());
+    this.#restart();
   }
 
   // Asks when there is more than what was asked for, not too often, and one request at a time.
-  follow() {
+  update() {
     const more = Number(this.#root.dataset.count) !== this.#last;
-    if (!more || this.#paused || this.#asking || this.#timer || !this.#onScreen || document.hidden) return;
-    const wait = Math.max(0, this.#askedAt + APART_MS - performance.now());
-    this.#timer = setTimeout(() => this.#ask(), wait);
+    if (!more || this.#paused || this.#request || this.#timer || !this.#onScreen || document.hidden) return;
+    const wait = Math.max(0, this.#queriedAt + APART_MS - performance.now());
+    this.#timer = setTimeout(() => this.#query(), wait);
   }
 
   // From the first line on, as other lines are wanted.
-  #again(wait = 0) {
-    this.#asking?.abort();
-    this.#asking = null;
+  #restart(wait = 0) {
+    this.#request?.abort();
+    this.#request = null;
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.#ask(true), wait);
+    this.#timer = setTimeout(() => this.#query(true), wait);
   }
 
-  async #ask(whole = false) {
+  async #query(whole = false) {
     this.#timer = 0;
-    this.#askedAt = performance.now();
-    const asking = (this.#asking = new AbortController());
+    this.#queriedAt = performance.now();
+    const request = (this.#request = new AbortController());
     const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
     const query = new URLSearchParams({ level: of("level"), node: of("node"), search: of("search"), after: whole ? 0 : this.#last });
     try {
       const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
-      const answer = await fetch(path, { signal: asking.signal });
-      if (answer.ok && asking === this.#asking) this.#show(await answer.json(), whole);
+      const answer = await fetch(path, { signal: request.signal });
+      if (answer.ok && request === this.#request) this.#show(await answer.json(), whole);
     } catch {
       // The connection is lost: the page shows that.
     }
-    if (asking !== this.#asking) return;
-    this.#asking = null;
-    this.follow();
+    if (request !== this.#request) return;
+    this.#request = null;
+    this.update();
   }
 
   #show({ lines, note, last }, whole) {

@@ -24,7 +24,7 @@ class Trend {
   #clock = 0; // what to add to performance.now() for the server's clock, in seconds
   #visible = false;
   #timer = 0;
-  #asked = null; // the request under way
+  #request = null; // the request under way
 
   constructor(root) {
     this.#root = root;
@@ -39,11 +39,11 @@ class Trend {
   }
 
   #listen() {
-    new IntersectionObserver((seen) => this.#see(seen.at(-1).isIntersecting)).observe(this.#area);
-    document.addEventListener("visibilitychange", () => this.#follow());
+    new IntersectionObserver((seen) => this.#setVisible(seen.at(-1).isIntersecting)).observe(this.#area);
+    document.addEventListener("visibilitychange", () => this.#update());
     const keys = this.#root.querySelector(".trend-keys");
     if (keys) keys.hidden = false;
-    keys?.addEventListener("click", (event) => this.#do(event.target.closest("button")?.dataset.do));
+    keys?.addEventListener("click", (event) => this.#act(event.target.closest("button")?.dataset.do));
     setInterval(() => this.#showBehind(), 1000);
   }
 
@@ -51,22 +51,22 @@ class Trend {
     return performance.now() / 1000 + this.#clock;
   }
 
-  #see(visible) {
+  #setVisible(visible) {
     this.#visible = visible;
-    this.#follow();
+    this.#update();
   }
 
   // Asks while the trend can be seen; a pause asks for nothing.
-  #follow() {
+  #update() {
     clearTimeout(this.#timer);
     if (!this.#visible || document.hidden) return;
     const isOver = this.#end !== null && this.#drawn?.end === this.#end && this.#drawn.span === this.#span;
-    if (!isOver) this.#ask();
+    if (!isOver) this.#query();
   }
 
-  async #ask() {
-    this.#asked?.abort();
-    const asked = (this.#asked = new AbortController());
+  async #query() {
+    this.#request?.abort();
+    const request = (this.#request = new AbortController());
     const points = this.#plot.mostColumns;
     const query = { span_s: this.#span, points };
     const width = this.#span / points;
@@ -77,24 +77,24 @@ class Trend {
     const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/trend?${new URLSearchParams(query)}`;
     let wait = AGAIN_MS;
     try {
-      const response = await fetch(path, { signal: asked.signal });
+      const response = await fetch(path, { signal: request.signal });
       if (response.ok) {
         const answer = await response.json();
         wait = Math.max(LEAST_MS, width * 1000);
         this.#clock = answer.now - performance.now() / 1000;
         if (goesOn && answer.shift !== drawn.shift) wait = 0;
-        this.#take(answer, goesOn ? query.since : 0, wait > 0);
+        this.#receive(answer, goesOn ? query.since : 0, wait > 0);
       }
     } catch {
-      if (asked.signal.aborted) return; // another one is under way
+      if (request.signal.aborted) return; // another one is under way
     }
-    if (asked !== this.#asked) return;
+    if (request !== this.#request) return;
     clearTimeout(this.#timer);
-    if (this.#end === null || wait === AGAIN_MS) this.#timer = setTimeout(() => this.#follow(), wait);
+    if (this.#end === null || wait === AGAIN_MS) this.#timer = setTimeout(() => this.#update(), wait);
   }
 
   // Columns from `since` on take the place of those that are there.
-  #take(answer, since, live) {
+  #receive(answer, since, live) {
     const { end, shift, width_s: width, zone_s: zone } = answer;
     const begin = end - this.#span;
     const isBefore = (number) => (number + 1) * width < begin;
@@ -106,7 +106,7 @@ class Trend {
   }
 
   // The keys.
-  #do(what) {
+  #act(what) {
     const end = this.#end ?? this.#now;
     const window = this.#windows.indexOf(this.#span);
     if (what === "pause") this.#end = this.#drawn?.end ?? end;
@@ -118,7 +118,7 @@ class Trend {
     else return;
     if (what === "live") this.#cursor.remove();
     this.#showState();
-    this.#follow();
+    this.#update();
   }
 
   get #oldest() {
