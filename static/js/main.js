@@ -94,7 +94,7 @@ const SECTIONS = {
 
 const source = new Source({
   snapshot(all) {
-    if (!source.whole || all.revision !== body.dataset.revision) {
+    if (!source.isComplete || all.revision !== body.dataset.revision) {
       lockAll();
       source.stop();
       location.reload();
@@ -126,7 +126,7 @@ for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
   });
 }
 if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});
-source.load("./whole.js", () => {});
+source.load("./full-text.js", () => {});
 // What is not there when these fail to load is the browser's own.
 const absent = () => {};
 const coarse = matchMedia("(pointer: coarse)");

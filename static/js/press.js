@@ -28,14 +28,14 @@ async function post(url, press, timeoutMs) {
 }
 
 export class Presser {
-  #line = null;
+  #socket = null;
   #untouchedTimer = 0;
   #widgets;
   #sentences;
   #source;
   #pending = new Set(); // URLs of presses without a response yet
-  #goal = "";
   #downButton = null; // the enabled button under the pointer when it went down
+  #downValue = ""; // of that button then: the goal that it cancels, or the value that a key of a step sends
   #confirm = () => {}; // of ask.js, which is loaded with the page: nothing is pressed before that
   #seen = null;
   #id = newId(); // of the next press
@@ -60,7 +60,7 @@ export class Presser {
 
   #down(target) {
     this.#downButton = target.closest?.("button:enabled");
-    this.#goal = this.#downButton?.value; // of a cancel button: the goal to cancel
+    this.#downValue = this.#downButton?.value;
     this.#seen = this.#source.seen; // the view at this moment
     this.#open();
   }
@@ -82,10 +82,10 @@ export class Presser {
     const byPointer = event.detail > 0;
     const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
     const isCancel = button.matches(".cancel");
-    if (isCancel) click.press = byPointer ? this.#goal : button.value;
+    if (isCancel) click.press = byPointer ? this.#downValue : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
     // The key of a step has the value that was shown when the finger went down.
-    if (button.matches(".step-key")) inputs[button.name] = Number(byPointer ? this.#goal : button.value);
+    if (button.matches(".step-key")) inputs[button.name] = Number(byPointer ? this.#downValue : button.value);
     if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
     else this.#confirm(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }
@@ -100,17 +100,17 @@ export class Presser {
   #open() {
     clearTimeout(this.#untouchedTimer);
     this.#untouchedTimer = setTimeout(() => this.close(), UNTOUCHED_MS);
-    if (!this.#line) import("./line.js").then(({ Line }) => this.#connect(Line), () => {});
+    if (!this.#socket) import("./press-socket.js").then(({ PressSocket }) => this.#connect(PressSocket), () => {});
   }
 
-  #connect(Line) {
-    if (this.#source.streams) this.#line ??= new Line((line) => line === this.#line && this.close());
+  #connect(PressSocket) {
+    this.#socket ??= new PressSocket((socket) => socket === this.#socket && this.close());
   }
 
   // Also when the event stream is lost. Pending presses still get their responses.
   close() {
-    this.#line?.leave();
-    this.#line = null;
+    this.#socket?.leave();
+    this.#socket = null;
   }
 
   // A second tap while the first is pending is the same press: it sends nothing.
@@ -120,8 +120,8 @@ export class Presser {
     this.#pending.add(url);
     try {
       const timeoutMs = RESPONSE_TIMEOUT_MS + 1000 * (root.dataset.answerS ?? 0);
-      const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
-      const receipt = this.#send(root.dataset.widget, line, url, { inputs, id: this.#id, ...click }, timeoutMs);
+      const socket = this.#socket?.free && !button.matches(".cancel") ? this.#socket : null;
+      const receipt = this.#send(root.dataset.widget, socket, url, { inputs, id: this.#id, ...click }, timeoutMs);
       // The press is sent; what can wait follows.
       this.#id = newId();
       forgetRobotValue(root);
@@ -136,14 +136,14 @@ export class Presser {
   }
 
   // Sent once, never repeated: without a response the outcome is unknown.
-  async #send(widget, line, url, press, timeoutMs) {
+  async #send(widget, socket, url, press, timeoutMs) {
     try {
-      const response = line?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs);
+      const response = socket?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs);
       const { status, error, ...receipt } = await response;
       if (receipt.outcome) return receipt;
       if (status < 500 && error) return { outcome: "refused", reason: error };
     } catch {
-      if (line && line === this.#line) this.close();
+      if (socket && socket === this.#socket) this.close();
     }
     return { outcome: "unknown", reason: this.#sentences.unsure };
   }

@@ -75,8 +75,10 @@ export function lockLocally(root, reason) {
     return;
   }
   const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
-  const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), reason: text("reason"), reasons: text("reasons"), more: text("more") };
-  for (const [name, value] of Object.entries({ enabled: false, reason, reasons: reason, more: "" })) showAttribute(root, name, value);
+  const texts = { reason: text("reason"), reasons: text("reasons"), more: text("more") };
+  const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), ...texts };
+  const lock = { enabled: false, reason, reasons: reason, more: "" };
+  for (const [name, value] of Object.entries(lock)) showAttribute(root, name, value);
   localLocks.set(root, { fromServer, times: 1 });
 }
 

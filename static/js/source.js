@@ -13,7 +13,8 @@ export class Source {
   // The page is as old as the server's response, not as its script.
   #aliveAt = performance.getEntriesByType("navigation")[0]?.responseStart ?? 0;
   #fresh = true; // the page itself is a snapshot, for as long as any other
-  #whole = true;
+  #isComplete = true;
+  #loading = 0; // modules that are not there yet
   #seen = document.body.dataset.seen;
   // The server's time is at least performance.now() plus this. A delay makes a measured offset smaller, so
   // the largest counts.
@@ -23,21 +24,15 @@ export class Source {
   // `handlers` has a function for each event, and `lost`.
   constructor(handlers) {
     this.#handlers = handlers;
-    this.#connection = new Connection(Object.keys(handlers), SILENCE_MS, {
-      streamed: (name, data, id) => this.#streamed(name, data, id),
-      polled: (name, data, id, sentAt) => this.#received(name, data, id, sentAt),
+    this.#connection = new Connection(Object.keys(handlers), {
+      event: (name, text, id) => this.#receive(name, text, id),
       lost: () => this.#lose(),
     });
   }
 
-  // Whether all modules of this page are loaded.
-  get whole() {
-    return this.#whole;
-  }
-
-  // Whether an event stream is open; else snapshots are requested one by one.
-  get streams() {
-    return this.#connection.streams;
+  // Whether no module of this page failed to load.
+  get isComplete() {
+    return this.#isComplete;
   }
 
   // The id of the last event: the view that the operator sees.
@@ -56,18 +51,26 @@ export class Source {
   }
 
   start() {
-    document.addEventListener("visibilitychange", () => (document.hidden ? this.#suspend() : this.#connection.open()));
+    document.addEventListener("visibilitychange", () => (document.hidden ? this.#suspend() : this.#open()));
     addEventListener("pagehide", () => this.#suspend());
-    addEventListener("pageshow", (event) => event.persisted && this.#connection.open());
+    addEventListener("pageshow", (event) => event.persisted && this.#open());
     setTimeout(() => this.#watch(), CHECK_MS);
     if (document.hidden) this.#suspend();
-    else this.#connection.open();
+    else this.#open();
   }
 
-  // Loads a further module. If that fails the page is locked and reloads.
+  // Loads a further module. The stream opens after that, since the module may show attributes of the snapshot. If it
+  // fails the page is locked and reloads.
   load(name, use) {
-    import(name).then(use, () => {
-      this.#whole = false;
+    this.#loading += 1;
+    const begin = (module) => {
+      this.#loading -= 1;
+      use(module);
+      if (!document.hidden) this.#open();
+    };
+    import(name).then(begin, () => {
+      this.#loading -= 1;
+      this.#isComplete = false;
       this.#lose();
       this.#connection.openLater();
     });
@@ -79,6 +82,10 @@ export class Source {
     this.#handlers = Object.fromEntries(Object.keys(this.#handlers).map((name) => [name, () => {}]));
   }
 
+  #open() {
+    if (!this.#loading) this.#connection.open();
+  }
+
   // A hidden page releases its stream. When it shows again it is locked until a new snapshot.
   #suspend() {
     this.#connection.close();
@@ -86,11 +93,16 @@ export class Source {
   }
 
   // An event that was delayed in a buffer is not shown, nor any after it: a new stream starts with a snapshot.
-  #streamed(name, data, id) {
-    const stamp = name === "beat" ? data.now : Infinity;
-    if (!this.#isLate(stamp)) return this.#received(name, data, id);
-    this.#lose();
-    this.#connection.open();
+  #receive(name, text, id) {
+    try {
+      const data = JSON.parse(text);
+      if (!this.#isLate(name === "beat" ? data.now : Infinity)) return this.#show(name, data, id);
+      this.#lose();
+      this.#connection.open();
+    } catch (error) {
+      this.#lose(); // a page that is half updated is locked
+      throw error;
+    }
   }
 
   #isLate(stamp) {
@@ -100,21 +112,16 @@ export class Source {
     return this.#synced && this.#offset + now - stamp > SILENCE_MS;
   }
 
-  #received(name, data, id, at = performance.now()) {
+  #show(name, data, id) {
     if (name === "snapshot") {
       this.#fresh = true;
       this.#synced = false;
     }
     if (!this.#fresh) return; // after a loss only a snapshot is valid
-    this.#aliveAt = at;
-    if (name === "beat") this.#sync(data.now - performance.now());
+    this.#aliveAt = performance.now();
+    if (name === "beat") this.#sync(data.now - this.#aliveAt);
     if (id) this.#seen = id;
-    try {
-      this.#handlers[name](data);
-    } catch (error) {
-      this.#lose(); // a page that is half updated is locked
-      throw error;
-    }
+    this.#handlers[name](data);
   }
 
   #sync(offset) {
@@ -130,7 +137,7 @@ export class Source {
     if (document.hidden || left > 0) return;
     const fresh = this.#fresh;
     this.#lose();
-    if (fresh || now - this.#connection.openedAt > REOPEN_MS) this.#connection.open();
+    if (fresh || now - this.#connection.openedAt > REOPEN_MS) this.#open();
   }
 
   #lose() {

@@ -88,24 +88,8 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
 
 # What some readers take for the end of a line; in a text of the robot's it is part of it.
 SEPARATED = "one \x85 two \u2028 three \u2029 four"
-SNAPSHOT = "**/events?once=1&page=*"
-NO_STREAM_LEFT = """() => {
-    const forEver = () => new Promise(() => {});
-    for (const place of [0, 1, 2]) navigator.locks.request(`stream-${place}`, forEver);
-}"""
-
-
-@pytest.fixture
-def polling(server: Server, node: RosNode, page: Page) -> Page:
-    """An open page that asks for snapshots: its browser has no event stream to spare."""
-    other = page.context.new_page()
-    other.goto(f"{server.url}/log")
-    other.evaluate(NO_STREAM_LEFT)
-    permit(server, node, True)
-    with page.expect_request(SNAPSHOT):
-        page.goto(server.url)
-    expect(button(page, "Publish1")).to_be_enabled()
-    return page
+EVENTS = "**/events?page=*"
+EVENT_STREAM: Final = "text/event-stream"
 
 
 def say(node: RosNode, server: Server, text: str) -> None:
@@ -116,43 +100,43 @@ def say(node: RosNode, server: Server, text: str) -> None:
 
 
 def test_a_text_with_line_separators_keeps_no_button_open(
-    polling: Page, server: Server, node: RosNode
+    server: Server, node: RosNode, page: Page
 ) -> None:
+    permit(server, node, True)
+    page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_enabled()
     say(node, server, SEPARATED)
-    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
+    expect(page.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
     permit(server, node, False)
-    expect(button(polling, "Publish1")).to_be_disabled()
-    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
-
-
-def test_line_separators_that_come_as_they_are_end_no_line_of_a_snapshot(
-    polling: Page, server: Server, node: RosNode
-) -> None:
-    def unescaped(route: Route) -> None:
-        body = route.fetch().text()
-        for separator in "\x85\u2028\u2029":
-            body = body.replace(f"\\\\u{ord(separator):04x}", separator)
-        route.fulfill(body=body, content_type="text/event-stream")
-
-    polling.route(SNAPSHOT, unescaped)
-    say(node, server, SEPARATED)
-    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
-    permit(server, node, False)
-    expect(button(polling, "Publish1")).to_be_disabled()
-    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
+    expect(button(page, "Publish1")).to_be_disabled()
+    expect(why(page, "operation1")).to_contain_text("The robot does not permit operation")
 
 
 @pytest.mark.parametrize(
-    "answer",
-    ["", 'event: beat\ndata: {"clock": "10:00:00", "now": 1}\n\n', "event: snapshot\ndata: {\n\n"],
-    ids=["nothing", "no snapshot", "half of one"],
+    ("status", "content_type", "body"),
+    [
+        (503, "text/plain", "busy"),
+        (200, "text/html", "<h1>Sign in</h1>"),
+        (200, EVENT_STREAM, ""),
+        (200, EVENT_STREAM, 'event: update\ndata: {"operation": {"enabled": true}}\n\n'),
+    ],
+    ids=["refused", "no stream", "nothing", "no snapshot"],
 )
-def test_an_answer_without_its_snapshot_is_a_lost_link(polling: Page, answer: str) -> None:
-    polling.route(SNAPSHOT, lambda route: route.fulfill(body=answer, content_type="text/event-stream"))
-    expect(button(polling, "Publish1")).to_be_disabled()
-    expect(why(polling, "operation1")).to_contain_text(NO_SERVER)
-    polling.unroute(SNAPSHOT)
-    expect(button(polling, "Publish1")).to_be_enabled()
+def test_an_answer_without_a_snapshot_opens_nothing_and_the_page_asks_again(
+    server: Server, page: Page, status: int, content_type: str, body: str
+) -> None:
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    page.evaluate(HIDE, True)
+    answer = {"status": status, "content_type": content_type, "body": body}
+    page.route(EVENTS, lambda route: route.fulfill(**answer))
+    with page.expect_request_finished(lambda request: "/events?" in request.url):
+        page.evaluate(HIDE, False)
+    with page.expect_request(EVENTS):
+        expect(button(page, "Publish")).to_be_disabled()
+        expect(why(page, "operation")).to_contain_text(NO_SERVER)
+    page.unroute(EVENTS)
+    expect(button(page, "Publish")).to_be_enabled()
 
 
 def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) -> None:
@@ -341,20 +325,26 @@ def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
     assert len(posts) == 1
 
 
-def test_eight_tabs_of_one_browser_all_work(server: Server, node: RosNode, chromium: Browser) -> None:
+def test_five_visible_windows_of_one_browser_all_work_beside_hidden_ones(
+    server: Server, node: RosNode, chromium: Browser
+) -> None:
+    """A browser opens six connections to one server over HTTP/1.1."""
     context = chromium.new_context()
     pages = [context.new_page() for _ in range(8)]
+    visible = pages[3:]
     for page in pages:
         page.goto(server.url)
         expect(button(page, "Publish")).to_be_enabled()
+        if page not in visible:
+            page.evaluate(HIDE, True)
     permit(server, node, True)
-    for page in pages:
+    for page in visible:
         expect(button(page, "Publish1")).to_be_enabled()
     permit(server, node, False)
     for page in pages:
         expect(button(page, "Publish1")).to_be_disabled()
+    for page in visible:
         expect(why(page, "operation1")).to_contain_text("does not permit")
-    for page in pages:
         until(partial(sends, page), "it is sent", every_s=TAP_AGAIN_MS / 1000)
     context.close()
 
@@ -367,7 +357,7 @@ def sends(page: Page) -> bool:
     return "Sent" in receipt.inner_text()
 
 
-def test_a_hidden_tab_gives_its_stream_back_and_takes_a_snapshot_when_shown(
+def test_a_hidden_page_gives_its_stream_back_and_is_locked_until_a_new_snapshot(
     server: Server, node: RosNode, page: Page
 ) -> None:
     def streams(count: int) -> bool:
@@ -382,7 +372,14 @@ def test_a_hidden_tab_gives_its_stream_back_and_takes_a_snapshot_when_shown(
     until(lambda: streams(0), "no stream")
     expect(button(page, "Publish1")).to_be_disabled()
     permit(server, node, False)
-    page.evaluate(HIDE, False)
+    held: list[Route] = []
+    page.route(EVENTS, lambda route: held.append(route))
+    with page.expect_request(EVENTS):
+        page.evaluate(HIDE, False)
+    for name in ("Publish", "Publish1"):
+        expect(button(page, name)).to_be_disabled()
+    expect(why(page, "operation")).to_contain_text(NO_SERVER)
+    page.unroute(EVENTS)  # lets what is held go on
     until(lambda: streams(1), "one stream again")
     expect(why(page, "operation1")).to_contain_text("does not permit")
     expect(button(page, "Publish")).to_be_enabled()

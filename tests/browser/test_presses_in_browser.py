@@ -113,7 +113,7 @@ def receipt(page: Page) -> Any:
 @pytest.mark.parametrize("by", MADE_BY)
 def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, by: str, way: str) -> None:
     if way == "post":
-        shown.route("**/line.js", lambda route: route.abort())
+        shown.route("**/press-socket.js", lambda route: route.abort())
     else:
         shown.locator("header h1").click()
         shown.wait_for_function("() => opened")
@@ -460,7 +460,7 @@ def test_what_a_gateway_says_is_no_refusal(shown: Page) -> None:
         route.fetch()
         route.fulfill(status=504, json={"message": "The upstream server is timing out"})
 
-    shown.route("**/line.js", lambda route: route.abort())
+    shown.route("**/press-socket.js", lambda route: route.abort())
     shown.route("**/widgets/*", times_out)
     publish(shown).click()
     expect(receipt(shown)).to_have_attribute("data-outcome", "unknown")

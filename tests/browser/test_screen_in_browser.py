@@ -242,7 +242,7 @@ def test_a_touch_on_a_locked_key_shows_its_whole_reason(long: Server, page: Page
     why = page.locator("#why-locked")
     expect(why).to_contain_text(DOORS)
     assert why.evaluate("(why) => why.scrollHeight > why.clientHeight")
-    expect(key.locator(".more")).to_be_attached()  # whole.js is loaded
+    expect(key.locator(".more")).to_be_attached()  # full-text.js is loaded
     key.click()
     expect(whole.get_by_role("heading")).to_have_text("Locked")
     expect(whole.locator("p")).to_have_text(why.text_content() or "")
@@ -276,7 +276,7 @@ def test_what_a_key_was_answered_is_shown_whole_and_presses_nothing(long: Server
 def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     """What is no longer so is not read on."""
     sized(page, 1024, 600).goto(long.url)
-    expect(page.locator("[data-widget=locked] .more")).to_be_attached()  # whole.js is loaded
+    expect(page.locator("[data-widget=locked] .more")).to_be_attached()  # full-text.js is loaded
     page.locator("[data-widget=locked]").click()
     expect(page.locator("#whole p")).to_contain_text(DOORS)
     page.locator("#why-locked [data-text=reason]").evaluate(
@@ -292,7 +292,7 @@ def test_keys_that_lock_at_once_are_measured_together(tmp_path: Path, page: Page
     many = 'title = "Keys"\nmode = "demo"\n' + MAIN + "".join(keys)
     with demo_server(tmp_path, many) as mine:
         page.goto(mine.url)
-        expect(page.locator(".key .more")).to_have_count(KEYS)  # whole.js is loaded
+        expect(page.locator(".key .more")).to_have_count(KEYS)  # full-text.js is loaded
         clock = page.locator("#clock").text_content() or ""
         expect(page.locator("#clock")).not_to_have_text(clock)  # a beat: the snapshot is shown
         page.evaluate(DRAWN)

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.support.browser.pages import place
 from tests.support.browser.touch import loaded
@@ -112,6 +112,22 @@ def test_the_value_under_the_finger_counts(cell: Server, node: RosNode, page: Pa
     page.mouse.up()
     expect(page.locator("#receipt-speed")).to_contain_text("Speed is 40 by now.")
     assert len(node.heard(SET)) == before
+
+
+def test_a_value_that_changes_before_the_script_of_its_kind_is_there_is_shown(
+    cell: Server, node: RosNode, page: Page
+) -> None:
+    is_reported(cell, node, 20.0)
+    held: list[Route] = []
+    page.route("**/kinds/step.js", lambda route: held.append(route))
+    page.goto(cell.url, wait_until="commit")
+    until(lambda: page.evaluate("1") and held, "the script is requested")
+    is_reported(cell, node, 40.0)
+    expect(page.locator('[data-lamp="server"]')).to_have_attribute("data-state", "bad")
+    page.unroute("**/kinds/step.js")  # lets what is held go on
+    expect(page.locator('[data-widget="speed"] .value')).to_contain_text("40")
+    expect(key(page, "up")).to_have_attribute("value", "50")
+    expect(key(page, "up")).to_be_enabled()
 
 
 def test_without_scripts_a_form_sends_the_value_of_its_key(

@@ -40,8 +40,8 @@ async def events(
     once: bool = False,
     page: str = "",
 ) -> Response:
-    """`once`: the snapshot alone, for a browser that has no stream to spare. `page`: of its widgets
-    only, and those of the frame; without one, or with one that the panel does not have, of all."""
+    """`once`: one snapshot and the end, for programs. `page`: of its widgets only, and those of the
+    frame; without one, or with one that the panel does not have, of all."""
     publisher, rules = session.publisher, session.control.rules
     who, token = principal_with_new_token(request, state) if rules.required else (None, "")
     first = client_id_event(who.client.id) if who else b""

@@ -1,11 +1,11 @@
-// What a key says, whole: its face shows two lines. A touch on a locked key shows it, or one on the sign that
-// there is more, which a keyboard reaches too. An open sheet follows its key. A touch on who has control shows
-// that whole.
+// The full text of a key in a popover: its face shows two lines. A touch on a locked key opens it, or one on the "…"
+// that the face has where text is cut, which a keyboard reaches too. An open popover follows its key. A touch on the
+// bar of control shows its text in full.
 import { setText } from "./show.js";
 
 const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
-const sheet = document.getElementById("whole");
-let shown = null; // the key of the sheet
+const popover = document.getElementById("whole");
+let shown = null; // the key whose text the popover shows
 
 function visibleTexts(key) {
   const locked = key.querySelector("button")?.disabled;
@@ -17,16 +17,16 @@ function visibleTexts(key) {
   return shown.map((text) => text.textContent.trim()).filter(Boolean);
 }
 
-function fillSheet() {
+function fillPopover() {
   const texts = visibleTexts(shown);
-  if (texts.length) setText(sheet.querySelector("p"), texts.join("\n"));
+  if (texts.length) setText(popover.querySelector("p"), texts.join("\n"));
   return texts.length > 0;
 }
 
-function showWhole(key) {
+function showFullText(key) {
   shown = key;
-  setText(sheet.querySelector("h2"), key.querySelector(".name").textContent);
-  if (fillSheet()) sheet.showPopover();
+  setText(popover.querySelector("h2"), key.querySelector(".name").textContent);
+  if (fillPopover()) popover.showPopover();
 }
 
 function isCut(text) {
@@ -34,9 +34,9 @@ function isCut(text) {
 }
 
 function showCut(key, cut) {
-  const isWhole = !cut && !key.querySelector('[data-text="more"]')?.textContent;
-  key.querySelector(".more").toggleAttribute("hidden", isWhole);
-  if (key === shown && sheet.matches(":popover-open") && !fillSheet()) sheet.hidePopover();
+  const isComplete = !cut && !key.querySelector('[data-text="more"]')?.textContent;
+  key.querySelector(".more").toggleAttribute("hidden", isComplete);
+  if (key === shown && popover.matches(":popover-open") && !fillPopover()) popover.hidePopover();
 }
 
 const changed = new Set(); // keys whose face or size is another since the last frame
@@ -63,7 +63,7 @@ function equip(key) {
   new ResizeObserver(() => mark(key)).observe(key);
   key.addEventListener("click", ({ target }) => {
     const locked = key.querySelector("button").disabled && !target.closest("button");
-    if (locked || target.closest(".more")) showWhole(key);
+    if (locked || target.closest(".more")) showFullText(key);
   });
 }
 
@@ -72,8 +72,8 @@ for (const key of document.querySelectorAll(".key")) equip(key);
 const control = document.getElementById("control");
 control?.querySelector("div").addEventListener("click", () => {
   shown = null;
-  setText(sheet.querySelector("h2"), control.getAttribute("aria-label"));
+  setText(popover.querySelector("h2"), control.getAttribute("aria-label"));
   const texts = [...control.querySelectorAll("p")].map((text) => text.textContent).filter(Boolean);
-  setText(sheet.querySelector("p"), texts.join("\n"));
-  sheet.showPopover();
+  setText(popover.querySelector("p"), texts.join("\n"));
+  popover.showPopover();
 });

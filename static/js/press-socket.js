@@ -1,11 +1,12 @@
 // A WebSocket for presses: faster than a POST in most browsers. Loaded with the first touch of a page.
-export class Line {
+export class PressSocket {
   #socket;
   #pending = new Map(); // press id → its promise
   #leaving = false;
 
   constructor(onClose) {
-    this.#socket = new WebSocket(new URL(`${document.body.dataset.base}/presses`, location).href.replace(/^http/, "ws"));
+    const url = new URL(`${document.body.dataset.base}/presses`, location);
+    this.#socket = new WebSocket(url.href.replace(/^http/, "ws"));
     this.#socket.onmessage = ({ data }) => {
       const response = JSON.parse(data);
       this.#pending.get(response.press)?.resolve(response);
