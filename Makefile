@@ -12,7 +12,7 @@
 
 PYTHON ?= python3
 CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
-PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hashes -r
+PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hashes --no-deps -r
 
 BENCH := $(CACHE)/bench
 export BENCH_CACHE := $(BENCH)
