@@ -5,6 +5,7 @@ import signal
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -125,10 +126,22 @@ def test_a_text_with_line_separators_keeps_no_button_open(
 def test_an_answer_without_a_snapshot_opens_nothing_and_the_page_asks_again(
     server: Server, page: Page, status: int, content_type: str, body: str
 ) -> None:
+    opens_nothing(server, page, status=status, content_type=content_type, body=body)
+
+
+def test_half_a_snapshot_opens_nothing_and_the_page_asks_again(
+    server: Server, chromium: Browser
+) -> None:
+    """The page reports it on its console, which fails a shared page."""
+    body = "event: snapshot\ndata: {\n\n"
+    with closing(chromium.new_context()) as context:
+        opens_nothing(server, context.new_page(), status=200, content_type=EVENT_STREAM, body=body)
+
+
+def opens_nothing(server: Server, page: Page, **answer: Any) -> None:
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
     page.evaluate(HIDE, True)
-    answer = {"status": status, "content_type": content_type, "body": body}
     page.route(EVENTS, lambda route: route.fulfill(**answer))
     with page.expect_request_finished(lambda request: "/events?" in request.url):
         page.evaluate(HIDE, False)
