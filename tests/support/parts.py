@@ -199,6 +199,7 @@ class Bridge:
     def start(self) -> None:
         self._process = Process(
             [
+                *("setpriv", "--pdeathsig", "KILL"),  # an aborted run leaves no bridge in its domain
                 str(BRIDGE),
                 *self._configuration(),
                 'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"',
