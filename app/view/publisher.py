@@ -2,8 +2,8 @@
 
 There is no queue: a stream keeps the view that it sent last and, when it can send, gets the difference
 to the newest. There is a view for each role in control. Events are encoded once for all streams of a
-language and a role: streams at the same version share the bytes of the difference, all others those of
-each event that carries a whole section.
+reader's kind and a role: streams at the same version share the bytes of the difference, all others
+those of each event that carries a whole section.
 
 A page gets the attributes of its own widgets and of the frame's, with their locks, but not the
 interlocks behind them. A client that names no page gets everything.
@@ -11,8 +11,8 @@ interlocks behind them. A client that names no page gets everything.
 
 import asyncio
 import secrets
-from collections.abc import Callable, Collection, Mapping
-from typing import Any, Final
+from collections.abc import Collection, Mapping
+from typing import Any, Final, NamedTuple
 
 from pydantic_core import to_json
 
@@ -37,6 +37,16 @@ def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
     return text
 
 
+class Reader(NamedTuple):
+    """What a client reads: the language, and the page that it shows; "" for the widgets of all."""
+
+    language: str = ENGLISH
+    page: str = ""
+
+
+EVERYTHING: Final = Reader()
+
+
 class ViewPublisher:
     """The newest view, with its version; changed on the event loop only."""
 
@@ -59,9 +69,11 @@ class ViewPublisher:
         self._changed = asyncio.Event()
         self._latest_events: Events = {}  # from the view before to this one
         self._without_control = without_control
-        self._by_role: dict[tuple[Role, str], View] = {}
-        # By the language, the version before, the roles then and now, and the page.
-        self._prepared: dict[tuple[str, int, Role, Role, str], bytes] = {}
+        self._readers: dict[Reader, Reader] = {}
+        self._by_role: dict[Role, View] = {}
+        self._snapshots: dict[tuple[Reader, Role], bytes] = {}
+        # By the reader, the version before, and the roles then and now.
+        self._prepared: dict[tuple[Reader, int, Role, Role], bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._lock_changes: dict[str, int] = {}
         self.closed = False
@@ -81,7 +93,7 @@ class ViewPublisher:
             if "enabled" in changed:
                 self._lock_changes[widget] = self.version
         self.view, self._latest_events, self._without_control = view, events, without_control
-        self._by_role, self._prepared, self._whole = {}, {}, {}
+        self._by_role, self._snapshots, self._prepared, self._whole = {}, {}, {}, {}
         self.heartbeat.along()
         self._wake()
 
@@ -103,72 +115,69 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def for_role(self, role: Role = "", page: str = "") -> View:
-        """The newest view for clients of this role on a page. With "", or a page that the panel does
-        not have, it has the widgets of all pages."""
-        key = role, page
-        if key not in self._by_role:
-            whole = for_role(self.view, self._without_control, role)
-            own = self._of_page(whole["widgets"], page)
-            self._by_role[key] = whole if own is whole["widgets"] else {**whole, "widgets": own}
-        return self._by_role[key]
+    def reader(self, language: str, page: str = "") -> Reader:
+        """A reader of a page's widgets; of all widgets if the panel does not have that page."""
+        reader = Reader(language, page if page in self._pages else "")
+        return self._readers.setdefault(reader, reader)
 
-    def _of_page(self, widgets: dict[str, Any], page: str) -> dict[str, Any]:
-        shown = self._pages.get(page)
-        return widgets if shown is None else {k: v for k, v in widgets.items() if k in shown}
+    def for_role(self, role: Role = "") -> View:
+        """The newest view for clients of this role."""
+        if not role:
+            return self.view
+        if role not in self._by_role:
+            self._by_role[role] = for_role(self.view, self._without_control, role)
+        return self._by_role[role]
 
-    def snapshot(self, language: str = ENGLISH, role: Role = "", page: str = "") -> bytes:
+    def snapshot(self, reader: Reader = EVERYTHING, role: Role = "") -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        view = self.for_role(role, page)
-        about = {"id": self.id, "revision": self.revision}
-        return self._shared_event("snapshot", view, language, lambda: {**about, **view})
+        key = reader, role
+        if key not in self._snapshots:
+            view = self.for_role(role)
+            whole = {**view, "widgets": self._of_page(view["widgets"], reader.page)}
+            about = {"id": self.id, "revision": self.revision}
+            self._snapshots[key] = self._event("snapshot", {**about, **whole}, reader.language)
+        return self._snapshots[key]
 
     def events_since(
-        self,
-        version: int,
-        view: View,
-        language: str = ENGLISH,
-        was: Role = "",
-        role: Role = "",
-        page: str = "",
+        self, version: int, view: View, reader: Reader = EVERYTHING, was: Role = "", role: Role = ""
     ) -> bytes:
         """The events that bring a page from `view`, which was posted as `version` and sent to a client
         of the role `was`, to the newest view for `role`."""
-        key = language, version, was, role, page if page in self._pages else ""
+        key = reader, version, was, role
         prepared = self._prepared.get(key)
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
-            events = self._latest_events if latest else difference(view, self.for_role(role, page))
+            events = self._latest_events if latest else difference(view, self.for_role(role))
             prepared = self._prepared[key] = b"".join(
-                self._event(name, data, language)
+                self._event(name, data, reader.language)
                 if name == "update"
-                else self._shared_event(name, data, language)
-                for name, data in self._shown(events, page).items()
+                else self._shared_event(name, data, reader.language)
+                for name, data in self._shown(events, reader.page).items()
             )
         return prepared
 
     def _shown(self, events: Events, page: str) -> Events:
         """The events that a page gets, in their order: keys lock before the rest is shown."""
-        if page not in self._pages:
+        if not page:
             return events
         shown = {name: data for name, data in events.items() if not name.endswith(PERMISSION_EVENT)}
-        if own := self._of_page(dict(shown.pop("update", {})), page):
+        if own := self._of_page(shown.pop("update", {}), page):
             shown = {"update": own, **shown}
         return shown
 
-    def _shared_event(
-        self,
-        name: str,
-        of: Mapping[str, Any],
-        language: str,
-        data: Callable[[], Mapping[str, Any]] | None = None,
-    ) -> bytes:
-        """An event that does not depend on what a stream sent before; encoded once. `of` is a part of
-        one of the newest views, `data` makes the event's data of it if they differ."""
-        key = language, name, id(of)
+    def _of_page(self, widgets: Mapping[str, Any], page: str) -> Mapping[str, Any]:
+        if not page:
+            return widgets
+        shown = self._pages[page]
+        return {name: one for name, one in widgets.items() if name in shown}
+
+    def _shared_event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
+        """An event that does not depend on what a stream sent before; encoded once. `data` is a part of
+        one of the newest views."""
+        key = language, name, id(data)
         whole = self._whole.get(key)
         if whole is None:
-            whole = self._whole[key] = self._event(name, data() if data else of, language)
+            whole = self._whole[key] = self._event(name, data, language)
         return whole
 
     def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:

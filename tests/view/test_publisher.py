@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.i18n import localized
+from app.i18n import ENGLISH, localized
 from app.i18n.catalogue import catalogues_in
 from app.printable import printable
 from app.robot.state import RobotState
@@ -93,29 +93,31 @@ def test_of_a_widget_only_what_changed_is_sent(publisher: ViewPublisher, robot: 
 def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
     pages = {"one": {"guarded"}, "two": {"heard"}}
     publisher = ViewPublisher(view_of(robot), "r1", pages=pages)
-    assert {page: set(publisher.for_role("", page)["widgets"]) for page in pages} == pages
-    assert publisher.for_role("", "gone") is publisher.view
-    assert set(events(publisher.snapshot(page="two"))["snapshot"]["widgets"]) == {"heard"}
-    old = {page: publisher.for_role("", page) for page in ("one", "two", "")}
+    readers = {page: publisher.reader(ENGLISH, page) for page in ("one", "two", "")}
+    snapshots = {page: events(publisher.snapshot(of))["snapshot"] for page, of in readers.items()}
+    assert {page: set(snapshots[page]["widgets"]) for page in pages} == pages
+    assert set(snapshots[""]["widgets"]) == set(publisher.view["widgets"])
+    assert publisher.reader(ENGLISH, "gone") == readers[""]
+    old = publisher.view
     says(robot, "/heard", "one")
     publisher.post(view_of(robot))
-    sent = {page: events(publisher.events_since(1, view, page=page)) for page, view in old.items()}
+    sent = {page: events(publisher.events_since(1, old, of)) for page, of in readers.items()}
     assert sent["one"] == {}
     assert set(sent["two"]["update"]) == set(sent[""]["update"]) == {"heard"}
     permits(robot)
     publisher.post(view_of(robot))
-    late = events(publisher.events_since(1, old["one"], page="one"))
+    late = events(publisher.events_since(1, old, readers["one"]))
     assert set(late["update"]) == {"guarded"}
     assert "operation-enabled-updated" not in late  # it shows that in its keys and its frame
 
 
 def test_keys_change_before_the_frame_around_them_on_a_page_too(robot: RobotState) -> None:
     publisher = ViewPublisher(view_of(robot), "r1", pages={"one": {"guarded"}})
-    old = {page: publisher.for_role("", page) for page in ("one", "")}
+    old = publisher.view
     permits(robot)
     publisher.post(view_of(robot))
-    for page, view in old.items():
-        sent = list(events(publisher.events_since(1, view, page=page)))
+    for page in ("one", ""):
+        sent = list(events(publisher.events_since(1, old, publisher.reader(ENGLISH, page))))
         permission = [] if page else ["operation-enabled-updated"]
         assert sent == [*permission, "update", "link", "state"], page
 
@@ -222,12 +224,13 @@ def test_each_language_has_events_of_its_own_encoded_once(
     permits(robot)
     publisher.post(view_of(robot))
     with catalogues_in(tmp_path):
-        german, sent = publisher.events_since(1, old, "de"), publisher.events_since(1, old)
+        reader = publisher.reader("de")
+        german, sent = publisher.events_since(1, old, reader), publisher.events_since(1, old)
         assert events(german)["link"]["node"]["locks"] == "Sperrt nichts."
-        assert events(publisher.snapshot("de"))["snapshot"]["link"] == events(german)["link"]
+        assert events(publisher.snapshot(reader))["snapshot"]["link"] == events(german)["link"]
         assert events(sent)["link"]["node"]["locks"] == "Locks nothing."
         assert events(sent) == events(publisher.events_since(1, old))
-        assert publisher.events_since(1, old, "de") is german
+        assert publisher.events_since(1, old, reader) is german
 
 
 def test_who_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:

@@ -8,10 +8,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from app.i18n import ENGLISH
+from app.panel.rules import ControlRules
 from app.permission.control_authority_view import Role, role
+from app.permission.principal import Principal
 from app.view.heartbeat import beat
-from app.view.publisher import ViewPublisher, client_id_event
+from app.view.publisher import EVERYTHING, Reader, ViewPublisher, client_id_event
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import server_send
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
@@ -45,18 +46,19 @@ async def events(
     publisher, rules = session.publisher, session.control.rules
     who, token = principal_with_new_token(request, state) if rules.required else (None, "")
     first = client_id_event(who.client.id) if who else b""
-
-    def role_now() -> Role:
-        return role(publisher.view["control"], who, rules) if who else ""
-
+    role_now = _role_of(who, publisher, rules) if who else no_role
     answer: Response
-    language = language_of(request)
+    reader = publisher.reader(language_of(request), page)
     if once:
-        all_of_it = publisher.snapshot(language, role_now(), page) + first + beat(language)
+        all_of_it = publisher.snapshot(reader, role_now()) + first + beat(reader.language)
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(publisher, first, state.metrics.streams, language, role_now, page)
+        answer = EventStream(publisher, first, state.metrics.streams, reader, role_now)
     return set_client_cookie(answer, request, token)
+
+
+def _role_of(who: Principal, publisher: ViewPublisher, rules: ControlRules) -> Callable[[], Role]:
+    return lambda: role(publisher.view["control"], who, rules)
 
 
 def no_role() -> Role:
@@ -75,17 +77,15 @@ class EventStream(Response):
         publisher: ViewPublisher,
         first: bytes,
         streams: Open,
-        language: str = ENGLISH,
+        reader: Reader = EVERYTHING,
         role: Callable[[], Role] = no_role,
-        page: str = "",
     ) -> None:
         """`first` is sent with the snapshot; `streams` counts the open streams; `role` returns the
-        client's role in control, `page` is the id of its page."""
-        self._page = page
+        client's role in control."""
         self._publisher = publisher
         self._first = first
         self._streams = streams
-        self._language = language
+        self._reader = reader
         self._role = role
         self.status_code = 200
         self.background = None
@@ -102,25 +102,28 @@ class EventStream(Response):
                 writing.cancel()
 
     async def _write(self, send: Send) -> None:
-        publisher, heartbeat, language = self._publisher, self._publisher.heartbeat, self._language
-        page = self._page
-        now = self._role()
-        version, view, beats = publisher.version, publisher.for_role(now, page), heartbeat.count
-        retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(
-            _body(retry + publisher.snapshot(language, now, page) + self._first + beat(language))
-        )
+        publisher, reader, role_now = self._publisher, self._reader, self._role
+        heartbeat, now = publisher.heartbeat, role_now()
+        version, view, beats = publisher.version, publisher.for_role(now), heartbeat.count
+        await send(_body(self._beginning(now)))
         while not publisher.closed:
             await publisher.wait_for_change(version, beats)
-            was, now = now, self._role()
-            newer = publisher.version > version
-            chunk = publisher.events_since(version, view, language, was, now, page) if newer else b""
+            chunk = b""
+            if publisher.version > version:
+                was, now = now, role_now()
+                chunk = publisher.events_since(version, view, reader, was, now)
+                version, view = publisher.version, publisher.for_role(now)
             if heartbeat.count > beats:
-                chunk += heartbeat.event(language)
-            version, view, beats = publisher.version, publisher.for_role(now, page), heartbeat.count
+                chunk += heartbeat.event(reader.language)
+                beats = heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    def _beginning(self, role: Role) -> bytes:
+        retry = f"retry: {RECONNECT_MS}\n\n".encode()
+        snapshot = self._publisher.snapshot(self._reader, role)
+        return retry + snapshot + self._first + beat(self._reader.language)
 
 
 def _body(chunk: bytes) -> Message:
