@@ -81,6 +81,8 @@ class Topic:
 
     def reading(self) -> Reading:
         """The current reading."""
+        if self._walk is None and not self._unread:
+            return self._last_reading
         if not self._deferred and not self._read():
             self._deferred = True
             self._slices.schedule(self._resume)

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
 from app.clock import age_changes_at, format_age, format_time
-from app.i18n import PanelText, TextLike, number, say
+from app.i18n import PanelText, Text, TextLike, number, say
 from app.i18n.values import with_unit
 from app.panel.base import HasTopic, TopicQos
 from app.panel.values import same_value
@@ -64,6 +65,25 @@ class ShownTopic(HasTopic, Protocol):
 
 def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState:
     """The state of a topic at `now`, without a value; never "missing"."""
+    reading = _reading(widget, robot)
+    return reading if isinstance(reading, FieldState) else _dated(reading, None, widget.max_age_s, now)
+
+
+def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState:
+    """The state of a field at `now`; the panel must subscribe to its topic and read the field."""
+    reading = _reading(widget, robot)
+    if isinstance(reading, FieldState):
+        return reading
+    value = reading.value(widget.field)
+    if value is None:
+        code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
+        time = format_time(reading.wall)
+        return FieldState("missing", say(code, field=widget.field, time=time))
+    return _dated(reading, value, widget.max_age_s, now)
+
+
+def _reading(widget: ShownTopic, robot: RobotState) -> Reading | FieldState:
+    """The last message of a topic, or why there is none that can be shown."""
     topic = widget.topic
     if doubt := topic_mismatch("MS", widget, robot):
         return FieldState("unreadable", doubt.reason or "")
@@ -72,38 +92,26 @@ def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState
         return FieldState("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
     if reading.fields is None:
         return FieldState("waiting", say("readout_waiting", topic=topic))
-    return _dated(
-        reading,
-        FieldState("live", say("readout_time", time=format_time(reading.wall))),
-        widget.max_age_s,
-        now,
-    )
+    return reading
 
 
-def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState:
-    """The state of a field at `now`; the panel must subscribe to its topic and read the field."""
-    field = topic_state(widget, robot, now)
-    if field.state in ("unreadable", "waiting"):
-        return field
-    reading = robot.reading(widget.topic)
-    value = reading.value(widget.field)
-    if value is None:
-        code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
-        time = format_time(reading.wall)
-        return FieldState("missing", say(code, field=widget.field, time=time))
-    return replace(field, value=value)
-
-
-def _dated(reading: Reading, field: FieldState, max_age_s: float | None, now: float) -> FieldState:
-    """The state of a received message, by its age."""
+def _dated(reading: Reading, value: Any, max_age_s: float | None, now: float) -> FieldState:
+    """The state of a received message with this value, by its age."""
     if reading.status == "cut":
-        return replace(field, state="old", note=say("readout_cut", time=format_time(reading.wall)))
+        return FieldState("old", say("readout_cut", time=format_time(reading.wall)), value)
+    note = _received(format_time(reading.wall))
     if max_age_s is None:
-        return field
+        return FieldState("live", note, value)
     if now - reading.at < max_age_s:
-        return replace(field, until=reading.at + max_age_s)
+        return FieldState("live", note, value, reading.at + max_age_s)
     note = say("readout_old", age=format_age(now - reading.at))
-    return replace(field, state="old", note=note, until=age_changes_at(reading.at, now))
+    return FieldState("old", note, value, age_changes_at(reading.at, now))
+
+
+@lru_cache(maxsize=1000)
+def _received(time: Text) -> Text:
+    """The same text for all that arrived in one second."""
+    return say("readout_time", time=time)
 
 
 def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
