@@ -96,12 +96,15 @@ def _no_link(endpoints: tuple[str, ...]) -> Verdict:
     return Verdict(False, "no_link", say("no_link_at", where=where))
 
 
-def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
+def interlock_verdict(
+    interlock: Interlock, robot: RobotState, now: float, link: Verdict | None = None
+) -> Verdict:
     """Whether an interlock permits: its topic has the type and QoS, a publisher where that is required,
-    and a value that is fresh and meets its conditions."""
-    passable = link_verdict(robot, now)
-    if not passable.permitted:
-        return passable
+    and a value that is fresh and meets its conditions. `link` is the link's verdict at `now` if it is
+    known already."""
+    link = link or link_verdict(robot, now)
+    if not link.permitted:
+        return link
     topic, key = interlock.topic, robot.key(interlock.topic)
     if doubt := topic_mismatch("MS", interlock, robot):
         return doubt

@@ -111,8 +111,9 @@ def judged(
     grounds: Grounds = NO_GROUNDS,
 ) -> Verdict:
     """Whether a widget with these interlocks may be pressed or held now."""
-    permissions = [interlock_verdict(one, robot, now) for one in interlocks]
-    return permission(Question(widget, robot, now, link_verdict(robot, now), permissions, grounds))
+    link = link_verdict(robot, now)
+    permissions = [interlock_verdict(one, robot, now, link) for one in interlocks]
+    return permission(Question(widget, robot, now, link, permissions, grounds))
 
 
 def combined(verdicts: Sequence[Verdict]) -> Verdict:

@@ -136,6 +136,9 @@ class Ingest:
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Ingests a sample; returns whether it changed a permission."""
+        if key not in self._interlocks:
+            self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))
+            return ""
         now = time.monotonic()
         before = self._verdicts(key, now)
         self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))

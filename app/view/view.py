@@ -80,7 +80,7 @@ def build_view(
     commands; "" for none. `control_lock` locks for clients without control; time alone changes
     `control` at `control_until`."""
     passable = link_verdict(robot, now)
-    interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
+    interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
     grounds = Grounds(log_lock=lock) if lock else NO_GROUNDS
     questions = [
         Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
