@@ -160,10 +160,12 @@ _WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
 
 def localized(value: Any, language: str) -> Any:
     """The same JSON value with every Text in it rendered."""
-    if isinstance(value, Text):
-        return _rendered(value, language)
+    if isinstance(value, str):  # most are
+        return value
     if isinstance(value, dict):
         return {key: localized(one, language) for key, one in value.items()}
+    if isinstance(value, Text):
+        return _rendered(value, language)
     if isinstance(value, list | tuple):
         return [localized(one, language) for one in value]
     return value

@@ -1,8 +1,7 @@
 """ROS 2 names and QoS: the syntax of topics, namespaces and types."""
 
 import re
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 # A liveliness token that the bridge can't parse ends its main loop while its process stays up. So a
 # name that does not match these must never become a token.
@@ -17,8 +16,7 @@ NO_TYPE: Final = "(not a type)"
 _ANY_TYPE = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
 
 
-@dataclass(frozen=True, slots=True)
-class Qos:
+class Qos(NamedTuple):
     """A topic's QoS; `depth` is that of KEEP_LAST."""
 
     reliable: bool = True

@@ -85,9 +85,9 @@ class _Arrived:
     seq: int
     at: float
     wall: float
+    cached: bool = False
     skipped: int = 0
     unseen: _Unseen | None = None
-    cached: bool = False
 
     def sample(self, kept: bool = False) -> Sample:
         """`sent` is set for kept samples only: reading a stamp's time is slow."""
@@ -196,9 +196,7 @@ class Inbox:
         self._add(key, payload, stamp, cached=True)
 
     def _add(self, key: str, payload: Buffer, stamp: Stamp | None, cached: bool = False) -> None:
-        arrived = _Arrived(
-            payload, stamp, next(self._seq), time.monotonic(), time.time(), cached=cached
-        )
+        arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time(), cached)
         replaced = self._samples.get(key)
         if replaced is not None:
             arrived.skipped = replaced.skipped + 1

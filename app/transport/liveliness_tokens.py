@@ -10,7 +10,6 @@ delivers each sample twice (#700).
 
 import logging
 from collections.abc import Iterator
-from dataclasses import replace
 
 from app.dialect.endpoint import OwnEndpoint, TopicRole
 from app.interfaces import Interfaces
@@ -88,7 +87,7 @@ class LivelinessTokens:
             transient_local = self._durability(key)
             if transient_local is None:
                 return None
-            qos = replace(qos, transient_local=transient_local)
+            qos = qos._replace(transient_local=transient_local)
         if key not in self._subscribed and self._robot.graph.mismatched_qos("MS", key, qos):
             return None
         self._subscribed.add(key)
