@@ -24,16 +24,20 @@ function setOnlyText(element, text) {
   } else if (node || text) element.textContent = text;
 }
 
-// What is locked with a widget: its key, or both of a step. It can always be canceled, and read again.
+// What is locked with a widget: its key, or both of a step. It can always be canceled, and read again. Looked for once:
+// a permission that changes does not wait for it.
+const keys = new WeakMap();
+
 function keysOf(root) {
-  return [...root.querySelectorAll("button[type=submit]:not(.cancel, .read), .hold")];
+  if (!keys.has(root)) keys.set(root, [...root.querySelectorAll("button[type=submit]:not(.cancel, .read), .hold")]);
+  return keys.get(root);
 }
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
 // `data-value` for the value of an element such as a meter, or an attribute of the widget's root.
 const SHOW = {
   enabled: (root, value) => {
-    root.toggleAttribute("data-locked", !value);
+    if (root.dataset.enabled) root.dataset.enabled = value;
     for (const key of keysOf(root)) key.disabled = !value || key.hasAttribute("data-end");
     if (!value) root.querySelector("dialog.ask")?.close();
   },

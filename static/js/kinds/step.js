@@ -8,5 +8,5 @@ function setKey(root, way, value) {
   const key = root.querySelector(`[data-way="${way}"]`);
   key.value = value;
   key.toggleAttribute("data-end", !value);
-  key.disabled = !value || root.hasAttribute("data-locked");
+  key.disabled = !value || root.dataset.enabled === "false";
 }
