@@ -210,7 +210,7 @@ class Chromium:
             page.add_init_script(SHOWN_AT.replace("SELECTOR", repr(shown)))
             wire = Wire(page.context.new_cdp_session(page))
             page.goto(url, wait_until="commit")
-            page.wait_for_function("window.benchShownAt > 0", timeout=WITHIN_MS)
+            page.wait_for_function("() => window.benchShownAt > 0", timeout=WITHIN_MS)
             shown_at = float(page.evaluate("window.benchShownAt"))
             page.wait_for_load_state("load")
             return shown_at, wire.bytes

@@ -331,5 +331,5 @@ def test_of_a_page_that_comes_slowly_no_half_is_drawn(example: Server, page: Pag
         page.goto(f"{line.url}/pages/setup", wait_until="domcontentloaded")
         line.slow = False
         expect(page.locator("#state")).to_have_attribute("data-state", "ready")
-        page.wait_for_function("performance.getEntriesByName('first-paint').length")
+        page.wait_for_function("() => performance.getEntriesByName('first-paint').length")
         assert page.evaluate(DRAWN_WHOLE)
