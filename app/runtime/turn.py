@@ -6,8 +6,8 @@ view never delays the end of a hold.
 
 import asyncio
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable
+from contextlib import suppress
 
 from app.robot.state import Reading
 from app.ros_logging import RobotLog
@@ -41,7 +41,7 @@ class Turn:
         self._loop = asyncio.get_running_loop()
         self._frame: asyncio.TimerHandle | None = None  # the turn that is scheduled for the next frame
         self._running = False
-        self._again = False  # something changed during a turn, which may not have shown it
+        self._again = False  # something changed that no step of a turn may have shown
         self._stopped = False
 
     def stop(self) -> None:
@@ -73,30 +73,21 @@ class Turn:
             self._renew()
             return
         if came_up:
-            self._robot.link_up = True
+            self._robot.link_up = self._again = True
             self._log.info("Zenoh link up")
-        with self._turn():
-            for updates in self._ingest.steps(changes):
-                updates.urgent |= came_up
-                if updates.graph:
-                    self._peer.lost(updates.bridges_lost)
-                    self._peer.found(updates.bridges_found)
-                    self.on_graph_change(updates.bridge_appeared)
-                self._apply(updates)
+        self._run(self._ingest.steps(changes))
 
     def run_late_reading(self, key: str, reading: Reading) -> None:
         """Runs a turn for a message that took more than one turn to decode."""
         if not self._stopped:
-            with self._turn():
-                self._apply(self._ingest.late_reading(key, reading))
+            self._run([self._ingest.late_reading(key, reading)])
 
     def changed(self) -> None:
         """Runs a turn after a change that no data caused: of the peer, a command, or control."""
         if self._running:
             self._again = True
             return
-        with self._turn():
-            self._apply(Updates(urgent=True))
+        self._run([Updates(urgent=True)])
 
     def on_graph_change(self, peer_appeared: bool) -> None:
         """Updates everything after a change of the graph; `peer_appeared`: there was no peer before."""
@@ -104,8 +95,24 @@ class Turn:
         self._commands.on_graph_change()
         self._peer.on_graph_change(peer_appeared)
 
+    def _run(self, steps: Iterable[Updates]) -> None:
+        """Runs the steps of a turn. Changes during it are shown at its end, or in one more turn."""
+        running, self._running = self._running, True
+        try:
+            for updates in steps:
+                self._apply(updates)
+        finally:
+            self._running = running
+            if self._again and not running:
+                self._again = False
+                self._loop.call_soon(self.changed)
+
     def _apply(self, updates: Updates) -> None:
         """Updates holds, then confirmations, then the view, from the robot's current state."""
+        if updates.graph:
+            self._peer.lost(updates.bridges_lost)
+            self._peer.found(updates.bridges_found)
+            self.on_graph_change(updates.bridge_appeared)
         self._commands.holds.judge()
         for key, reading in updates.readings:
             self._confirm(key, reading)
@@ -122,18 +129,6 @@ class Turn:
             self._commands.confirmations.update(key, reading)
         except Exception:
             self._log.exception("checking %s for confirmations failed", key)
-
-    @contextmanager
-    def _turn(self) -> Iterator[None]:
-        """Marks a running turn. Changes during it are shown at its end, or in one more turn."""
-        running, self._running = self._running, True
-        try:
-            yield
-        finally:
-            self._running = running
-            if self._again and not running:
-                self._again = False
-                self._loop.call_soon(self.changed)
 
     def _cancel_frame(self) -> None:
         if self._frame is not None:

@@ -76,6 +76,7 @@ def link_statuses(
     """The three links, and when (monotonic seconds) time alone changes them; `verdicts` are those of
     all commands, by their ids. The server's link is always "ok": the browser overrides it when the
     server is lost."""
+    verdicts = {name: verdict for name, verdict in verdicts.items() if not verdict.permitted}
     state, text = BRIDGE_LAMPS[passable.code]
     silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
     bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""

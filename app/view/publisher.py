@@ -32,8 +32,9 @@ SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"
 def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
     """JSON in one line, for clients that read lines. NaN and infinity are null; a Text is rendered."""
     text = to_json(localized(data, language), inf_nan_mode="null")
-    for separator, escaped in SEPARATORS.items():
-        text = text.replace(separator, escaped)
+    if not text.isascii():
+        for separator, escaped in SEPARATORS.items():
+            text = text.replace(separator, escaped)
     return text
 
 
@@ -160,9 +161,11 @@ class ViewPublisher:
         """The events that a page gets, in their order: keys lock before the rest is shown."""
         if not page:
             return events
-        shown = {name: data for name, data in events.items() if not name.endswith(PERMISSION_EVENT)}
-        if own := self._of_page(shown.pop("update", {}), page):
-            shown = {"update": own, **shown}
+        own = self._of_page(events.get("update", NOTHING), page)
+        shown: Events = {"update": own} if own else {}
+        for name, data in events.items():
+            if name != "update" and not name.endswith(PERMISSION_EVENT):
+                shown[name] = data
         return shown
 
     def _of_page(self, widgets: Mapping[str, Any], page: str) -> Mapping[str, Any]:
