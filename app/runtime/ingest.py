@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, Protocol
 
 from app.commands.actions.goals import GoalTracker
@@ -136,12 +137,13 @@ class Ingest:
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Ingests a sample; returns whether it changed a permission."""
+        take = partial(self._apply, updates=updates)
         if key not in self._interlocks:
-            self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))
+            self._guarded(key, sample, take)
             return ""
         now = time.monotonic()
         before = self._verdicts(key, now)
-        self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))
+        self._guarded(key, sample, take)
         pairs = zip(before, self._verdicts(key, now), strict=True)
         changes = [_change(was, verdict) for was, verdict in pairs]
         return "now" if "now" in changes else "soon" if "soon" in changes else ""

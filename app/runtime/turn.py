@@ -73,21 +73,22 @@ class Turn:
             self._renew()
             return
         if came_up:
-            self._robot.link_up = self._again = True
+            self._robot.link_up = True
+            self._again = True  # the first step shows it
             self._log.info("Zenoh link up")
-        self._run(self._ingest.steps(changes))
+        self._run_steps(self._ingest.steps(changes))
 
     def run_late_reading(self, key: str, reading: Reading) -> None:
         """Runs a turn for a message that took more than one turn to decode."""
         if not self._stopped:
-            self._run([self._ingest.late_reading(key, reading)])
+            self._run_steps([self._ingest.late_reading(key, reading)])
 
     def changed(self) -> None:
         """Runs a turn after a change that no data caused: of the peer, a command, or control."""
         if self._running:
             self._again = True
             return
-        self._run([Updates(urgent=True)])
+        self._run_steps([Updates(urgent=True)])
 
     def on_graph_change(self, peer_appeared: bool) -> None:
         """Updates everything after a change of the graph; `peer_appeared`: there was no peer before."""
@@ -95,7 +96,7 @@ class Turn:
         self._commands.on_graph_change()
         self._peer.on_graph_change(peer_appeared)
 
-    def _run(self, steps: Iterable[Updates]) -> None:
+    def _run_steps(self, steps: Iterable[Updates]) -> None:
         """Runs the steps of a turn. Changes during it are shown at its end, or in one more turn."""
         running, self._running = self._running, True
         try:

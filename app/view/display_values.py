@@ -99,11 +99,9 @@ def _dated(reading: Reading, value: Any, max_age_s: float | None, now: float) ->
     """The state of a received message with this value, by its age."""
     if reading.status == "cut":
         return FieldState("old", say("readout_cut", time=format_time(reading.wall)), value)
-    note = _received(format_time(reading.wall))
-    if max_age_s is None:
-        return FieldState("live", note, value)
-    if now - reading.at < max_age_s:
-        return FieldState("live", note, value, reading.at + max_age_s)
+    until = math.inf if max_age_s is None else reading.at + max_age_s
+    if now < until:
+        return FieldState("live", _received(format_time(reading.wall)), value, until)
     note = say("readout_old", age=format_age(now - reading.at))
     return FieldState("old", note, value, age_changes_at(reading.at, now))
 
