@@ -15,7 +15,7 @@ from app.i18n import say
 from tests.support.form import several
 from tests.support.parts import Bridge, RosNode, Server, has_heard, http_client, live, until
 
-KILLS = several(8, 60)
+KILLS = several(5, 60)
 CLIENTS = 3
 LONGEST_LIFE_S = 0.5
 TOO_MANY = 429

@@ -14,7 +14,7 @@ from tests.support.form import several
 from tests.support.parts import ROOT, Bridge, RosNode, Server, arrives, has_heard, live, until
 from tests.support.samples import TEXTS
 
-STARTS = several(12, 100)
+STARTS = several(6, 100)
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 
 

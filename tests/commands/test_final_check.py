@@ -46,7 +46,7 @@ CALL: Table = {
 }
 GOAL: Table = {**COUNT, "interlock": "operation"}
 PANEL = panel_of(MESSAGE, FREE, GUARDED, CALL, GOAL)
-PRESSES = several(300, 600)
+PRESSES = several(150, 600)
 
 
 class Way(FakeTransport):

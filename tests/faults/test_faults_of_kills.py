@@ -15,7 +15,7 @@ from tests.support.parts import free_port
 
 rig = fixtures.rig
 
-KILLS = several(5, 200)
+KILLS = several(3, 200)
 LATE_S = 1.0
 
 

@@ -24,8 +24,8 @@ from tests.support.parts import ENOUGH_S, RosNode, Server, until
 rig = fixtures.rig
 server = fixtures.server
 
-RESTARTS = several(4, 100)
-FLOOD_S = several(4, 30)
+RESTARTS = several(3, 100)
+FLOOD_S = several(2, 30)
 FLOOD_PER_S = 2000.0
 LONG_MESSAGES = several(6, 60)
 LONG_MESSAGE = 10_000_000

@@ -161,7 +161,7 @@ def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
 def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
     """300 ms each way and every tenth frame lost: everything works, delayed by TCP."""
     with far_rig.serving(tmp_path) as server:
-        account, locked = impaired(cable, far_rig, server, several(8, 30))
+        account, locked = impaired(cable, far_rig, server, several(5, 30))
     record(
         "300 ms delay each way, 10 % of the frames lost",
         locked=f"{locked} times, as pulses came late",

@@ -36,7 +36,7 @@ def test_a_clock_that_is_set_back_and_forward(rig: Rig, tmp_path: Path) -> None:
     with rig.serving(tmp_path, panel=PATIENT, **clock.environment) as server:
         watch, presser = Watch(server), Presser(server, "paced")
         with answering(server):
-            for off in (0, -HOUR_S, HOUR_S, 0):
+            for off in (-HOUR_S, HOUR_S, 0):
                 clock.set(off)
                 is_off(server, off)
                 presses_work(presser)
