@@ -58,9 +58,9 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Repeats failed tests of real time once, and no others. Sorts the files: first those that begin
-    with a browser, because they share it, then those with the most tests on real parts. So no slow file
-    starts last; files without real parts fill the rest."""
+    """Repeats failed tests of real time once, and no others. Sorts the files: first those with a
+    browser, which share it and begin with its tests, then those with the most tests on real parts. So
+    no slow file starts last; files without real parts fill the rest."""
     wanted = config.getoption("--real-time")
     for item in items:
         assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
@@ -73,8 +73,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left_out)
         items[:] = [one for one in items if one not in set(left_out)]
     on_parts = Counter(one.path for one in items if needs_part(one))
-    first = {one.path: one for one in reversed(items)}
-    items.sort(key=lambda one: (not takes_browser(first[one.path]), -on_parts[one.path]))
+    in_browser = {one.path for one in items if takes_browser(one)}
+
+    def place(item: pytest.Item) -> tuple[bool, int, Path, bool]:
+        return item.path not in in_browser, -on_parts[item.path], item.path, not takes_browser(item)
+
+    items.sort(key=place)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -237,7 +241,7 @@ def browsers() -> Iterator[Browsers]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
     """Keeps browsers if the next module begins with one, else closes them: while Playwright runs, its
-    event loop runs in this thread, and other tests need their own."""
+    event loop runs in this thread, and tests in other modules need their own."""
     yield
     if nextitem is not None and item.path != nextitem.path and not takes_browser(nextitem):
         BROWSERS.close()

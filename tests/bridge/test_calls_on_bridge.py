@@ -244,7 +244,7 @@ def _is_published(kiosk: Server) -> bool:
     return bool(answer.json()["outcome"] == "published")
 
 
-WAITING_S = 4.0
+WAITING_S = 3.0
 
 
 def waiting_widget(number: int, name: str) -> str:

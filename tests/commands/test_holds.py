@@ -610,7 +610,7 @@ def _split(points: list[tuple[float, float, float]]) -> list[list[tuple[float, f
 
 TestOrders = Orders.TestCase
 TestOrders.settings = settings(
-    max_examples=several(80, 300),
+    max_examples=several(40, 300),
     stateful_step_count=40,
     deadline=None,
     database=None,

@@ -290,7 +290,7 @@ DAMAGE: Final = st.one_of(
 
 @given(st.lists(DAMAGE, min_size=1, max_size=4))
 @settings(
-    max_examples=several(25, 200),
+    max_examples=several(15, 200),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -172,7 +172,7 @@ def texts(draw: st.DrawFn) -> tuple[str, dict[Path, int]]:
 
 
 @given(texts())
-@settings(max_examples=several(40, 150), deadline=None)
+@settings(max_examples=several(25, 150), deadline=None)
 def test_whatever_the_layout_each_path_has_its_line(written: tuple[str, dict[Path, int]]) -> None:
     text, lines = written
     assert set(paths(tomllib.loads(text))) == set(lines), "the test wrote what it meant"

@@ -58,7 +58,7 @@ BUTTONS: Final = some.sampled_from(["guarded", "add"])
 GARBAGE: Final = some.binary(max_size=4) | some.binary().map(lambda data: b"\xff" + data)
 CORRECTED: Final = frozenset({"timed_out", "unknown"})
 FEW: Final = settings(
-    max_examples=several(60, 200),
+    max_examples=several(30, 200),
     stateful_step_count=40,
     deadline=None,
     derandomize=True,

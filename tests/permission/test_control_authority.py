@@ -611,7 +611,7 @@ class Everybody(RuleBasedStateMachine):
 
 TestEverybody = Everybody.TestCase
 TestEverybody.settings = settings(
-    max_examples=several(50, 150),
+    max_examples=several(25, 150),
     stateful_step_count=60,
     deadline=None,
     database=None,

@@ -26,9 +26,9 @@ ANSWERED = [f"answered_{n}" for n in range(9)]
 MUTE = [f"mute_{n}" for n in range(20)]
 TIMEOUT_S = 0.2
 ANSWERED_S = 5.0  # in time on a busy machine; Zenoh keeps something of each call for so long
-CALLS, UNANSWERED = several(1_500, 10_000), several(240, 1_000)
+CALLS, UNANSWERED = several(1_200, 10_000), several(120, 1_000)
 # After them all caches are full, and Zenoh keeps as much as after the others.
-FIRST_CALLS, FIRST_UNANSWERED = several(1_500, 4_000), several(100, 200)
+FIRST_CALLS, FIRST_UNANSWERED = several(1_200, 4_000), several(100, 200)
 LAST_CALLS = -(-RECEIPTS_KEPT // len(ANSWERED))  # of each service that answers
 GROWTH_KB = 4_000  # of what the process has: half of it is what SQLite keeps of its file
 MOST_KNOWN = 100  # questions that this panel has to the graph

@@ -65,8 +65,8 @@ STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
 # Even on a busy machine, an immediate effect happens within this time.
 ENOUGH_S = 40.0
 ARRIVES_WITHIN_S = 2.0
-SOONEST_S, LATEST_S = 0.01, 0.1  # until the next check of a condition
-GROWS = 0.05  # per second of waiting
+SOONEST_S, LATEST_S = 0.015, 0.15  # until the next check of a condition
+GROWS = 0.1  # per second of waiting
 
 
 def until(
