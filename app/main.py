@@ -107,16 +107,17 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
 
 
 def _add_routes(app: FastAPI, dev: bool) -> None:
-    for routes in ROBOT_ROUTES:
+    """FastAPI builds a router's routes when the first request comes to it: those of several robots are
+    last, and are not built on a panel with one."""
+    for routes in (static, health, display, *ROBOT_ROUTES):
         app.include_router(routes.router)
-        app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-    for common in (static, health, display):
-        app.include_router(common.router)
     if dev:
         from app.web.routes import gallery
 
         app.include_router(gallery.router)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
+    for routes in ROBOT_ROUTES:
+        app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
 
 
 @asynccontextmanager
