@@ -107,8 +107,8 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
 
 
 def _add_routes(app: FastAPI, dev: bool) -> None:
-    """FastAPI builds a router's routes when the first request comes to it: those of several robots are
-    last, and are not built on a panel with one."""
+    """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
+    last: no page of a panel with one robot requests them."""
     for routes in (static, health, display, *ROBOT_ROUTES):
         app.include_router(routes.router)
     if dev:
