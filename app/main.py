@@ -108,8 +108,9 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
 
 def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
-    last: no page of a panel with one robot requests them."""
-    for routes in (static, health, display, *ROBOT_ROUTES):
+    last: no page of a panel with one robot requests them. The others are built by the first health
+    check, so that the first page does not wait for it."""
+    for routes in (*ROBOT_ROUTES, static, health, display):
         app.include_router(routes.router)
     if dev:
         from app.web.routes import gallery
