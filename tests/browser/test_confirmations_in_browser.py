@@ -8,15 +8,14 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.commands.test_confirmations import TYPED, panel_file
 from tests.support.browser.pages import asked, place
-from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
+from tests.support.servers import ready
 
 
 @pytest.fixture
 def asking(tmp_path: Path, servers: Callable[[Server], Server]) -> Server:
     path = panel_file(tmp_path, f"confirm_press = true\n{TYPED}")
-    mine = servers(Server(ROOT, KIOSK_PANEL=str(path)))
-    until(mine.ready, "ready")
-    return mine
+    return servers(ready(Server(ROOT, KIOSK_PANEL=str(path))))
 
 
 def test_a_press_is_confirmed_by_the_robot_in_every_browser(
@@ -68,8 +67,7 @@ def test_a_lock_takes_the_question_away(
     tmp_path: Path, servers: Callable[[Server], Server], page: Page
 ) -> None:
     path = panel_file(tmp_path, "confirm_press = true")
-    mine = servers(Server(ROOT, KIOSK_PANEL=str(path)))
-    until(mine.ready, "ready")
+    mine = servers(ready(Server(ROOT, KIOSK_PANEL=str(path))))
     page.goto(mine.url)
     asked(page.get_by_role("button", name="Start"))
     mine.process.kill()
