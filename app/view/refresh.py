@@ -20,7 +20,7 @@ from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.view.link_status import Lamp, LinkTimes
 from app.view.publisher import ViewPublisher
-from app.view.view import ViewWithDeadlines, build_view, lock_all, update_displays
+from app.view.view import ViewContext, ViewWithDeadlines, build_view, lock_all, update_displays
 
 log = logging.getLogger("kiosk.view")
 
@@ -69,6 +69,20 @@ class ViewSources:
     others: OtherRobots
     recordings: Recorded | None = None
     simulated: bool = False
+
+    def context(self) -> ViewContext:
+        """The context of a view that is built now."""
+        unlogged = self.operators_log.fault
+        faults = (unlogged, self.recordings.fault if self.recordings else "")
+        return ViewContext(
+            robots=self.others.link_statuses(),
+            simulated=self.simulated,
+            fault=joined(faults, "between_lines"),
+            log_lock=self.operators_log.lock if unlogged else "",
+            control=self.control.view(),
+            control_lock=self.control.lock,
+            control_until=self.control.until,
+        )
 
 
 class ViewRefresher:
@@ -177,20 +191,6 @@ class ViewRefresher:
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
     def _build(self) -> ViewWithDeadlines:
-        sources = self._sources
-        unlogged = sources.operators_log.fault
-        faults = (unlogged, sources.recordings.fault if sources.recordings else "")
-        built = build_view(
-            self._panel,
-            self._robot,
-            time.monotonic(),
-            robots=sources.others.link_statuses(),
-            simulated=sources.simulated,
-            fault=joined(faults, "between_lines"),
-            lock=sources.operators_log.lock if unlogged else "",
-            control=sources.control.view(),
-            control_lock=sources.control.lock,
-            control_until=sources.control.until,
-        )
+        built = build_view(self._panel, self._robot, time.monotonic(), self._sources.context())
         built.view["link"] = self._link_times.dated(built.view["link"])
         return built

@@ -42,9 +42,6 @@ class View(TypedDict):
     control: ControlView
 
 
-NO_OTHERS: Final[Mapping[str, Lamp]] = {}
-
-
 class ViewWithDeadlines(NamedTuple):
     """A view and its deadlines in monotonic seconds: `displays` is when time alone changes a display,
     by its id, `rest` the same for all else. `robot` is the robot's lamp on the pages of others.
@@ -63,25 +60,33 @@ class ViewWithDeadlines(NamedTuple):
         return min(self.rest, *self.displays.values()) if self.displays else self.rest
 
 
+class ViewContext(NamedTuple):
+    """What a view shows beside the panel and the state of its robot.
+
+    `robots` has the lamp of each robot if the panel has several. `fault` is shown above the page,
+    `log_lock` locks all commands; "" for none. `control_lock` locks for clients without control; time
+    alone changes `control` at `control_until` (monotonic seconds).
+    """
+
+    robots: Mapping[str, Lamp] = {}
+    simulated: bool = False
+    fault: TextLike = ""
+    log_lock: TextLike = ""
+    control: ControlView = NO_CONTROL
+    control_lock: Verdict = PERMITTED
+    control_until: float = math.inf
+
+
+ALONE: Final = ViewContext()  # one robot, its log is written, and control is not required
+
+
 def build_view(
-    panel: Panel,
-    robot: RobotState,
-    now: float,
-    *,
-    robots: Mapping[str, Lamp] = NO_OTHERS,
-    simulated: bool = False,
-    fault: TextLike = "",
-    lock: TextLike = "",
-    control: ControlView = NO_CONTROL,
-    control_lock: Verdict = PERMITTED,
-    control_until: float = math.inf,
+    panel: Panel, robot: RobotState, now: float, context: ViewContext = ALONE
 ) -> ViewWithDeadlines:
-    """The view at `now` (monotonic seconds). `fault` is shown above the page, `lock` locks all
-    commands; "" for none. `control_lock` locks for clients without control; time alone changes
-    `control` at `control_until`."""
+    """The view at `now` (monotonic seconds)."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
-    grounds = Grounds(log_lock=lock) if lock else NO_GROUNDS
+    grounds = Grounds(log_lock=context.log_lock) if context.log_lock else NO_GROUNDS
     questions = [
         Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
         for w in panel.commands
@@ -89,21 +94,22 @@ def build_view(
     verdicts = {question.widget.id: permission(question) for question in questions}
     widgets = {w.id: show(w, robot, now, verdicts.get(w.id, PERMITTED)) for w in panel.widgets()}
     link, until = link_statuses(panel, robot, passable, verdicts, now)
-    banner = say("simulated") if simulated or robot.graph.is_simulated else ""
+    banner = say("simulated") if context.simulated or robot.graph.is_simulated else ""
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
         widgets={name: attributes for name, (attributes, _) in widgets.items()},
-        notice=Notice(banner=banner, fault=fault),
+        notice=Notice(banner=banner, fault=context.fault),
         state=robot_word(passable, interlocks.values()),
-        robots=dict(robots),
-        control=control,
+        robots=dict(context.robots),
+        control=context.control,
     )
     untils = {w.id: widgets[w.id][1] for w in panel.displays}
     others = (at for name, (_, at) in widgets.items() if name not in untils)
     judged = (passable, *interlocks.values(), *verdicts.values())
-    rest = min(until, control_until, *others, *(verdict.until for verdict in judged))
-    without = {} if control_lock.permitted else _without_control(questions, control_lock)
+    rest = min(until, context.control_until, *others, *(verdict.until for verdict in judged))
+    lock = context.control_lock
+    without = {} if lock.permitted else _without_control(questions, lock)
     return ViewWithDeadlines(view, summary(robot.title, link), rest, untils, without)
 
 

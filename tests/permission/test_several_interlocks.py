@@ -10,7 +10,7 @@ from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import PERMITTED, Verdict
 from app.permission.press_permission import combined, judged
 from app.robot.state import RobotState
-from app.view.view import build_view, for_role
+from app.view.view import ViewContext, build_view, for_role
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
 from tests.commands.test_holds import Bench as HoldBench
 from tests.commands.test_presses import Bench as PressBench
@@ -140,7 +140,7 @@ def test_without_control_that_is_the_only_reason() -> None:
     robot = robot_there(panel)
     control: ControlView = {**NO_CONTROL, "required": True, "text": "Not in control."}
     lock = Verdict(False, "control_free", "Not in control.")
-    built = build_view(panel, robot, NOW, control=control, control_lock=lock)
+    built = build_view(panel, robot, NOW, ViewContext(control=control, control_lock=lock))
     view = for_role(built.view, built.without_control, "free")
     assert view["widgets"]["guarded"] == {
         "enabled": False, "reason": "Not in control.", "reasons": "Not in control.", "more": "",

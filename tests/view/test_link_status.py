@@ -2,7 +2,6 @@
 
 import ast
 import math
-from typing import Any
 
 import pytest
 
@@ -26,7 +25,7 @@ from app.view.link_status import (
     link_statuses,
     locks,
 )
-from app.view.view import build_view
+from app.view.view import ViewContext, build_view
 from tests.support.builders import (
     BOOL,
     ENABLED,
@@ -67,10 +66,11 @@ def cell(interlock: Table = NOTHING) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock)
 
 
-def links_of(panel: Panel, robot: RobotState, now: float = NOW, **more: Any) -> dict[str, LinkStatus]:
+def links_of(
+    panel: Panel, robot: RobotState, now: float = NOW, log_lock: str = ""
+) -> dict[str, LinkStatus]:
     robot.update_publishers()
-    links: dict[str, LinkStatus] = build_view(panel, robot, now, **more).view["link"]
-    return links
+    return build_view(panel, robot, now, ViewContext(log_lock=log_lock)).view["link"]
 
 
 LOCKS_NOTHING = say("locks_nothing")
@@ -181,7 +181,7 @@ def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
 
 def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
     panel = cell()
-    link = links_of(panel, robot_there(panel), lock="The disk is full.")
+    link = links_of(panel, robot_there(panel), log_lock="The disk is full.")
     assert {lamp["locks"] for lamp in link.values()} == {LOCKS_NOTHING}
 
 

@@ -13,7 +13,7 @@ from app.i18n.catalogue import catalogues_in
 from app.printable import printable
 from app.robot.state import RobotState
 from app.view.publisher import ViewPublisher
-from app.view.view import View, build_view
+from app.view.view import View, ViewContext, build_view
 from tests.support.builders import NOW, permits, robot_there, says, small_panel
 from tests.support.parts import events_in
 from tests.support.words import english
@@ -31,8 +31,8 @@ def publisher(robot: RobotState) -> ViewPublisher:
     return ViewPublisher(view_of(robot), "r1")
 
 
-def view_of(robot: RobotState, **more: Any) -> View:
-    return build_view(PANEL, robot, NOW, **more).view
+def view_of(robot: RobotState, **context: Any) -> View:
+    return build_view(PANEL, robot, NOW, ViewContext(**context)).view
 
 
 def events(chunk: bytes) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from app.dialect.bridge_dialect import bridge_token, server_token
 from app.dialect.endpoint import DEMO_VERSION
 from app.robot.state import RobotState, Sample
 from app.view.display_values import LONGEST_TEXT, readout, written
-from app.view.view import View, build_view
+from app.view.view import View, ViewContext, build_view
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -37,8 +37,8 @@ def robot() -> RobotState:
     return robot_there(PANEL)
 
 
-def view_of(robot: RobotState, now: float = NOW, **more: Any) -> View:
-    return build_view(PANEL, robot, now, **more).view
+def view_of(robot: RobotState, now: float = NOW, **context: Any) -> View:
+    return build_view(PANEL, robot, now, ViewContext(**context)).view
 
 
 def heard(robot: RobotState, now: float = NOW, **widget: Any) -> tuple[dict[str, Any], float]:

@@ -14,7 +14,7 @@ from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.view import publisher as module
 from app.view.publisher import ViewPublisher
-from app.view.view import ViewWithDeadlines, build_view
+from app.view.view import ViewContext, ViewWithDeadlines, build_view
 from app.web.metrics import Open
 from app.web.routes.events import EventStream
 from tests.support.builders import (
@@ -49,7 +49,8 @@ class Room:
 
     def build(self) -> ViewWithDeadlines:
         control = self.control
-        return build_view(PANEL, self.robot, NOW, control=control.view(), control_lock=control.lock)
+        context = ViewContext(control=control.view(), control_lock=control.lock)
+        return build_view(PANEL, self.robot, NOW, context)
 
     def post(self) -> None:
         built = self.build()
