@@ -25,7 +25,6 @@ from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.template import needed_inputs
 from app.panel.widgets.hold import HoldCommand
-from app.panel.widgets.joystick import Joystick
 from app.permission.interlocks import Verdict
 from app.permission.press_permission import cause_of, judged
 from app.robot.state import RobotState
@@ -238,10 +237,9 @@ class HoldController:
             self._timer = self._loop.call_at(min(whens), self.step)
 
     def _send(self, holding: ActiveHold) -> None:
-        widget, axes = holding.widget, (0.0, 0.0)
-        if isinstance(widget, Joystick):
-            holding.moved = moved(widget, holding.moved, holding.deflection)
-            axes = widget.axes_at(*holding.moved)
+        widget = holding.widget
+        holding.moved = moved(widget, holding.moved, holding.deflection)
+        axes = widget.axes_at(*holding.moved)
         try:
             self._messages.put(widget, holding.values, lambda: self._final_check(holding), axes)
         except LinkError as error:

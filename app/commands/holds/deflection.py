@@ -6,6 +6,7 @@ A deflection is (x, y), each from -1 to 1: x to the right, y to the front, as th
 import math
 from typing import Final
 
+from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.joystick import Joystick
 
 Deflection = tuple[float, float]
@@ -13,8 +14,10 @@ Deflection = tuple[float, float]
 CENTRE: Final[Deflection] = (0.0, 0.0)
 
 
-def moved(of: Joystick, before: Deflection, deflection: Deflection) -> Deflection:
-    """The deflection in the next message, if `before` was in the last one."""
+def moved(of: HoldCommand, before: Deflection, deflection: Deflection) -> Deflection:
+    """The deflection in the next message, if `before` was in the last one; none of a key."""
+    if not isinstance(of, Joystick):
+        return CENTRE
     x, y = shaped(of, deflection)
     step = of.period_s / of.ramp_s if of.ramp_s else math.inf
     return ramped(before[0], x, step), ramped(before[1], y, step)

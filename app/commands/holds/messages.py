@@ -44,7 +44,7 @@ class HoldMessages:
         widget: HoldCommand,
         values: Values,
         final_check: FinalCheck,
-        axes: tuple[float, float] = (0.0, 0.0),
+        axes: tuple[float, float],
     ) -> None:
         """Publishes one message, with the values of a joystick's axes; LinkError if it could not be
         sent, PressRefused from `final_check`."""

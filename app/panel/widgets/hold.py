@@ -58,6 +58,14 @@ class HoldCommand(KeyCommand, PublishCommand):
     def stopping(self) -> Mapping[str, Any]:
         """The template of the message when it ends."""
 
+    def axes_at(self, x: float, y: float) -> tuple[float, float]:
+        """The values of the axes at a deflection from -1 to 1: 0 of a key, which has none."""
+        return 0.0, 0.0
+
+    def texts_at(self, x: float, y: float) -> dict[str, str]:
+        """The same by axis, as an operator reads them; empty of a key."""
+        return {}
+
     @property
     def previewed(self) -> Mapping[str, Any]:
         """The template of the message while it is held, as a preview shows it."""

@@ -64,11 +64,10 @@ class Joystick(HoldCommand):
         return self.release or self.moving(0.0, 0.0)
 
     def axes_at(self, x: float, y: float) -> tuple[float, float]:
-        """The values of the axes at a deflection from -1 to 1; zero has no sign."""
+        # Zero has no sign.
         return x * self.x_axis.max + 0.0, y * self.y_axis.max + 0.0
 
     def texts_at(self, x: float, y: float) -> dict[str, str]:
-        """The same as an operator reads them."""
         values = zip("xy", self.axes_at(x, y), (self.x_axis.unit, self.y_axis.unit), strict=True)
         return {axis: f"{value:.2f} {unit}".strip().replace("-", "−") for axis, value, unit in values}
 

@@ -21,7 +21,6 @@ from app.commands.receipts import Receipt, with_log_fault
 from app.errors import InputError, LogError
 from app.i18n import localized, say
 from app.panel.template import needed_inputs
-from app.panel.widgets.joystick import Joystick
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import principal_of
@@ -215,5 +214,5 @@ class _HoldSocket:
 
 def _deflection_texts(holding: ActiveHold) -> dict[str, Any]:
     """`moves`: the values published for a joystick's deflection, as texts; empty for other widgets."""
-    widget = holding.widget
-    return {"moves": widget.texts_at(*holding.moved)} if isinstance(widget, Joystick) else {}
+    moves = holding.widget.texts_at(*holding.moved)
+    return {"moves": moves} if moves else {}
