@@ -143,7 +143,8 @@ class Process:
 
     def send(self, number: signal.Signals) -> None:
         if self.running:
-            send_signal(self.pid, number)
+            with suppress(ProcessLookupError):  # it has just ended
+                send_signal(self.pid, number)
 
     def wait(self, timeout_s: float) -> int:
         return self._process.wait(timeout_s)
