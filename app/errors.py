@@ -22,15 +22,29 @@
 `app/web/error_pages.py` maps them to HTTP responses. "–": never sent to a client as such.
 """
 
+import errno
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
-from app.i18n import Text, TextLike
+from app.i18n import Text, TextLike, say
 from app.printable import printable
 
 # The cause of a refusal, as a receipt has it.
 Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
+
+# The codes of the system's errors that an operator may read, such as a disk that is full.
+OS_ERRORS: Final[Mapping[int, str]] = {
+    errno.ENOSPC: "disk_full",
+    errno.EROFS: "disk_read_only",
+    errno.EIO: "disk_failed",
+    errno.EACCES: "file_not_permitted",
+    errno.EPERM: "file_not_permitted",
+    errno.ENOENT: "file_not_found",
+    errno.EEXIST: "not_a_folder",
+    errno.ENOTDIR: "not_a_folder",
+}
 
 
 class KioskError(Exception):
@@ -188,3 +202,12 @@ class LogGone(LogError):
 
 class FolderInUse(LogError):
     pass
+
+
+def os_error_text(error: OSError) -> TextLike:
+    """The reason of an error of the operating system, to be put into a sentence, with its file. Rare
+    ones are in the system's words, in no language."""
+    code = OS_ERRORS.get(error.errno or 0)
+    words = error.strerror or str(error)
+    why = say(code) if code else words[:1].lower() + words[1:]
+    return say("with_file", why=why, file=str(error.filename)) if error.filename else why

@@ -1,11 +1,15 @@
 """The error tree: what it is called, which status it has, how it reads."""
 
+import errno
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from app import errors
-from app.errors import Fault, FieldError, KioskError, PanelError
+from app.errors import Fault, FieldError, KioskError, PanelError, os_error_text
+from app.i18n import say
 
 
 @pytest.mark.parametrize(
@@ -54,3 +58,18 @@ def test_a_panel_error_lists_the_file_and_each_fault_on_a_line() -> None:
 @pytest.mark.parametrize(("field", "text"), [("a.b[1]", "a.b[1]: too long"), ("", "too long")])
 def test_a_field_error_names_its_field(field: str, text: str) -> None:
     assert str(FieldError(field, "too long")) == text
+
+
+def test_an_error_of_the_system_is_a_sentence_of_the_catalogue() -> None:
+    assert os_error_text(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))) == say("disk_full")
+
+
+def test_an_error_of_the_system_names_its_file() -> None:
+    with pytest.raises(OSError, match="/gone/away") as raised:
+        Path("/gone/away").read_bytes()
+    assert os_error_text(raised.value) == say("with_file", why=say("file_not_found"), file="/gone/away")
+
+
+def test_a_rare_error_of_the_system_is_in_its_own_words() -> None:
+    assert os_error_text(OSError(errno.EMFILE, "Too many open files")) == "too many open files"
+    assert os_error_text(OSError("no number")) == "no number"

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import FolderInUse
-from app.i18n import say
+from app.i18n import Text, say
 
 LOCK: Final = "server.lock"
 HELD_BY_OTHER_S: Final = 5.0  # a restarted server waits this long for the lock of the old one
@@ -41,8 +41,7 @@ class DataDir:
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise FolderInUse(f"{self.path} is in use by {_read_holder(fd)}: give each server its own "
-                              "KIOSK_DATA, and one worker") from None  # fmt: skip
+            raise FolderInUse(say("folder_in_use", path=str(self.path), by=_read_holder(fd))) from None
         else:
             self.release()
             self._fd, fd = fd, -1
@@ -88,10 +87,11 @@ class DataDir:
             os.pwrite(fd, json.dumps(about).encode(), 0)
 
 
-def _read_holder(fd: int) -> str:
+def _read_holder(fd: int) -> Text:
     """The process that has the lock, from the lock file, which may not be written yet."""
     try:
         about = json.loads(os.pread(fd, 4096, 0))
-        return f'process {about["pid"]} since {about["since"]} ("{about["command"]}")'
+        pid, since, command = str(about["pid"]), str(about["since"]), str(about["command"])
     except (ValueError, KeyError, TypeError):
-        return "another process"
+        return say("other_process")
+    return say("named_process", pid=pid, since=since, command=command)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from app.errors import LogCorrupt, LogError, LogGone
+from app.errors import LogCorrupt, LogError, LogGone, os_error_text
 from app.i18n import say
 
 NAME: Final = "operators-log.sqlite3"
@@ -35,13 +35,14 @@ CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT RO
 # For finding a repeated press; older files get the index when they are opened.
 INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> ''"
 
-ERROR_TEXTS: Final = {
-    "SQLITE_FULL": "no space left on device",
-    "SQLITE_READONLY": "the file is read-only",
-    "SQLITE_CANTOPEN": "the file can't be opened",
-    "SQLITE_BUSY": "another program has the file locked",
-    "SQLITE_PERM": "permission denied",
-    "SQLITE_IOERR": "the disk does not take it (input/output error)",
+# The code of the sentence for each error of SQLite that an operator may read.
+ERRORS: Final = {
+    "SQLITE_FULL": "disk_full",
+    "SQLITE_READONLY": "file_read_only",
+    "SQLITE_CANTOPEN": "file_not_opened",
+    "SQLITE_BUSY": "file_locked",
+    "SQLITE_PERM": "file_not_permitted",
+    "SQLITE_IOERR": "disk_failed",
 }
 
 
@@ -67,11 +68,9 @@ def as_log_error() -> Iterator[None]:
         short = "_".join(name.split("_")[:2])
         if short in DAMAGED:
             raise LogCorrupt(f"the file is damaged: {error}") from error
-        raise LogError(ERROR_TEXTS.get(short, str(error))) from error
+        raise LogError(say(ERRORS[short]) if short in ERRORS else str(error)) from error
     except OSError as error:
-        words = "not a folder" if isinstance(error, FileExistsError) else error.strerror or str(error)
-        where = f" ({error.filename})" if error.filename else ""
-        raise LogError(words[:1].lower() + words[1:] + where) from error
+        raise LogError(os_error_text(error)) from error
 
 
 def open_database(folder: Path, after: Head | None = None) -> sqlite3.Connection:
@@ -112,7 +111,7 @@ def _check_or_create(db: sqlite3.Connection, after: Head | None) -> None:
     elif version == 1:
         _add_text(db)
     elif version != VERSION:
-        raise LogError(f"the file is of another version of this program ({version}, not {VERSION})")
+        raise LogError(say("log_other_version", version=version, own=VERSION))
     db.execute(INDEX)
 
 

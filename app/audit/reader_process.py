@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Final, TypeVar
 
 from app.audit.reader_main import ReadRequest
-from app.errors import LogError
+from app.errors import LogError, os_error_text
 from app.i18n import say
 from app.settings import PACKAGE
 
@@ -64,7 +64,7 @@ class ReaderProcess:
         try:
             self._process = process = _popen()
         except OSError as error:  # such as memory or open files that are used up
-            raise LogError(say("log_unreadable", why=error.strerror or str(error))) from error
+            raise LogError(say("log_unreadable", why=os_error_text(error))) from error
         if self._killed:
             process.kill()
         assert process.stdin is not None

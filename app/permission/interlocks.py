@@ -174,7 +174,7 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
         return None, locked("missing", field=of.field, topic=of.topic)
     stale_at = math.inf if of.max_age_s is None else reading.at + of.max_age_s
     if now >= stale_at:
-        return None, locked("stale", topic=of.topic, limit=f"{of.max_age_s:g}")
+        return None, locked("stale", topic=of.topic, limit=number(f"{of.max_age_s:g}"))
     return value, PERMITTED if stale_at == math.inf else Verdict(True, until=stale_at)
 
 

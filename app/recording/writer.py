@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
+from app.errors import os_error_text
 from app.i18n import TextLike, say
 from app.recording.directory import RecordingDirectory
 from app.recording.mcap_file import Channel, McapFile
@@ -98,7 +99,7 @@ class Recordings:
 
     def report_failure(self, error: Exception) -> None:
         """Sets the fault. The next press starts a new file."""
-        why = (isinstance(error, OSError) and error.strerror) or str(error)
+        why = os_error_text(error) if isinstance(error, OSError) else str(error)
         log.error("recording stopped, in %s: %s", self._folder.path, why)
         self._set_fault(say("not_recorded", why=why))
 

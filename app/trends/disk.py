@@ -214,7 +214,7 @@ class TrendDisk:
                 set_aside(self._folder)
         if not self._fault:
             log.error("trends are not written to %s: %s", self._folder, error)
-        self._call(self._show_fault, say("trend_not_kept", why=str(error)))
+        self._call(self._show_fault, say("trend_not_kept", why=error.text))
 
     def _call(self, function: Callable[[Given], None], given: Given) -> None:
         with suppress(RuntimeError):  # the loop is closed

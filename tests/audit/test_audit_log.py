@@ -23,6 +23,7 @@ from app.audit.store import Store
 from app.audit.ticket import Results
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogCorrupt, LogError
+from app.i18n import render
 from app.process.shutdown import SHUTDOWN_TIMEOUT_S
 from tests.support.operator_log import pressed, run, sent, until_good
 from tests.support.parts import ENOUGH_S, until
@@ -349,6 +350,17 @@ def test_garbage_at_the_start_is_put_aside_and_said(tmp_path: Path) -> None:
     (aside,) = tmp_path.glob("*damaged*")
     assert aside.read_bytes() == b"garbage" * 1000
     assert verify(tmp_path).fault == ""
+
+
+def test_the_error_of_the_disk_reads_in_the_readers_language(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+
+    async def work(log: OperatorLog) -> None:
+        where = tmp_path / "file"
+        german = f"Das Bedienprotokoll kann nicht geschrieben werden: kein Ordner ({where})."
+        assert render(log.lock, "de") == german
+
+    run(tmp_path / "file", work)
 
 
 def test_a_folder_that_can_not_be_made_locks_until_it_can(tmp_path: Path) -> None:

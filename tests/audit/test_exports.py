@@ -316,7 +316,7 @@ def test_an_export_of_what_can_not_be_read_says_why(tmp_path: Path) -> None:
     async def work() -> None:
         mine = readers.Readers(tmp_path)
         async with mine.export(Filter(), None, True) as export:
-            with pytest.raises(LogError, match="cannot be read: no such file or directory"):
+            with pytest.raises(LogError, match="cannot be read: no such file or folder"):
                 await export.start()
         mine.stop()
 
@@ -333,7 +333,7 @@ def test_where_no_process_can_be_begun_an_export_says_why_and_leaves_its_place(
             patch.setattr(reader_process, "COMMAND", (str(tmp_path / "gone"),))
             for _ in range(2):
                 async with log.export(Filter(), None, False) as export:
-                    with pytest.raises(LogError, match="cannot be read: No such file or directory"):
+                    with pytest.raises(LogError, match="cannot be read: no such file or folder"):
                         await export.start()
         async with log.export(Filter(), None, False) as export:
             assert (await export.start()).startswith(b"\xef\xbb\xbfseq,at,")

@@ -9,7 +9,7 @@ import pytest
 from app.commands.confirmations import Confirmations
 from app.commands.receipts import Receipt
 from app.errors import PanelError
-from app.i18n import TextLike, say
+from app.i18n import TextLike, number, say
 from app.panel import load_panel
 from app.panel.model import Panel
 from app.panel.widgets.step import Step
@@ -114,7 +114,7 @@ def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
     step = next(w for w in desk.panel.commands if isinstance(w, Step))
     assert judged(step, (), desk.robot, desk.now).until == desk.now + 5
     desk.now += 6
-    assert desk.reason() == say("stale", topic="/speed", limit="5")
+    assert desk.reason() == say("stale", topic="/speed", limit=number("5"))
     assert desk.press(50).outcome == "refused"
     assert desk.sent() == []
 
