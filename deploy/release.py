@@ -76,14 +76,20 @@ def build(folder: Path) -> Path:
     run("-m", "build", "--no-isolation", "--sdist", "--wheel", "--outdir", str(folder), str(ROOT))
     (wheel,), (sdist,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
     with tempfile.TemporaryDirectory() as unpacked:
-        with tarfile.open(sdist) as archive:
-            archive.extractall(unpacked, filter="data")
+        unpack(sdist, unpacked)
         (source,) = Path(unpacked).iterdir()
         run("-m", "build", "--no-isolation", "--wheel", "--outdir", unpacked, str(source))
         (again,) = Path(unpacked).glob("*.whl")
         if again.name != wheel.name or digest(again) != digest(wheel):
             raise ReleaseError(f"{sdist.name} gives another wheel than the checkout")
     return wheel
+
+
+def unpack(sdist: Path, folder: str) -> None:
+    """Python has `filter="data"` since 3.11.4; before that, the attribute is ignored."""
+    with tarfile.open(sdist) as archive:
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)
+        archive.extractall(folder)
 
 
 def describe(folder: Path) -> None:

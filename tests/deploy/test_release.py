@@ -82,6 +82,27 @@ def test_the_sdist_gives_the_wheel_of_the_checkout(tmp_path: Path) -> None:
     assert "app/deploy/release.lock" not in installed
 
 
+def test_the_sdist_is_unpacked_by_the_oldest_python_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before Python 3.11.4, as in Debian 12, `extractall` knows no filter."""
+    sdist = tmp_path / "panel.tar.gz"
+    with tarfile.open(sdist, "w:gz") as archive:
+        archive.add(ROOT / "pyproject.toml", "panel/pyproject.toml")
+    extract = tarfile.TarFile.extractall
+
+    def as_in_3_11_2(self: tarfile.TarFile, path: str) -> None:
+        extract(self, path)
+
+    with monkeypatch.context() as older:
+        older.setattr(tarfile.TarFile, "extractall", as_in_3_11_2)
+        older.delattr(tarfile, "data_filter", raising=False)
+        release.unpack(sdist, str(tmp_path / "older"))
+    release.unpack(sdist, str(tmp_path / "newer"))
+    for name in ("older", "newer"):
+        assert (tmp_path / name / "panel/pyproject.toml").is_file()
+
+
 def test_without_its_documentation_it_is_no_release(checkout: ModuleType, tmp_path: Path) -> None:
     with pytest.raises(release.ReleaseError, match="`make docs` writes it"):
         checkout.pack_docs(tmp_path)
