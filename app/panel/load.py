@@ -12,7 +12,7 @@ from app.interfaces import Interfaces, load_interfaces, read_distribution
 from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_interlock
-from app.panel.faults.toml_file import TomlFile, read_toml
+from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
 
@@ -47,6 +47,15 @@ def check_panel(path: Path) -> Checked:
     notes = add_locations(find_notes(panel, interfaces), file.text, file.tables)
     sent = add_locations(previews(panel, interfaces), file.text, file.tables)
     return Checked(panel, tuple(notes), tuple(sent))
+
+
+def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
+    """The faults of a panel file in `folder` that would have this text."""
+    try:
+        _load(parse_toml(folder / "panel.toml", text.encode()))
+    except PanelError as error:
+        return error.faults
+    return ()
 
 
 def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:

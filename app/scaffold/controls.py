@@ -1,6 +1,7 @@
 """The widgets that act on the robot: keys for topics, services and actions, and parameters."""
 
 from collections.abc import Collection, Iterator, Mapping
+from textwrap import shorten
 from typing import Any, Final
 
 from app.graph.model import Server, Topic
@@ -20,6 +21,7 @@ OF_EVERY_NODE: Final = (
     "lifecycle_msgs/srv/",
 )
 PARAMETER_TYPES: Final = ("bool", "integer", "double", "string")
+MAX_COMMENT: Final = 200  # characters of a value, and of a description
 ROLES: Final = {"start": "start", "stop": "stop", "reset": "reset"}
 
 
@@ -94,7 +96,9 @@ def parameter(of: NodeParameter) -> Iterator[Entry]:
         "type": of.type,
         "span": 6,
     }
-    comment = " ".join(f"Now {of.value!r}. {of.description}".split()) if of.value is not None else ""
+    now = shorten(repr(of.value), MAX_COMMENT, placeholder=" …")
+    about = shorten(of.description, MAX_COMMENT, placeholder=" …")
+    comment = f"Now {now}. {about}".strip() if of.value is not None else ""
     yield _control("parameter", f"{of.node}/{of.name}", (of.node,), labelled, comment)
 
 

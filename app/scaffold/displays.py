@@ -79,7 +79,10 @@ def _field(topic: Topic, page: str, about: Mapping[str, Any], shown: Shown, valu
     if shown.low is None and shown.unit:
         return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 3})
     seen = float(value) * shown.scale if isinstance(value, int | float) else None
-    low, high = range_for(shown, (shown.field, topic.name), seen)
+    ends = range_for(shown, (shown.field, topic.name), seen)
+    if ends is None:
+        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 3})
+    low, high = ends
     comment = "" if shown.low is not None else "The ends of the scale are a guess."
     keys |= {"min": _whole(low), "max": _whole(high), "span": 3}
     return Entry(kind="gauge", name=name, page=page, keys=keys, comment=comment)

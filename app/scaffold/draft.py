@@ -48,9 +48,12 @@ def _is_public(topic: Topic) -> bool:
     return topic.name not in LEFT_OUT and "/_" not in topic.name
 
 
-def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
-    """`base` with pages, interlock candidates and remarks."""
-    interlocks = list(_interlocks(known.topics))
+def make_draft(
+    known: Known, interfaces: Interfaces, base: Draft, left_out: Mapping[tuple[str, str], str]
+) -> Draft:
+    """`base` with pages, interlock candidates and remarks, without the parts `left_out`: see
+    `checked_draft`."""
+    interlocks = [one for one in _interlocks(known.topics) if ("interlock", one.topic) not in left_out]
     entries: list[Entry] = []
     remarks: list[str] = []
     for topic in shown(known.topics):
@@ -73,6 +76,8 @@ def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
     for one in known.parameters:
         entries += controls.parameter(one)
     remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unreadable]
+    remarks += [f"{name} ({kind}): {why}" for (kind, name), why in left_out.items()]
+    entries = [one for one in entries if (one.kind, one.name) not in left_out]
     return replace(base, interlocks=interlocks, pages=_pages(entries), remarks=remarks)
 
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import floor, isfinite, log10
+from math import copysign, floor, isfinite, log10
 from typing import Final
 
 from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES
+from app.panel.widgets.numbers import MAX_EXACT_NUMBER
 from app.simulator.values.guesses import NAMES
 
 NUMBERS: Final = frozenset((*FLOAT_TYPES, *INTEGER_RANGES))
@@ -133,9 +134,9 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
         yield Shown(field=one.name, kind="float64" if number else one.type.name, word=word, format=text)
 
 
-def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float]:
+def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float] | None:
     """The ends of a gauge's scale: the usual ones of the type, else by a word in the name, wide enough
-    for the value that was seen."""
+    for the value that was seen. None where a panel file can't have so wide a scale."""
     low, high = shown.low, shown.high
     if low is None or high is None:
         by_name = (span for name in names for words, span in NAMES if words.search(name))
@@ -145,14 +146,14 @@ def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tupl
         high = max(0.0, _round_away(high))
     if value is not None and isfinite(value):
         low, high = min(low, _round_away(value)), max(high, _round_away(value))
-    return low, high
+    return (low, high) if max(-low, high) <= MAX_EXACT_NUMBER else None
 
 
 def _round_away(value: float) -> float:
-    """The next of 1, 2, 5, 10, 20, … further from zero."""
+    """The next of 1, 2, 5, 10, 20, … further from zero, for every finite number; infinite where there
+    is none."""
     if value == 0:
         return 0.0
     size = abs(value)
-    power = 10.0 ** floor(log10(size))
-    step = next(step for step in (1, 2, 5, 10) if step * power >= size * (1 - 1e-9))
-    return (step * power) if value > 0 else -(step * power)
+    steps = (float(f"{step}e{floor(log10(size))}") for step in (1, 2, 5, 10))
+    return copysign(next(step for step in steps if step >= size * (1 - 1e-9)), value)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection
 from typing import Final
 
-MAX_ID: Final = 60
+MAX_ID: Final = 58  # with a number behind it 64 at most
 MAX_LABEL: Final = 40
 GENERAL: Final = "robot"
 # Names of bools that report a fault: true does not permit anything.

@@ -13,23 +13,32 @@ WIDTH: Final = 100
 CHECK: Final = "operator-panel check"
 
 
-def toml_text(draft: Draft, controls: bool = False) -> str:
-    """The file. `controls`: keys that act on the robot are live, each behind the first interlock."""
+def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
+    """The file. `controls`: keys that act on the robot are live, each behind the first interlock.
+    `trial`: all of them, to be checked."""
     lines = [*_head(draft), *_interlocks(draft)]
     taken: set[str] = set()
     pages: set[str] = set()
-    for page, entries in draft.pages.items():
+    for page, entries in zip(draft.pages, written(draft, controls, trial), strict=True):
         own_id = id_of(page, pages)
         pages.add(own_id)
         lines += _page(page, own_id)
         for entry in entries:
-            if controls and entry.kind == "label":
-                continue  # it stands for those that are commented out
-            live = not entry.control or (controls and bool(draft.interlocks))
+            live = trial or not entry.control or (controls and bool(draft.interlocks))
             lines += _widget(entry, id_of(entry.name, taken), draft, live, taken)
     if draft.remarks:
-        lines += ["", *_comment("Not on the panel:"), *(f"# - {one}" for one in draft.remarks)]
+        remarks = (f"# - {' '.join(one.split())}" for one in draft.remarks)
+        lines += ["", *_comment("Not on the panel:"), *remarks]
     return "\n".join(printable(line) for line in lines) + "\n"
+
+
+def written(draft: Draft, controls: bool = False, trial: bool = False) -> list[list[Entry]]:
+    """The entries of each page in the file's order, also those that are comments."""
+    notes = not controls or trial  # a note stands for controls that are commented out
+    return [
+        [entry for entry in entries if notes or entry.kind != "label"]
+        for entries in draft.pages.values()
+    ]
 
 
 def _head(draft: Draft) -> Iterator[str]:
@@ -119,7 +128,8 @@ def _value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        whole = value.encode(errors="replace").decode()  # TOML has no lone surrogates
+        return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
         inner = ", ".join(f"{key} = {_value(one)}" for key, one in value.items())
         return f"{{ {inner} }}" if inner else "{}"

@@ -25,6 +25,11 @@ from tests.support.processes.command import COMMAND
 
 BOOL = "std_msgs/msg/Bool"
 GRIPPER = "gripper_msgs/msg/Gripper"
+EXTREMES = {
+    "/pressure_stamp": ("std_msgs/msg/UInt64", 2**64 - 1),
+    "/speed_largest": ("std_msgs/msg/Float64", 1.7e308),
+    "/speed_smallest": ("std_msgs/msg/Float64", 5e-324),
+}
 
 
 def run(bridge: Bridge, *words: str) -> subprocess.CompletedProcess[str]:
@@ -62,8 +67,13 @@ def io(cyclone_bridge: Bridge) -> Iterator[RosNode]:
     node.every("/arm/temperature", {"temperature": 41.5}, 0.2)
     node.advertise("/unknown", "test_msgs/msg/BasicTypes")
     node.subscribe("/start", BOOL)
+    for name, (kind, value) in EXTREMES.items():
+        node.advertise(name, kind, durability="transient_local", depth=1)
+        node.publish(name, {"data": value})
+    node.advertise("/odd_joints", "sensor_msgs/msg/JointState", durability="transient_local", depth=1)
+    node.publish("/odd_joints", {"name": ["j1\x07"], "position": [0.5]})
     names = {"/operation_enabled", "/arm/joint_states", "/arm/temperature", "/unknown", "/start"}
-    until_passed_on(cyclone_bridge, *names)
+    until_passed_on(cyclone_bridge, *names, *EXTREMES, "/odd_joints")
     yield node
     node.end()
 
@@ -236,6 +246,8 @@ def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
     for name in ("/start", "/reset", "/set_enabled", "/fibonacci"):
         assert f'"{name}"' in text
     assert '# parameter = "speed"' in text
+    assert "# - /odd_joints (joints): joint[0].name: " in text
+    assert all(f'topic = "{name}"' in text for name in EXTREMES)
     assert "parameters of /cell_io: the bridge reaches services on Cyclone DDS only" in text
     widgets = {one["id"]: one for page in tomllib.loads(text)["page"] for one in page.get("widget", ())}
     assert [one["name"] for one in widgets["arm_joint_states"]["joint"]] == ["j1", "j2"]

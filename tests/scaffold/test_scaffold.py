@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,8 @@ from app.graph.model import EndpointQos, Server, Topic, TopicEndpoint
 from app.graph.node_services import NodeParameter
 from app.interfaces import load_interfaces
 from app.panel import check_panel
+from app.panel.load import faults_of_text
+from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.fields import Shown, range_for
@@ -42,9 +45,12 @@ def server(name: str, type_name: str, dds: str = "Cyclone DDS") -> Server:
 
 
 def text_of(controls: bool = False, base: Draft | None = None, **known: Any) -> str:
-    return toml_text(
-        make_draft(Known(**known), INTERFACES, base or Draft(title="Cell")), controls=controls
+    draft, faults = checked_draft(
+        partial(make_draft, Known(**known), INTERFACES, base or Draft(title="Cell")),
+        partial(faults_of_text, folder=Path()),
     )
+    assert not faults
+    return toml_text(draft, controls=controls)
 
 
 def widgets(text: str) -> dict[str, dict[str, Any]]:
@@ -283,7 +289,40 @@ def test_texts_of_a_robot_can_not_leave_their_place(tmp_path: Path) -> None:
     )
     path = tmp_path / "cell.toml"
     path.write_text(text)
-    assert [page["id"] for page in tomllib.loads(text)["page"]] == ["cell_io", "robot"]
+    assert [page["id"] for page in tomllib.loads(text)["page"]] == ["robot"]
+    assert [line for line in text.splitlines() if "[[page]]" in line] == [
+        "[[page]]",
+        """# Now '"\\n[[page]]\\n'. a b = 1 c""",
+    ]
+    assert "# - /j (joints): joint[0].name: " in text
+
+
+@pytest.mark.parametrize("value", [1.7e308, -1.7e308, 5e-324, 2.0**53 + 2, 1e300])
+def test_a_value_of_any_size_leaves_the_rest_of_the_panel(value: float) -> None:
+    text = text_of(
+        topics=[published("/speed", "std_msgs/msg/Float64"), ENABLED],
+        samples={"/speed": SimpleNamespace(data=value)},
+    )
+    assert {"speed", "operation_enabled"} <= widgets(text).keys()
+
+
+@pytest.mark.parametrize("controls", [False, True])
+def test_what_a_panel_file_can_not_have_is_left_out_with_the_reason(controls: bool) -> None:
+    long = f"/{'x' * 300}"
+    joints = {"/joints": SimpleNamespace(name=["j1\x07"], position=[0.0])}
+    text = text_of(
+        controls,
+        topics=[ENABLED, published("/joints", "sensor_msgs/msg/JointState"), heard("/start", BOOL)],
+        actions=[server(long, "example_interfaces/action/Fibonacci")],
+        samples=joints,
+    )
+    assert widgets(text).keys() >= {"operation_enabled", *(["start"] if controls else [])}
+    remarks = [line for line in text.splitlines() if line.startswith("# - ")]
+    assert [line.partition(": ")[0] for line in remarks] == [
+        "# - /joints (joints)",
+        f"# - {long} (action)",
+    ]
+    assert f'"{long}"' not in text
 
 
 def test_several_robots_have_their_entries(tmp_path: Path) -> None:

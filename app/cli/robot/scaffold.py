@@ -5,6 +5,7 @@ Exit status: 0 it is written, 1 there is no robot, or the file exists, 2 a mista
 
 import os
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,11 +15,12 @@ from app.cli.parser import Parser
 from app.cli.robot.link import Place, add_options, check_namespace, ended, opened, place_of
 from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey
-from app.errors import KioskError, PanelError
+from app.errors import KioskError
 from app.graph.model import GraphSnapshot, RobotGraph
-from app.interfaces import load_interfaces
-from app.panel import check_panel
-from app.scaffold.draft import make_draft
+from app.interfaces import Interfaces, load_interfaces
+from app.panel.load import faults_of_text
+from app.scaffold.checked import checked_draft
+from app.scaffold.draft import Known, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
@@ -51,7 +53,9 @@ async def _scaffold(given: Any) -> int:
         known = await survey(observer, robot, below, interfaces, given.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
         raise ScaffoldError(_nothing_there(robot, f"{robot.namespace}{below}"))
-    draft = make_draft(known, interfaces, _base(place, graph, f"{robot.namespace}{below}", target))
+    draft = _checked(
+        known, interfaces, _base(place, graph, f"{robot.namespace}{below}", target), target
+    )
     if given.controls and not draft.interlocks:
         raise ScaffoldError(
             "no topic looks like a permission of the robot, so no control is made live: leave"
@@ -64,6 +68,20 @@ async def _scaffold(given: Any) -> int:
     _write(target, text, given.force)
     print(*_summary(target, draft, given.controls), sep="\n", flush=True)
     return 0
+
+
+def _checked(known: Known, interfaces: Interfaces, base: Draft, target: Path | None) -> Draft:
+    """The draft without what a panel file can't have; ScaffoldError if it has other faults."""
+    draft, faults = checked_draft(
+        partial(make_draft, known, interfaces, base), partial(faults_of_text, folder=_folder(target))
+    )
+    if faults:
+        raise ScaffoldError(f"no panel can be made of this: {'; '.join(map(str, faults))}")
+    return draft
+
+
+def _folder(target: Path | None) -> Path:
+    return Path() if target is None else target.resolve().parent
 
 
 def _nothing_there(robot: RobotGraph, namespace: str) -> str:
@@ -85,7 +103,7 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
         entry: dict[str, Any] = {"id": own_id, "name": label_of(name or own_id)}
         entry |= {"namespace": name} if name else {}
         robots.append(entry | ({"connect": list(place.connect)} if place.connect else {}))
-    folder = Path() if target is None else target.resolve().parent
+    folder = _folder(target)
     return Draft(
         title=label_of(namespace or "Robot"),
         namespace=namespace,
@@ -96,15 +114,8 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
 
 
 def _write(target: Path, text: str, force: bool) -> None:
-    """Only what is a good panel is written."""
-    try:
-        with draft_of(target, force) as draft:
-            draft.write_text(text, encoding="utf-8")
-            check_panel(draft)
-    except PanelError as error:
-        raise ScaffoldError(
-            f"the panel that was made has faults, which is a mistake of {APP}: {error}"
-        ) from error
+    with draft_of(target, force) as draft:
+        draft.write_text(text, encoding="utf-8")
 
 
 def _summary(target: Path, draft: Draft, live: bool) -> Iterator[str]:

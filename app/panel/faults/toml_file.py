@@ -41,9 +41,17 @@ def read_toml(path: Path) -> TomlFile:
     """The parsed file; PanelError (`unreadable`) with the line if it is no TOML."""
     try:
         data = path.read_bytes()
+    except OSError as error:
+        raise PanelError(str(path), (_read_fault(error),), unreadable=True) from error
+    return parse_toml(path, data)
+
+
+def parse_toml(path: Path, data: bytes) -> TomlFile:
+    """The same, of a file that has these bytes."""
+    try:
         text = data.decode("utf-8-sig")  # some editors begin a file with a mark
         tables = tomllib.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         fault = _read_fault(error)
         if isinstance(error, tomllib.TOMLDecodeError):
             fault = _misspelt_header(text) or fault
