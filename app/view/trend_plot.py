@@ -5,6 +5,7 @@ The plot is a square of `SIZE` units a side, stretched to its box; texts and mar
 """
 
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -28,7 +29,13 @@ STEPS: Final = (
     *(3600, 7200, 10_800, 21_600, 43_200, 86_400, 172_800, 604_800),
 )
 DAY: Final = 86_400
+LARGEST: Final = 1e300  # of an axis
+LEAST_WIDTH: Final = 1e-300
+NARROWEST: Final = 1e-9  # relative: a narrower axis has ticks that doubles can't tell apart
+MARGIN: Final = 0.05
+MOST_DIGITS: Final = 12  # after the point
 
+Range = tuple[float, float]
 Place = Callable[[float], float]
 
 
@@ -98,12 +105,17 @@ def pen_columns(
     found = history.columns(field, begin, end, width)
     if (pen.scale, pen.offset) == (1.0, 0.0):
         return found
-    return [_scaled(one, pen) for one in found]
+    return [_scaled(column, pen) for column in found]
 
 
 def _scaled(column: Column, pen: Pen) -> Column:
-    low, high = sorted((pen.shown(column.low), pen.shown(column.high)))
-    return column._replace(low=low, high=high, last=pen.shown(column.last))
+    low, high = sorted((_finite(pen.shown(column.low)), _finite(pen.shown(column.high))))
+    return column._replace(low=low, high=high, last=_finite(pen.shown(column.last)))
+
+
+def _finite(value: float) -> float:
+    """The nearest finite number: a scale may lead beyond all doubles."""
+    return min(max(value, -sys.float_info.max), sys.float_info.max)
 
 
 def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: float) -> Plot:
@@ -133,33 +145,54 @@ def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: 
 
 def value_range(widget: Trend, columns: Sequence[Sequence[Column]]) -> tuple[float, float]:
     """The lowest and highest value of the axis: as the panel file says, else of all that is drawn."""
-    fixed = [
+    limits = [
         v for pen in widget.pens for v in (pen.low, pen.high, *(pen.normal or ())) if v is not None
     ]
-    lows = [one.low for of in columns for one in of] + fixed
-    highs = [one.high for of in columns for one in of] + fixed
-    low = widget.min if widget.min is not None else min(lows, default=0.0)
-    high = widget.max if widget.max is not None else max(highs, default=1.0)
-    if low >= high:
-        middle = widget.min if widget.min is not None else low
-        margin = abs(middle) * 0.05 or 1.0
-        low, high = (low, low + margin) if widget.min is not None else (high - margin, high + margin)
-    margin = (high - low) * 0.05
+    lows = [column.low for pen in columns for column in pen] + limits
+    highs = [column.high for pen in columns for column in pen] + limits
+    return axis_range(min(lows, default=0.0), max(highs, default=1.0), widget.min, widget.max)
+
+
+def axis_range(low: float, high: float, fixed_low: float | None, fixed_high: float | None) -> Range:
+    """The ends of the axis for values from `low` to `high`, with a margin where an end is not fixed.
+
+    Total: for all doubles but NaN the ends are finite and far enough apart for ticks that differ. The
+    same as `axisRange` in `static/js/trend/axis.js`.
+    """
+    low = _drawable(low if fixed_low is None else fixed_low)
+    high = _drawable(high if fixed_high is None else fixed_high)
+    largest = max(abs(low), abs(high))
+    if high - low < max(largest * NARROWEST, LEAST_WIDTH):
+        margin = largest * MARGIN if largest * MARGIN >= LEAST_WIDTH else 1.0
+        if fixed_low is not None:
+            high = low + margin
+        elif fixed_high is not None:
+            low = high - margin
+        else:
+            low, high = high - margin, high + margin
+    margin = (high - low) * MARGIN
     return (
-        low if widget.min is not None else low - margin,
-        high if widget.max is not None else high + margin,
+        low if fixed_low is not None else low - margin,
+        high if fixed_high is not None else high + margin,
     )
 
 
-def value_ticks(low: float, high: float) -> Iterator[tuple[float, str]]:
-    """(value, text) of the lines of the grid."""
-    least = (high - low) / VALUE_TICKS
+def _drawable(value: float) -> float:
+    """The nearest value that an axis can have: sums and differences of such values are finite."""
+    return min(max(value, -LARGEST), LARGEST)
+
+
+def value_ticks(low: float, high: float, most: int = VALUE_TICKS) -> Iterator[tuple[float, str]]:
+    """(value, text) of the lines of the grid, for the ends of an axis."""
+    least = (high - low) / most
     power = 10.0 ** math.floor(math.log10(least))
-    step = next(power * by for by in (1, 2, 2.5, 5, 10) if power * by >= least * 0.999)
-    digits = max(0, -math.floor(math.log10(step) + 1e-9) + (step / power == 2.5))
+    factor = next((f for f in (1, 2, 2.5, 5) if power * f >= least * 0.999), 10)
+    step = power * factor
+    digits = max(0, -math.floor(math.log10(step) + 1e-9) + (factor == 2.5))
+    fixed_point = max(abs(low), abs(high)) < 1e6 and digits <= MOST_DIGITS
     for count in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
         value = count * step
-        text = f"{value:.{digits}f}" if max(abs(low), abs(high)) < 1e6 else f"{value:.4g}"
+        text = f"{value:.{digits}f}" if fixed_point else f"{value:.4g}"
         yield value, text.replace("-", "\N{MINUS SIGN}")
 
 

@@ -1,7 +1,9 @@
 """A trend as an operator uses it: Chromium, the real bridge, an rclpy node that publishes."""
 
+import itertools
 import math
 import re
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Response, expect
 
+from app.view.trend_plot import axis_range, value_ticks
 from tests.support.browser.pages import HIDE, place
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, until
 from tests.support.servers import live_server
@@ -332,3 +335,60 @@ def test_a_lost_server_marks_values_as_old_and_keeps_the_picture(
     decoration = "e => getComputedStyle(e).textDecorationStyle"
     assert page.locator(f"{TREND} .pen-0 > b").evaluate(decoration) == "dotted"
     assert line(page).count("L") >= drawn.count("L") - 1
+
+
+# Extremes, equal neighbours, and values as robots have them.
+DOUBLES = sorted(
+    {
+        sign * value
+        for sign in (-1, 1)
+        for value in (0.0, 5e-324, 1e-310, 2.3e-308, 1e-9, 0.1, 1.0, 97.25, 1e6, 1e15)
+    }
+    | {math.nextafter(1.0, 2.0), math.nextafter(97.25, 0.0), 1.7e308, -1.7e308, -sys.float_info.max}
+)
+AXES = """async ([module, ranges]) => {
+  const { axisRange, valueTicks } = await import(module);
+  return ranges.map(([low, high, fixedLow, fixedHigh]) => {
+    const ends = axisRange(low, high, fixedLow ?? undefined, fixedHigh ?? undefined);
+    const ticks = [];
+    for (const [value] of valueTicks(...ends, 4)) if (ticks.push(value) > 20) break;
+    return [...ends, ...ticks];
+  });
+}"""
+
+
+def test_the_browser_draws_the_axes_of_the_server(cell: Server, page: Page) -> None:
+    """Also for values at which an axis has no width, or more than a double can say."""
+    page.goto(cell.url)
+    script = page.locator('script[src$="main.js"]').get_attribute("src") or ""
+    ends = [(low, high) for low, high in itertools.product(DOUBLES, DOUBLES) if low <= high]
+    ranges = [
+        (*pair, *fixed)
+        for pair in ends
+        for fixed in ((None, None), (0.0, None), (None, 5e-324), (-5.0, 5.0))
+    ]
+    module = script.replace("main.js", "trend/axis.js")
+    for drawn, parameters in zip(page.evaluate(AXES, [module, ranges]), ranges, strict=True):
+        low, high = axis_range(*parameters)
+        expected = [low, high, *(value for value, _ in value_ticks(low, high))]
+        assert drawn == pytest.approx(expected, rel=1e-12, abs=0.0), parameters
+
+
+@pytest.mark.parametrize(
+    "values", [(1.7e308, -1.7e308), (5e-324, 0.0, 1e-323), (1.0, math.nextafter(1.0, 2.0))]
+)
+@pytest.mark.usefixtures("cell")
+def test_no_value_of_a_robot_takes_the_page(
+    values: tuple[float, ...], bridge: Bridge, node: RosNode, page: Page, tmp_path: Path
+) -> None:
+    with receiving(bridge, node, tmp_path) as mine:
+        for value in values:
+            node.publish("/test_inlet", {"data": value})
+        until(lambda: "5.00" not in mine.widget("course")["text0"], "they arrive")
+        assert mine.http.get("/").status_code == 200
+        opened(page, mine)
+        until(lambda: is_drawn(page), "a line is drawn")
+        assert page.locator(f"{TREND} .values text").count() >= 1
+        assert "NaN" not in page.locator(f"{TREND} .plot").inner_html()
+        node.publish("/test_inlet", {"data": 4.5})
+        expect(page.locator(f"{TREND} .pen-0 > b")).to_have_text("4.50 bar")

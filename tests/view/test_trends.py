@@ -1,9 +1,13 @@
 """The attributes of a trend and its plot, without a browser."""
 
+import itertools
 import math
+import sys
 from typing import Any, Final
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from app.i18n import render
 from app.panel.widgets.trend import Trend
@@ -11,7 +15,7 @@ from app.robot.history import Column
 from app.robot.state import RobotState
 from app.trends.recorder import TrendRecorder
 from app.view.kinds import show
-from app.view.trend_plot import COLUMNS, draw, plot, time_ticks, value_ticks
+from app.view.trend_plot import COLUMNS, axis_range, draw, plot, time_ticks, value_ticks
 from tests.support.builders import INTERFACES, NOW, Table, panel_of, robot_there, says
 
 FLOAT: Final = "std_msgs/msg/Float64"
@@ -123,6 +127,42 @@ def test_a_value_that_does_not_change_is_drawn(value: float, fixed: Table) -> No
     drawn = draw(widget, [columns((0, value, value, value), (1, value, value, value))], 0.0, 600.0)
     assert drawn.values
     assert math.isfinite(drawn.lines[0].y)
+
+
+DOUBLES: Final = st.floats(allow_nan=False) | st.sampled_from(
+    [0.0, 5e-324, -5e-324, 2.3e-308, 1.7e308, -1.7e308, sys.float_info.max, math.inf, -math.inf]
+)
+ENDS: Final = st.none() | st.floats(-(2.0**53), 2.0**53)
+
+
+@given(a=DOUBLES, b=DOUBLES, neighbour=st.booleans(), fixed_low=ENDS, fixed_high=ENDS)
+def test_an_axis_is_drawn_for_all_doubles(
+    a: float, b: float, neighbour: bool, fixed_low: float | None, fixed_high: float | None
+) -> None:
+    low, high = sorted((a, math.nextafter(a, math.inf) if neighbour else b))
+    low, high = axis_range(low, high, fixed_low, fixed_high)
+    assert -math.inf < low < high < math.inf
+    assert math.isfinite(high - low)
+    ticks = list(itertools.islice(value_ticks(low, high), 12))
+    assert 2 <= len(ticks) <= 10
+    assert all(math.isfinite(value) and len(text) < 25 for value, text in ticks)
+    assert [value for value, _ in ticks] == sorted({value for value, _ in ticks})
+
+
+@given(
+    values=st.lists(DOUBLES.filter(math.isfinite), min_size=1, max_size=4),
+    scale=DOUBLES.filter(math.isfinite),
+)
+def test_every_finite_value_is_drawn(values: list[float], scale: float) -> None:
+    widget, robot = cell(pen=[{**PENS[1], "scale": scale}])
+    history = robot.history
+    for second, value in enumerate(values):
+        history.fields["gripper", "data"].add(history.start + second, value)
+    drawn = plot(widget, robot, 10 - history.time(0.0) + history.start, history.start + 10)
+    assert "inf" not in drawn.lines[0].path
+    assert "nan" not in drawn.lines[0].path
+    assert math.isfinite(drawn.lines[0].y)
+    assert drawn.values
 
 
 @pytest.mark.usefixtures("utc")

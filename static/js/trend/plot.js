@@ -1,6 +1,7 @@
 // Draws a trend's columns into the elements that the server has rendered (templates/widgets/trend.html); the same as
 // app/view/trend_plot.py.
 import { numberText } from "../number-text.js";
+import { axisRange, valueTicks } from "./axis.js";
 
 const SIZE = 1000;
 const PER_COLUMN_PX = 1.5;
@@ -11,7 +12,7 @@ const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10
 
 // The name of a limit stands outside of what the limits enclose, if that is drawn.
 const isNamedAbove = (letter, place) => (letter === "H" ? place >= NAME_ROOM : place > 100 - NAME_ROOM);
-const numberOr = (text, other) => (text === undefined ? other : Number(text));
+const numberOr = (text) => (text === undefined ? undefined : Number(text));
 
 export class Plot {
   #root;
@@ -49,7 +50,7 @@ export class Plot {
     const values = [...valueTicks(low, high, Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX)))];
     const times = [...this.#timeTicks()];
     part(".grid-lines").innerHTML = values.map(([value]) => `<path d="M0 ${y(value)}h${SIZE}"/>`).join("") + times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
-    part(".values").innerHTML = values.map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${text}</text>`).join("");
+    part(".values").innerHTML = values.map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${numberText(text)}</text>`).join("");
     part(".times").innerHTML = times.map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`).join("");
     const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
@@ -90,17 +91,11 @@ export class Plot {
   #range(columns) {
     const fixed = this.pens.flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])]).filter((value) => value !== undefined);
     const { min, max } = this.#root.dataset;
-    let low = numberOr(min, [...columns.flat().map((one) => one[1]), ...fixed].reduce((a, b) => Math.min(a, b), Infinity));
-    let high = numberOr(max, [...columns.flat().map((one) => one[2]), ...fixed].reduce((a, b) => Math.max(a, b), -Infinity));
-    if (!Number.isFinite(low)) low = Number.isFinite(high) ? high - 1 : 0;
-    if (!Number.isFinite(high)) high = low + 1;
-    if (low >= high) {
-      const margin = Math.abs(low) * 0.05 || 1;
-      if (min === undefined) low = high - margin;
-      if (max === undefined) high = low + 2 * margin;
-    }
-    const margin = (high - low) * 0.05;
-    return [min === undefined ? low - margin : low, max === undefined ? high + margin : high];
+    const ends = (index, pick, none) => [...columns.flat().map((column) => column[index]), ...fixed].reduce(pick, none);
+    const low = ends(1, (a, b) => Math.min(a, b), Infinity);
+    const high = ends(2, (a, b) => Math.max(a, b), -Infinity);
+    const [lowest, highest] = low <= high ? [low, high] : [0, 1]; // nothing is drawn
+    return axisRange(lowest, highest, numberOr(min), numberOr(max));
   }
 
   *#timeTicks() {
@@ -118,19 +113,6 @@ export class Plot {
 
   clockOf(time) {
     return this.#local(time).slice(11, 19);
-  }
-}
-
-function* valueTicks(low, high, most) {
-  const least = (high - low) / most;
-  const power = 10 ** Math.floor(Math.log10(least));
-  const by = [1, 2, 2.5, 5, 10].find((one) => power * one >= least * 0.999);
-  const step = power * by;
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9) + (by === 2.5 ? 1 : 0));
-  for (let number = Math.ceil(low / step - 1e-9); number <= high / step + 1e-9; number++) {
-    const value = number * step;
-    const text = Math.max(Math.abs(low), Math.abs(high)) < 1e6 ? value.toFixed(Math.min(digits, 20)) : Number(value.toPrecision(4)).toString();
-    yield [value, numberText(text)];
   }
 }
 
