@@ -110,6 +110,7 @@ class ViewRefresher:
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf  # monotonic seconds; not every event loop's timers know theirs
         self._failed = False
+        self._failing: frozenset[str] = frozenset()  # ids of the widgets that can't be shown
         self._stopped = False
 
     def stop(self) -> None:
@@ -147,6 +148,7 @@ class ViewRefresher:
         self._shown_at = time.monotonic()
         try:
             self._refresh()
+            self._log_failures()
             self.publisher.post(self._current.view, self._current.without_control)
         except Exception:
             if not self._failed:
@@ -159,6 +161,13 @@ class ViewRefresher:
             self._failed = self._whole = False
             self._updated_keys = set()
             self._schedule(self._current.until)
+
+    def _log_failures(self) -> None:
+        """Logs each widget that can't be shown, once until it is shown again."""
+        for name, error in self._current.failures.items():
+            if name not in self._failing:
+                self._log.error('widget "%s" can not be shown', name, exc_info=error)
+        self._failing = frozenset(self._current.failures)
 
     def _refresh(self) -> None:
         now = self._shown_at

@@ -11,15 +11,26 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
-from app.panel.widgets.families import DisplayWidget
+from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import for_role as control_for_role
 from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
 from app.permission.press_permission import NO_GROUNDS, Grounds, Question, permission
 from app.robot.state import RobotState
-from app.view.kinds import Attributes, Enabled, enabled, show
+from app.view.kinds import Attributes, Enabled, Shown, enabled, show
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 from app.view.robot_state import UNKNOWN, RobotWord, robot_word
+
+RETRY_S: Final = 1.0  # after which a widget that can't be shown is tried again
+FAILURE: Final = say("widget_failed")
+FAILED: Final[Attributes] = {"failed": FAILURE, "state": "unreadable", "note": FAILURE}
+FAILED_COMMAND: Final[Attributes] = {
+    **FAILED,
+    "enabled": False,
+    "reason": FAILURE,
+    "reasons": FAILURE,
+    "more": "",
+}
 
 
 class Notice(TypedDict):
@@ -46,13 +57,15 @@ class ViewWithDeadlines(NamedTuple):
     """A view and its deadlines in monotonic seconds: `displays` is when time alone changes a display,
     by its id, `rest` the same for all else. `robot` is the robot's lamp on the pages of others.
     `without_control` has the attributes of commands for clients without control, by their ids; it is
-    empty if all clients have control."""
+    empty if all clients have control. `failures` has the error of each widget that can't be shown, by
+    its id."""
 
     view: View
     robot: Lamp
     rest: float
     displays: Mapping[str, float]
     without_control: Mapping[str, Attributes] = {}
+    failures: Mapping[str, Exception] = {}
 
     @property
     def until(self) -> float:
@@ -92,7 +105,10 @@ def build_view(
         for w in panel.commands
     ]
     verdicts = {question.widget.id: permission(question) for question in questions}
-    widgets = {w.id: show(w, robot, now, verdicts.get(w.id, PERMITTED)) for w in panel.widgets()}
+    failures: dict[str, Exception] = {}
+    widgets = {
+        w.id: _show(w, robot, now, verdicts.get(w.id, PERMITTED), failures) for w in panel.widgets()
+    }
     link, until = link_statuses(panel, robot, passable, verdicts, now)
     banner = say("simulated") if context.simulated or robot.graph.is_simulated else ""
     view = View(
@@ -109,14 +125,31 @@ def build_view(
     judged = (passable, *interlocks.values(), *verdicts.values())
     rest = min(until, context.control_until, *others, *(verdict.until for verdict in judged))
     lock = context.control_lock
-    without = {} if lock.permitted else _without_control(questions, lock)
-    return ViewWithDeadlines(view, summary(robot.title, link), rest, untils, without)
+    without = {} if lock.permitted else _without_control(questions, lock, failures)
+    return ViewWithDeadlines(view, summary(robot.title, link), rest, untils, without, failures)
 
 
-def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:
+def _show(
+    widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict, failures: dict[str, Exception]
+) -> Shown:
+    """The attributes of a widget. One whose attributes can't be made is locked and says so, whatever is
+    wrong with it: the others are shown. It is tried again after `RETRY_S`."""
+    try:
+        return show(widget, robot, now, verdict)
+    except Exception as error:
+        failures[widget.id] = error
+        return FAILED_COMMAND if isinstance(widget, Command) else FAILED, now + RETRY_S
+
+
+def _without_control(
+    questions: Iterable[Question], lock: Verdict, failures: dict[str, Exception]
+) -> dict[str, Attributes]:
     """The attributes of these commands for a client without control."""
-    others = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
-    return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in others}
+    others = (ask._replace(grounds=replace(ask.grounds, control=lock)) for ask in questions)
+    return {
+        ask.widget.id: _show(ask.widget, ask.robot, ask.now, permission(ask), failures)[0]
+        for ask in others
+    }
 
 
 def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
@@ -141,9 +174,12 @@ def update_displays(
 ) -> ViewWithDeadlines:
     """The view with these displays as of `now`; nothing else may have changed."""
     widgets, untils = dict(current.view["widgets"]), dict(current.displays)
+    failures = dict(current.failures)
     for widget in displays:
-        widgets[widget.id], untils[widget.id] = show(widget, robot, now)
-    return current._replace(view={**current.view, "widgets": widgets}, displays=untils)
+        failures.pop(widget.id, None)
+        widgets[widget.id], untils[widget.id] = _show(widget, robot, now, PERMITTED, failures)
+    view: View = {**current.view, "widgets": widgets}
+    return current._replace(view=view, displays=untils, failures=failures)
 
 
 def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:

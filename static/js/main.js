@@ -1,19 +1,33 @@
 // Connects the event stream to the page: each event updates its section of the markup.
 import { Source } from "./source.js";
 import { Presser } from "./press.js";
-import { addShow, lockWidget, setText, showAttribute } from "./show.js";
+import { addShow, lockWidget, setText, showAttribute, showFailed } from "./show.js";
 
 const body = document.body;
 const clock = document.getElementById("clock"); // shows the time of the last heartbeat
 let reconnected = false; // a snapshot has arrived after a loss, and no heartbeat after it yet
 const widgets = new Map(
-  [...document.querySelectorAll("[data-widget]")].map((root) => [root.dataset.widget, root]),
+  [...document.querySelectorAll("[data-widget]:not([data-failed])")].map((root) => [root.dataset.widget, root]),
 );
+
+// What fails in one widget shows there, and leaves the others as they are.
+function attempt(root, work) {
+  if ("failed" in root.dataset) return;
+  try {
+    work();
+  } catch (error) {
+    root.dataset.failed = "";
+    showFailed(root, body.dataset.broken);
+    console.error(`widget "${root.dataset.widget}" can not be shown`, error);
+  }
+}
 
 function showWidget(id, attributes) {
   const root = widgets.get(id);
   if (!root) return;
-  for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
+  attempt(root, () => {
+    for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
+  });
 }
 
 // A page without the bar does not require control.
@@ -79,7 +93,7 @@ function lockAll() {
     tab.dataset.state = "wait";
     setText(tab.querySelector("b"), unknown);
   }
-  for (const root of widgets.values()) lockWidget(root, lost, unknown);
+  for (const root of widgets.values()) attempt(root, () => lockWidget(root, lost, unknown));
 }
 
 // The sections of a snapshot, in the order in which they are shown. Each is an event by itself when it changes.
@@ -122,7 +136,7 @@ for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
   const roots = document.querySelectorAll(`[data-kind="${kind}"]`);
   source.load(`./kinds/${kind}.js`, ({ equip, show }) => {
     addShow(show);
-    for (const root of roots) equip?.(root, source);
+    for (const root of roots) attempt(root, () => equip?.(root, source));
   });
 }
 if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});

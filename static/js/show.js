@@ -110,6 +110,13 @@ function showInPlace(root, name, value) {
   if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
 }
 
+// Locks a widget that can't be shown, for good: what it shows is no longer updated.
+export function showFailed(root, text) {
+  for (const button of root.querySelectorAll("button")) button.disabled = true;
+  if (root.dataset.state) root.dataset.state = "unreadable";
+  for (const name of ["reason", "note"]) setText(root.querySelector(`[data-text="${name}"]`), text);
+}
+
 // Without a connection no permission is known and each value is old. Its note keeps the time of the value.
 export function lockWidget(root, lost, unknown) {
   if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="doing"]'), unknown);

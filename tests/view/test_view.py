@@ -9,9 +9,12 @@ import pytest
 from app.clock import format_time
 from app.dialect.bridge_dialect import bridge_token, server_token
 from app.dialect.endpoint import DEMO_VERSION
+from app.panel.widgets.families import BaseWidget
 from app.robot.state import RobotState, Sample
+from app.view import view as view_module
 from app.view.display_values import LONGEST_TEXT, readout, written
-from app.view.view import View, ViewContext, build_view
+from app.view.kinds import show
+from app.view.view import View, ViewContext, build_view, update_displays
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -302,3 +305,32 @@ def test_joining_shows_again_when_it_is_over(robot: RobotState) -> None:
 def test_a_readout_alone_gives_attributes_and_time(robot: RobotState) -> None:
     widget: Any = next(w for w in PANEL.widgets() if w.id == "heard")
     assert readout(widget, robot, NOW)[0]["state"] == "waiting"
+
+
+def test_a_widget_that_cannot_be_shown_leaves_the_others(
+    robot: RobotState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Displays and commands, in the whole view and in a frame of values; it is tried again."""
+    fine = build_view(PANEL, robot, NOW)
+    names = [widget.id for widget in (*PANEL.commands[:1], *PANEL.displays[:1])]
+
+    def fail(widget: BaseWidget, *parameters: Any) -> Any:
+        if widget.id in names:
+            raise ValueError(widget.id)
+        return show(widget, *parameters)
+
+    monkeypatch.setattr(view_module, "show", fail)
+    built = build_view(PANEL, robot, NOW)
+    frame = update_displays(fine, PANEL.displays, robot, NOW)
+    command, display = (built.view["widgets"][name] for name in names)
+    assert (command["enabled"], command["reason"].code) == (False, "widget_failed")
+    assert frame.view["widgets"][names[1]] == display
+    assert (display["state"], display["note"].code) == ("unreadable", "widget_failed")
+    assert set(built.failures) == set(names)
+    assert set(frame.failures) == {names[1]}
+    assert frame.displays[names[1]] == NOW + 1.0
+    for name in fine.view["widgets"].keys() - set(names):
+        assert built.view["widgets"][name] == fine.view["widgets"][name]
+    monkeypatch.undo()
+    again = update_displays(frame, PANEL.displays, robot, NOW)
+    assert (again.view, again.failures) == (fine.view, {})

@@ -45,6 +45,7 @@ def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     plain = server.http.get("/gallery")
     assert plain.status_code == 200
     assert len(re.findall("data-widget=", plain.text)) == len(EXAMPLES)
+    assert "data-failed" not in plain.text
     assert 'data-theme="light" data-text-size="normal"' in plain.text
     large = server.http.get("/gallery?theme=dark&text_size=large&hand=none").text
     assert 'data-theme="dark" data-text-size="large" data-hand="right"' in large

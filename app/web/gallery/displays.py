@@ -1,5 +1,6 @@
 """Readouts, lamps, cameras and logs in each of their states."""
 
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from app.i18n import TextLike, number, say
@@ -99,15 +100,8 @@ LOGS: Final = (
 )
 
 
-class Everyones(dict[str, list[dict[str, TextLike]]]):
-    """The same lines for every question."""
-
-    def __missing__(self, _: str) -> list[dict[str, TextLike]]:
-        said = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
-        return [
-            {"time": AT, "level": level, "word": say(f"rosout_{level}"), "node": "cell", "text": text}
-            for level, text in zip(LOG_LEVELS, said, strict=True)
-        ]
-
-
-LINES: Final = Everyones()
+MESSAGES: Final = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
+LINES: Final[Sequence[Mapping[str, TextLike]]] = [
+    {"time": AT, "level": level, "word": say(f"rosout_{level}"), "node": "cell", "text": text}
+    for level, text in zip(LOG_LEVELS, MESSAGES, strict=True)
+]

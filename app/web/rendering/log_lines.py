@@ -19,7 +19,7 @@ LEVEL_WORDS: Final = {
 RENDERED: Final = 20  # lines of a page as it is rendered
 
 
-def newest_lines(session: RobotSession, widget: LogView, language: str) -> list[dict[str, Any]]:
+def newest_lines(session: RobotSession, language: str, widget: LogView) -> list[dict[str, Any]]:
     """The newest lines of a log, as many as a rendered page has."""
     kept = session.robot.log_lines[session.robot.key(widget.topic)]
     wanted = wanted_lines(widget, widget.level, widget.node, "")

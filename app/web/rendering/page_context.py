@@ -58,6 +58,7 @@ class PageContext(TypedDict):
     locks_all: Text
     unknown: Text
     unsure: Text
+    broken: Text
     refresh_s: int
     now: int
     since: float | None
@@ -101,6 +102,7 @@ def page_context(
         locks_all=say("locks_all"),
         unknown=say("unknown"),
         unsure=say("server_unsure"),
+        broken=say("widget_failed"),
         refresh_s=refresh_s,
         now=round(now * 1000),
         since=None if RELOADED in request.query_params else round(now, 3),

@@ -4,18 +4,25 @@ A page with its own template is rendered in two steps: that template in its sand
 the usual macros, then the frame around it.
 """
 
-from collections.abc import Collection
+import logging
+from collections.abc import Collection, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from app.i18n import Text, render
+from app.i18n import Text, render, say
 from app.i18n.locales import number_in, symbols
 from app.icons import icon
 from app.panel.layout import Page
 from app.panel.screen import CLEANING_S
+from app.panel.widgets.families import BaseWidget
+
+log = logging.getLogger("kiosk.web")
+
+FAILURE: Final = say("widget_failed")
 
 
 class PageTemplates:
@@ -33,7 +40,9 @@ class PageTemplates:
         )
         self._base.globals["icon"] = icon
         self._base.globals["cleaning_s"] = CLEANING_S
+        self._base.globals["failure"] = FAILURE
         self._environments: dict[str, Environment] = {}
+        self._failing: set[str] = set()  # ids of widgets whose failure was logged
         self._own: dict[Path, Template] = {}
         if own:
             from app.panel.page_template import compile_template  # its sandbox is not needed otherwise
@@ -52,6 +61,7 @@ class PageTemplates:
                 "said": shown,
                 "number": lambda text: number_in(f"{text}", language),
                 "decimal": symbols(language).decimal,
+                "tile": partial(self._tile, language),
             }
             made.globals = {**self._base.globals, **own}
         return self._environments[language]
@@ -60,6 +70,26 @@ class PageTemplates:
         """A page for a reader of this language."""
         template = self.environment(language).get_template(name)
         return template.render(language=language, **context)
+
+    def _tile(
+        self, language: str, widget: BaseWidget, shown: Mapping[str, Any], *context: Any
+    ) -> Markup:
+        """The HTML of a widget, by the macro of its kind; a sentence in its place if that fails: no
+        widget takes the page. The failure is logged once, until the widget is rendered again."""
+        if "failed" not in shown:
+            try:
+                macros = self.environment(language).get_template(f"widgets/{widget.kind}.html").module
+                html = getattr(macros, widget.kind)(widget, shown, *context)
+            except Exception:
+                if widget.id not in self._failing:
+                    log.exception(
+                        'widget "%s" can not be rendered; the page shows the others', widget.id
+                    )
+                self._failing.add(widget.id)
+            else:
+                self._failing.discard(widget.id)
+                return Markup(html)
+        return Markup(self.environment(language).get_template("_failed.html").render(widget=widget))
 
     def inside(
         self, page: Page, pictures: Collection[str], language: str, **context: Any

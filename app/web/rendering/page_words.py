@@ -1,13 +1,13 @@
 """The words of a page, by their names in its templates, and the questions before its presses."""
 
 import time
+from functools import partial
 from typing import Any, Final, TypedDict
 
 from app.i18n import Text, say
 from app.panel.layout import Page
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
-from app.panel.widgets.log_view import LogView
 from app.panel.widgets.trend import Trend
 from app.runtime.robot_session import RobotSession
 from app.view.trend_plot import Plot, plot
@@ -59,20 +59,17 @@ class Ask(TypedDict):
 
 
 def page_words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
-    """The `words` of a page's context; `pictures` is the path of the panel's picture files."""
+    """The `words` of a page's context; `pictures` is the path of the panel's picture files. `plot` and
+    `lines` are called by the macros of trends and logs, with the widget."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
-    own |= {"asks": asks_of(session, page), "trends": trends_on(session, page)}
-    logs = (widget for widget in page.widgets if isinstance(widget, LogView))
-    own |= {"lines": {log.id: newest_lines(session, log, language) for log in logs}}
+    own |= {"asks": asks_of(session, page)}
+    own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 
-def trends_on(session: RobotSession, page: Page) -> dict[str, Plot]:
-    """The plots of the trends of a page, by the ids of their widgets."""
-    now, wall = time.monotonic(), time.time()
-    shown = (widget for widget in page.widgets if isinstance(widget, Trend))
-    return {widget.id: plot(widget, session.robot, now, wall) for widget in shown}
+def _plot_now(session: RobotSession, widget: Trend) -> Plot:
+    return plot(widget, session.robot, time.monotonic(), time.time())
 
 
 def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:

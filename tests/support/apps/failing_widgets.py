@@ -1,0 +1,27 @@
+"""The application with widgets that can't be shown, for `uvicorn
+tests.support.apps.failing_widgets:app`: a gauge above 90 has no attributes, a trend no HTML."""
+
+from typing import Any
+
+from app import main
+from app.panel.widgets.gauge import Gauge
+from app.view import kinds
+from app.web.rendering import page_words
+
+shown = kinds.SHOWN[Gauge]
+
+
+def gauge(*parameters: Any) -> kinds.Shown:
+    attributes, until = shown(*parameters)
+    if str(attributes["text"]).startswith("9"):
+        raise RuntimeError("this gauge fails")
+    return attributes, until
+
+
+def plot(*_: Any) -> Any:
+    raise RuntimeError("this plot fails")
+
+
+vars(kinds)["SHOWN"] = {**kinds.SHOWN, Gauge: gauge}
+vars(page_words)["plot"] = plot
+app = main.app
