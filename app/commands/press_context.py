@@ -14,9 +14,9 @@ from app.audit.press_record import Log, origin_of
 from app.errors import InputError
 from app.i18n import TextLike, number, say
 from app.permission.control_authority import ControlAuthority
-from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.press_permission import NO_GROUNDS, Grounds
 from app.permission.principal import Principal
+from app.permission.verdict import PERMITTED, Verdict, locked
 from app.view.publisher import ViewPublisher
 
 MAX_AHEAD_S: Final = 1.0  # tolerance for a press time in the future: rounding and drift

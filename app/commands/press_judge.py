@@ -11,8 +11,8 @@ from app.errors import Cause, PressRefused
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
-from app.permission.interlocks import Verdict
 from app.permission.press_permission import cause_of, judged
+from app.permission.verdict import Verdict
 from app.robot.state import RobotState
 
 

@@ -10,8 +10,8 @@ from app.commands.refusals import EarlyRefusals
 from app.errors import Cause, FieldError, InputError
 from app.i18n import say
 from app.panel.widgets.families import PressCommand
-from app.permission.interlocks import PERMITTED
 from app.permission.press_permission import cause_of
+from app.permission.verdict import PERMITTED
 from app.ros_logging import RobotLog
 
 

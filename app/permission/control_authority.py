@@ -14,8 +14,8 @@ from typing import Final, Literal, NamedTuple
 from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
-from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.principal import Principal
+from app.permission.verdict import PERMITTED, Verdict, locked
 
 LIFE_S: Final = 5.0  # without a keepalive; a page with scripts sends one every 1.5 s
 ASK_AGAIN_S: Final = 10.0  # after a request was denied

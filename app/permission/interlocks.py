@@ -7,53 +7,24 @@ an operator reads.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from app.dialect.endpoint import TopicRole
-from app.i18n import TextLike, joined, number, say
-from app.interfaces.names import Qos
-from app.panel.base import HasTopic
+from app.i18n import number, say
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row
-from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
+from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
 from app.permission.conditions import permits, unmet
+from app.permission.mismatches import topic_mismatch
+from app.permission.servers import call_blocked, set_blocked
+from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.command_status import IDLE
-from app.robot.graph import LiveGraph, cached_until_change
-from app.robot.parameter_state import (
-    UNKNOWN,
-    ParameterState,
-    each_text,
-    has_allowed_value,
-    panel_limits_text,
-)
 from app.robot.state import Reading, RobotState
 
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """`reason` is None when permitted; `code` is its stable name; `until` (monotonic seconds) is
-    when time alone would change the verdict. `others` are further verdicts that lock the same."""
-
-    permitted: bool
-    code: str = "permitted"
-    reason: TextLike | None = None
-    until: float = math.inf
-    others: tuple["Verdict", ...] = ()
-
-    @property
-    def reasons(self) -> list[TextLike]:
-        """All reasons of a lock, each sentence once."""
-        reasons = (one.reason for one in (self, *self.others))
-        return list(dict.fromkeys(reason for reason in reasons if reason))
-
-
-PERMITTED: Final = Verdict(True)
 # The codes of a `link_verdict` that locks.
 NO_WAY: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
@@ -63,10 +34,6 @@ MAX_ENDPOINTS: Final = 3
 
 # What comes so soon after joining may be a value of any age, sent again.
 HISTORY_S: Final = 1.0
-
-# From a server's token to routes that carry the first call: a call sent in the same millisecond was
-# lost 2 times in 30, none after 5 ms, with all on one machine.
-SERVER_SETTLE_S: Final = 0.2
 
 
 def link_verdict(robot: RobotState, now: float) -> Verdict:
@@ -187,105 +154,6 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
         low, high = number(number_text(step.min)), number(number_text(step.max))
         return locked("step_outside", value=number(f"{value:g}"), low=low, high=high)
     return verdict
-
-
-def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
-    """Why a service may not be called or a goal not be sent: no server has its name and type, or
-    a response is awaited."""
-    role, name = call.server_role, call.server_name
-    key = robot.key(name)
-    found = robot.graph.server_type(role, key)
-    if found is None:
-        return locked("no_service", name=name)
-    if found != call.type:
-        return locked("wrong_type", topic=name, found=found, wanted=call.type)
-    ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
-    if now < ready_at:
-        return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
-    known = robot.command_status.get(call.id, IDLE)
-    if not known.busy:
-        return None
-    return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
-
-
-def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
-    """Why a parameter may not be set: its node is not running or has not reported what may be set, or
-    a response is awaited."""
-    if doubt := parameters_offered(parameter.node, robot) or unsettable(
-        parameter, robot.parameters.get(parameter.id, UNKNOWN)
-    ):
-        return doubt
-    return locked("busy") if robot.command_status.get(parameter.id, IDLE).busy else None
-
-
-def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
-    """Why the parameters of a node can't be read and set, by what the graph shows."""
-    for name, wanted in (GET, DESCRIBE, SET):
-        found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
-        if found is None:
-            return locked("no_parameters", node=node)
-        if found != wanted:
-            return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
-    return None
-
-
-def unsettable(parameter: Parameter, known: ParameterState) -> Verdict | None:
-    """Why a parameter can't be set, by what its node says of it."""
-    code = {
-        "waiting": "parameter_waiting",
-        "cut": "parameter_waiting",
-        "silent": "parameter_silent",
-        "undeclared": "parameter_undeclared",
-        "mistyped": "parameter_mistyped",
-        "unreadable": "parameter_unreadable",
-    }.get(known.state)
-    node, name = parameter.node, parameter.parameter
-    if code == "parameter_silent" and known.wall == 0.0:
-        return Verdict(False, code, _silent_parameter(node, name))
-    if code is not None:
-        return locked(code, node=node, name=name, found=known.robot_type, wanted=parameter.type)
-    if known.read_only:
-        return locked("parameter_read_only", node=node, name=name)
-    if not has_allowed_value(parameter, known):
-        theirs = each_text(parameter, known.range)
-        return locked(
-            "parameter_apart", node=node, name=name, theirs=theirs, ours=panel_limits_text(parameter)
-        )
-    return None
-
-
-def _silent_parameter(node: str, name: str) -> TextLike:
-    return joined([say("parameter_silent", node=node, name=name), say("cyclone_hint")])
-
-
-def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
-    """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
-    not route it. `role` is what the panel does with it: publish ("MP") or subscribe ("MS")."""
-    return _misfit(
-        robot.graph,
-        role,
-        robot.key(of.topic),
-        of.topic,
-        of.type,
-        of.qos.wire_qos,
-    )
-
-
-@cached_until_change
-def _misfit(
-    graph: LiveGraph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
-) -> Verdict | None:
-    if found := graph.mismatched_type(role, key, type_name):
-        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
-    if code := graph.mismatched_qos(role, key, qos):
-        return locked(code, topic=topic)
-    return locked("unheard", topic=topic) if role == "MS" and graph.is_unrouted(key) else None
-
-
-@lru_cache(maxsize=256)
-def locked(code: str, **about: TextLike) -> Verdict:
-    """The verdict for a sentence; the same one again for the same."""
-    return Verdict(False, code, say(code, **about))
 
 
 # What may lock a command, beside the link and its interlocks: a check for each family of widgets.

@@ -14,16 +14,9 @@ from app.errors import Cause
 from app.i18n import TextLike
 from app.panel.interlock import Interlock
 from app.panel.widgets.families import Command
-from app.permission.interlocks import (
-    NO_WAY,
-    PERMITTED,
-    Verdict,
-    command_blocked,
-    interlock_verdict,
-    link_verdict,
-    locked,
-)
+from app.permission.interlocks import NO_WAY, command_blocked, interlock_verdict, link_verdict
 from app.permission.principal import Principal
+from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.state import RobotState
 
 

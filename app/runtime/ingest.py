@@ -17,7 +17,8 @@ from app.dialect.endpoint import Endpoint
 from app.interfaces import names
 from app.panel.model import Panel
 from app.panel.widgets.parameter import EVENTS
-from app.permission.interlocks import Verdict, interlock_verdict
+from app.permission.interlocks import interlock_verdict
+from app.permission.verdict import Verdict
 from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token

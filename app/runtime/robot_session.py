@@ -21,7 +21,8 @@ from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.trend import trends_of
 from app.permission.control_authority import ControlAuthority
-from app.permission.interlocks import Verdict, link_verdict, locked
+from app.permission.interlocks import link_verdict
+from app.permission.verdict import Verdict, locked
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog

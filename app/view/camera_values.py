@@ -6,7 +6,7 @@ from typing import Any
 from app.clock import age_changes_at, format_age, format_time
 from app.i18n import say
 from app.panel.widgets.camera import Camera
-from app.permission.interlocks import topic_mismatch
+from app.permission.mismatches import topic_mismatch
 from app.robot.state import RobotState
 
 

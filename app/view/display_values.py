@@ -13,7 +13,7 @@ from app.panel.base import HasTopic, TopicQos
 from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, LampState, Readout, WrittenNumber
 from app.panel.widgets.families import Display
-from app.permission.interlocks import topic_mismatch
+from app.permission.mismatches import topic_mismatch
 from app.printable import printable
 from app.robot.state import Reading, RobotState
 

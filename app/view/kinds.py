@@ -21,7 +21,7 @@ from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
-from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.verdict import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
 from app.view.camera_values import camera

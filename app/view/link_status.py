@@ -14,7 +14,9 @@ from app.clock import format_datetime
 from app.i18n import Text, TextLike, number, say
 from app.i18n.values import longest
 from app.panel.model import Panel
-from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, topic_mismatch
+from app.permission.interlocks import NO_WAY
+from app.permission.mismatches import topic_mismatch
+from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
 
 State = Literal["ok", "wait", "bad"]

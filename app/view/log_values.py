@@ -5,7 +5,7 @@ from typing import Any
 
 from app.i18n import say
 from app.panel.widgets.log_view import LogView
-from app.permission.interlocks import topic_mismatch
+from app.permission.mismatches import topic_mismatch
 from app.robot.state import RobotState
 
 

@@ -7,7 +7,7 @@ from app.clock import format_time
 from app.i18n import Text, TextLike, say
 from app.panel.number_range import decimal_text
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, MAX_TEXT, Parameter, Scalar, Value
-from app.permission.interlocks import parameters_offered
+from app.permission.servers import parameters_offered
 from app.printable import printable
 from app.robot.parameter_state import (
     MAX_LIST_LENGTH,

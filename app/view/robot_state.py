@@ -5,7 +5,7 @@ from functools import cache
 from typing import Final, Literal, TypedDict
 
 from app.i18n import TextLike, say
-from app.permission.interlocks import Verdict
+from app.permission.verdict import Verdict
 
 FORBIDDEN: Final = frozenset({"forbidden", "unmet"})
 

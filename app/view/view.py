@@ -14,8 +14,9 @@ from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import for_role as control_for_role
-from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
+from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import NO_GROUNDS, Grounds, Question, permission
+from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
 from app.view.kinds import Attributes, Enabled, Shown, enabled, show
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary

@@ -14,7 +14,7 @@ from app.errors import LinkError
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.service_action import Action, Call
-from app.permission.interlocks import call_blocked
+from app.permission.servers import call_blocked
 from app.robot.command_status import CommandStatus, Outcome
 from app.robot.state import RobotState, Sample
 from tests.support.builders import BRIDGE, INTERFACES, FakeTransport, panel_of, robot_there

@@ -19,9 +19,9 @@ from app.panel.model import Panel
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ControlAuthority
-from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.press_permission import Grounds
 from app.permission.principal import Principal
+from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,

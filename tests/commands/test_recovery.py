@@ -19,7 +19,7 @@ from app.commands.actions.results import RESULT_S
 from app.commands.service_calls import LATE_S, MAX_UNANSWERED
 from app.dialect import bridge_dialect
 from app.errors import LogError
-from app.permission.interlocks import call_blocked
+from app.permission.servers import call_blocked
 from app.robot.command_status import IDLE
 from tests.commands.test_calls_and_goals import COUNT, Bench, queried, sample_of, tell_states
 from tests.support.builders import BRIDGE, INTERFACES

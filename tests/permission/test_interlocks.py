@@ -11,14 +11,10 @@ from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
-from app.permission.interlocks import (
-    SERVER_SETTLE_S,
-    Verdict,
-    interlock_verdict,
-    link_verdict,
-    locked,
-)
+from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import judged
+from app.permission.servers import SERVER_SETTLE_S
+from app.permission.verdict import Verdict, locked
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,

@@ -7,7 +7,6 @@ import pytest
 
 from app.commands.holds.receipts import ActiveHold
 from app.permission import press_permission
-from app.permission.interlocks import PERMITTED, Verdict
 from app.permission.press_permission import (
     CHECKS,
     Check,
@@ -18,6 +17,7 @@ from app.permission.press_permission import (
     judged,
     permission,
 )
+from app.permission.verdict import PERMITTED, Verdict
 from app.view.view import build_view
 from tests.commands.test_calls_and_goals import CALL
 from tests.commands.test_holds import Bench as HoldBench

@@ -7,8 +7,8 @@ import pytest
 from app.i18n import joined, say
 from app.panel.model import Panel
 from app.permission.control_authority_view import NO_CONTROL, ControlView
-from app.permission.interlocks import PERMITTED, Verdict
 from app.permission.press_permission import combined, judged
+from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
 from app.view.view import ViewContext, build_view, for_role
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS

@@ -14,7 +14,8 @@ from app.commands.service_calls import ServiceCalls
 from app.dialect.bridge_dialect import token
 from app.dialect.endpoint import Endpoint
 from app.interfaces.names import Qos
-from app.permission.interlocks import Verdict, interlock_verdict
+from app.permission.interlocks import interlock_verdict
+from app.permission.verdict import Verdict
 from app.robot.silent_publishers import TOKEN_DELAY_LATCHED_S, TOKEN_DELAY_S, SilentPublishers
 from app.robot.state import RobotState
 from app.runtime.ingest import Ingest

@@ -11,7 +11,7 @@ from app.interfaces.names import Qos
 from app.panel.model import Panel
 from app.panel.number_range import Range
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
-from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.verdict import PERMITTED, Verdict
 from app.robot.parameter_state import ParameterState
 from app.robot.state import RobotState
 from app.settings import PACKAGE

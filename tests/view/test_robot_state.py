@@ -4,7 +4,7 @@ from typing import Final
 
 import pytest
 
-from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.verdict import PERMITTED, Verdict
 from app.view.robot_state import robot_word
 from tests.support.words import english
 

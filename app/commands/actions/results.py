@@ -13,7 +13,7 @@ from app.commands.service_calls import LATE_S, with_fields, with_reply
 from app.concurrency import spawn_logged
 from app.errors import LinkError
 from app.i18n import TextLike, number, say
-from app.permission.interlocks import SERVER_SETTLE_S
+from app.permission.servers import SERVER_SETTLE_S
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog

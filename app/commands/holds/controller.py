@@ -25,8 +25,8 @@ from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.template import needed_inputs
 from app.panel.widgets.hold import HoldCommand
-from app.permission.interlocks import Verdict
 from app.permission.press_permission import cause_of, judged
+from app.permission.verdict import Verdict
 from app.robot.state import RobotState
 
 

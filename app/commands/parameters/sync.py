@@ -27,7 +27,7 @@ from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
-from app.permission.interlocks import SERVER_SETTLE_S, parameters_offered
+from app.permission.servers import SERVER_SETTLE_S, parameters_offered
 from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.parameter_state import read_parameter_state
 from app.robot.state import RobotState, Sample

@@ -1,0 +1,32 @@
+"""Why a topic can't be used, by what the graph shows of it. Pure."""
+
+from app.dialect.endpoint import TopicRole
+from app.interfaces.names import Qos
+from app.panel.base import HasTopic
+from app.permission.verdict import Verdict, locked
+from app.robot.graph import LiveGraph, cached_until_change
+from app.robot.state import RobotState
+
+
+def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
+    """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
+    not route it. `role` is what the panel does with it: publish ("MP") or subscribe ("MS")."""
+    return _misfit(
+        robot.graph,
+        role,
+        robot.key(of.topic),
+        of.topic,
+        of.type,
+        of.qos.wire_qos,
+    )
+
+
+@cached_until_change
+def _misfit(
+    graph: LiveGraph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+) -> Verdict | None:
+    if found := graph.mismatched_type(role, key, type_name):
+        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
+    if code := graph.mismatched_qos(role, key, qos):
+        return locked(code, topic=topic)
+    return locked("unheard", topic=topic) if role == "MS" and graph.is_unrouted(key) else None

@@ -1,0 +1,35 @@
+"""What permission is judged to be: permitted, or locked with a reason."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+from app.i18n import TextLike, say
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """`reason` is None when permitted; `code` is its stable name; `until` (monotonic seconds) is
+    when time alone would change the verdict. `others` are further verdicts that lock the same."""
+
+    permitted: bool
+    code: str = "permitted"
+    reason: TextLike | None = None
+    until: float = math.inf
+    others: tuple["Verdict", ...] = ()
+
+    @property
+    def reasons(self) -> list[TextLike]:
+        """All reasons of a lock, each sentence once."""
+        reasons = (one.reason for one in (self, *self.others))
+        return list(dict.fromkeys(reason for reason in reasons if reason))
+
+
+PERMITTED: Final = Verdict(True)
+
+
+@lru_cache(maxsize=256)
+def locked(code: str, **about: TextLike) -> Verdict:
+    """The verdict for a sentence; the same one again for the same."""
+    return Verdict(False, code, say(code, **about))
