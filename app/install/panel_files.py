@@ -13,7 +13,7 @@ from typing import Any, Final
 from app.errors import SettingsError
 from app.install.files import write
 from app.install.host import Host
-from app.interfaces.packages import package_files
+from app.interfaces.package_folders import package_files
 
 OF_PAGES: Final = ("template", "styles")
 

@@ -29,10 +29,11 @@ EXPECTED: Final = (
 
 
 class Key(NamedTuple):
-    """Selects an element of a list by the value of one of its fields, or of a list beside it."""
+    """Selects an element of a list by the value of one of its fields, or of a list beside it. The value
+    is a text, as in a path, until its type is known."""
 
     path: str
-    value: str
+    value: str | int
 
 
 Step = str | int | Key

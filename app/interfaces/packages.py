@@ -1,21 +1,20 @@
-"""Reads interface definitions from folders of ROS packages. The only module of this room that reads
-files."""
+"""Reads interface definitions from folders of ROS packages."""
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Final
 
 from app.errors import InterfaceError
 from app.interfaces.definitions import Definitions, Structure, interface_name
 from app.interfaces.derived_types import EVENT_INFO
-from app.interfaces.parsing import KINDS, parse_definition
-
-_PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
-# Where a folder has packages: itself, its subfolders, `share` of a merged install folder, and `share`
-# of each package in an isolated one.
-_PLACES: Final = (".", "*", "share/*", "*/share/*")
+from app.interfaces.package_folders import (
+    definition_files,
+    find_idl_only,
+    idl_hint,
+    package_name,
+    packages,
+)
+from app.interfaces.parsing import parse_definition
 
 
 def read_folders(folders: Sequence[Path]) -> Definitions:
@@ -26,81 +25,16 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
     """
     found = Definitions()
     for folder in folders:
-        packages = list(_packages(folder))
-        if not packages:
+        in_it = list(packages(folder))
+        if not in_it:
             why = "has no interfaces: they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
             hint = "".join(f"; {idl_hint(file)}" for file in list(find_idl_only([folder]).values())[:1])
             raise InterfaceError(f"{folder} {why}{hint}", folder)
-        for package in packages:
-            name = _package_name(package)
-            for file in _files(package):
+        for package in in_it:
+            name = package_name(package)
+            for file in definition_files(package):
                 _add_file(found, file, name)
     return found.excluding(found.unusable)
-
-
-def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
-    """(path, mtime in ns, size) of each file of the folders; differs when a file has changed."""
-    files = [file for folder in folders for package in _packages(folder) for file in _files(package)]
-    return tuple((file, *_mtime_and_size(file)) for file in files)
-
-
-def package_files(folder: Path) -> list[Path]:
-    """The files of a folder by which its packages are known: their definitions and package.xml."""
-    return [
-        file
-        for package in _packages(folder)
-        for file in (*_files(package), package / "package.xml")
-        if file.is_file()
-    ]
-
-
-def _mtime_and_size(file: Path) -> tuple[int, int]:
-    try:
-        about = file.stat()
-    except OSError:  # reading it will raise the error
-        return 0, 0
-    return about.st_mtime_ns, about.st_size
-
-
-def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
-    """Type → file of the interfaces that exist as `.idl` only."""
-    found = {}
-    for place in (place for folder in folders for place in _places(folder)):
-        for kind in KINDS:
-            for file in sorted((place / kind).glob("*.idl")):
-                if not file.with_suffix(f".{kind}").is_file():
-                    found[f"{_package_name(place)}/{kind}/{file.stem}"] = file
-    return found
-
-
-def idl_hint(file: Path) -> str:
-    """The message about an interface that exists as `.idl` only."""
-    return f"{file} is not read, as no .idl is: put {file.stem}.{file.parent.name} beside it"
-
-
-def _places(folder: Path) -> Iterator[Path]:
-    for place in _PLACES:
-        yield from [folder] if place == "." else sorted(folder.glob(place))
-
-
-def _packages(folder: Path) -> Iterator[Path]:
-    for package in _places(folder):
-        if any((package / kind).is_dir() for kind in KINDS) and any(_files(package)):
-            yield package
-
-
-def _files(package: Path) -> Iterator[Path]:
-    for kind in KINDS:
-        yield from sorted((package / kind).glob(f"*.{kind}"))
-
-
-def _package_name(package: Path) -> str:
-    """The package's name from its package.xml, else from its folder."""
-    try:
-        match = _PACKAGE_NAME.search((package / "package.xml").read_text())
-    except (OSError, UnicodeDecodeError):
-        match = None
-    return match[1] if match else package.resolve().name
 
 
 def _read_file(file: Path, package: str) -> Definitions:

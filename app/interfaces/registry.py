@@ -15,14 +15,16 @@ from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import Definitions, Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
 from app.interfaces.distributions import read_distribution
+from app.interfaces.field_path import Step
 from app.interfaces.mcap_schema import definition_text
-from app.interfaces.packages import (
+from app.interfaces.package_folders import (
     file_stamps,
     find_idl_only,
+    find_unread,
     idl_hint,
-    read_folders,
-    usable_definitions,
+    unread_hint,
 )
+from app.interfaces.packages import read_folders, usable_definitions
 from app.interfaces.type_hash import type_hash
 from app.interfaces.validation import Check, field_check, message_check
 
@@ -52,6 +54,7 @@ class Interfaces:
         if described.structures:
             known = known | described
         self._distro = distro
+        self._folders = tuple(folders)
         self._idl_only = find_idl_only(folders)
         self._definitions = (
             usable_definitions(read_folders(folders) | described, known, self._idl_only)
@@ -111,6 +114,11 @@ class Interfaces:
         """The same as `Type`; InterfaceError if the type has no such field."""
         self.require(type_name)
         return self._resolver.type_at(type_name, path)
+
+    def typed_steps(self, type_name: str, path: str) -> tuple[Step, ...]:
+        """The steps of a path, whose keys have the values that a message has: 5, not "5"."""
+        self.require(type_name)
+        return self._resolver.typed_steps(type_name, path)
 
     def field_reader(self, type_name: str, paths: Iterable[str]) -> FieldReader:
         """A reader of the fields at these paths, which skips the rest of each message.
@@ -198,7 +206,10 @@ class Interfaces:
         if (cause := self.unusable.get(interface_name(name))) is not None:
             return InterfaceError(f'"{name}" can\'t be used: {cause}', cause.source)
         if name in self._idl_only:
-            return InterfaceError(f'"{name}" is not there: {idl_hint(self._idl_only[name])}')
+            hint = idl_hint(self._idl_only[name], name.split("/")[1])
+            return InterfaceError(f'"{name}" is not there: {hint}')
+        if (file := find_unread(self._folders, name)) is not None:
+            return InterfaceError(f'"{name}" is not there: {unread_hint(file)}')
         why = f'"{name}" is not {what} of ROS 2 {self._distro}'
         every, package = [*known, *self.unusable], name.partition("/")[0]
         if near := _suggestions(name, every):

@@ -118,7 +118,7 @@ def _topic(fields: PanelFields, topic: str, type_name: str, shown: Sequence[Show
 def _message(fields: PanelFields, topic: str, type_name: str) -> Message:
     """Messages with the names that the panel looks for, and what `[demo]` fixes."""
     keys = [step for path in fields.paths.get(topic, ()) for step in path_steps(path)]
-    wanted = [step.value for step in keys if isinstance(step, Key) and step.path == "name"]
+    wanted = [str(step.value) for step in keys if isinstance(step, Key) and step.path == "name"]
     base = plausible(type_name, fields.interfaces, dict.fromkeys(wanted))
     over = fields.entry(topic).message
     return (lambda moment: merged(base(moment), over)) if over else base

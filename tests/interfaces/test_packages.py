@@ -11,6 +11,7 @@ from app.errors import FieldError, InterfaceError
 from app.interfaces import DISTROS, Interfaces, load_interfaces
 from app.interfaces.definitions import Type
 from app.interfaces.distributions import BUILTIN
+from app.interfaces.package_folders import file_stamps, package_files
 from app.interfaces.packages import read_folders
 
 Make = Callable[[Mapping[str, str]], Path]
@@ -120,6 +121,48 @@ def test_a_folder_may_be_a_package_or_have_packages(make: Make, tmp_path: Path, 
 def test_a_package_is_named_by_its_package_xml(make: Make) -> None:
     folder = make({"cell/msg/Lamp.msg": "bool on", "cell/package.xml": "<name> cell_msgs </name>"})
     Interfaces("jazzy", [folder]).require("cell_msgs/msg/Lamp")
+
+
+PACKAGE_XML = "<package><name>cell_msgs</name></package>"
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "cell_msgs/arm/Move.srv",  # as rosidl installs srv/arm/Move.srv
+        "cell_msgs/srv/arm/Move.srv",
+        "cell_msgs/operation_mode/srv/Move.srv",
+        "cell_msgs/arm/left/srv/Move.srv",
+    ],
+)
+@pytest.mark.parametrize("place", ["", "cell_msgs"])
+def test_an_interface_may_be_in_any_folder_of_its_package(make: Make, file: str, place: str) -> None:
+    folder = make(
+        {file: "uint8 mode\n---\nbool ok", "cell_msgs/package.xml": PACKAGE_XML, "std/msg/A.msg": ""}
+    )
+    cell = Interfaces("jazzy", [folder / place])
+    cell.service_types("cell_msgs/srv/Move")
+    assert not [name for name in cell.structures if name.startswith("operation_mode/")]
+    assert any(file in str(path) for path, *_ in file_stamps([folder]))
+    assert [path for path in package_files(folder) if path.suffix == ".srv"] == [folder / file]
+
+
+def test_of_two_files_of_a_type_the_one_in_the_usual_folder_counts(make: Make) -> None:
+    files = {"cell_msgs/msg/A.msg": "int8 a", "cell_msgs/test/A.msg": "int8 b"}
+    folder = make(files | {"cell_msgs/package.xml": PACKAGE_XML, "other/test/A.msg": "int8 c"})
+    assert Interfaces("jazzy", [folder]).field_type("cell_msgs/msg/A", "a") == "int8"
+
+
+def test_a_file_that_is_in_no_package_is_named_with_what_helps(make: Make) -> None:
+    folder = make({"cell_msgs/arm/Move.srv": "---\n", "cell_msgs/modes/msg/A.msg": "", **CELL})
+    cell = Interfaces("jazzy", [folder])
+    for ask, name, file in (
+        (cell.service_types, "cell_msgs/srv/Move", "cell_msgs/arm/Move.srv"),
+        (Interfaces("jazzy", [folder / "cell_msgs/modes"]).require, "cell_msgs/msg/A", "msg/A.msg"),
+    ):
+        why = f'"{name}" is not there: .*{file} is not read as this type: its package needs a package'
+        with pytest.raises(InterfaceError, match=why):
+            ask(name)
 
 
 def test_packages_may_need_each_other_in_any_order(make: Make) -> None:

@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import pytest
 
-from app.interfaces.field_path import path_steps
 from app.simulator.values.clock_picture import SIZE
 from app.simulator.values.guesses import ANYTHING, span_of
 from app.simulator.values.known_types import KNOWN, Fields, Moment
@@ -84,6 +83,8 @@ def test_a_quaternion_is_of_length_1() -> None:
         (JOINTS, "position[name=gripper]", 1.5),
         ("diagnostic_msgs/msg/DiagnosticArray", "status[name='drive: motor'].level", 2),
         ("tf2_msgs/msg/TFMessage", "transforms[header.frame_id=map].child_frame_id", "odom"),
+        ("visualization_msgs/msg/MarkerArray", "markers[id=5].text", "door"),
+        ("visualization_msgs/msg/MarkerArray", "markers[type=CUBE].ns", "door"),
         ("geometry_msgs/msg/PoseWithCovariance", "covariance[35]", 0.5),
         ("nav_msgs/msg/Path", "poses[4].pose.position.y", -2.0),
     ],
@@ -91,7 +92,7 @@ def test_a_quaternion_is_of_length_1() -> None:
 def test_a_value_is_put_where_its_path_says(type_name: str, path: str, value: Any) -> None:
     fields = made(type_name)
     put(fields, type_name, path, value, STRUCTURES)
-    assert get(fields, path_steps(path)) == value
+    assert get(fields, INTERFACES.typed_steps(type_name, path)) == value
     payload = INTERFACES.encode(type_name, fields)
     assert INTERFACES.field_reader(type_name, [path]).read(payload).get(path) == value
 

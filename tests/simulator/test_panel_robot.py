@@ -107,6 +107,7 @@ def test_scale_and_offset_lead_to_the_unit(loaded: Loaded) -> None:
     [
         ("sensor_msgs/msg/JointState", "position[name=axis_3]"),
         ("diagnostic_msgs/msg/DiagnosticArray", "status[name='drive: motor'].message"),
+        ("visualization_msgs/msg/MarkerArray", "markers[id=5].text"),
         ("std_msgs/msg/Float64MultiArray", "data[11]"),
         ("nav_msgs/msg/Odometry", "pose.pose.position.x"),
         ("std_msgs/msg/String", "data"),

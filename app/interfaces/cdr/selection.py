@@ -1,6 +1,6 @@
 """The selected fields of a message: paths resolved against a type, as a tree."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 from app.errors import FieldError, InterfaceError
 from app.interfaces.cdr.formats import LENGTH_BYTES
 from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Structure, Type
-from app.interfaces.field_path import Key, path_steps
+from app.interfaces.field_path import Key, Step, path_steps
 from app.interfaces.parsing import BOOLS
 from app.interfaces.validation import scalar_check
 
@@ -72,36 +72,53 @@ class Resolver:
         """The type of the field at a path."""
         return self._add_path(Selection(), Type(type_name), path)
 
+    def typed_steps(self, type_name: str, path: str) -> tuple[Step, ...]:
+        """The steps of a path, whose keys have the values that a message has: 5, not "5"."""
+        return tuple(step for step, _, _ in self._steps(Type(type_name), path))
+
     def _add_path(self, root: Selection, whole: Type, path: str) -> Type:
-        node, at, around = root, whole, whole
-        for step in path_steps(path):
+        node, at = root, whole
+        for step, beside, after in self._steps(whole, path):
             match step:
                 case Key():
-                    node = self._select_by_key(node, at, around, step, path)
-                    at = at.element
+                    chosen = node.by_sibling if beside else node.by_field
+                    node = chosen.setdefault(step.path, {}).setdefault(step.value, Selection())
                 case str():
-                    around, at = at, self._field_type(at, step, path)
                     node = node.fields.setdefault(step, Selection())
                 case _:
-                    at = _element_type(at, step, path)
                     node = node.by_index.setdefault(step, Selection())
+            at = after
         node.paths.append(path)
         return at
 
-    def _select_by_key(self, node: Selection, at: Type, around: Type, key: Key, path: str) -> Selection:
+    def _steps(self, whole: Type, path: str) -> Iterator[tuple[Step, bool, Type]]:
+        """(step, whether it is a key of a list beside the list, type behind it)."""
+        at, around = whole, whole
+        for step in path_steps(path):
+            beside = False
+            match step:
+                case Key():
+                    step, beside = self._typed_key(at, around, step, path)
+                    at = at.element
+                case str():
+                    around, at = at, self._field_type(at, step, path)
+                case _:
+                    at = _element_type(at, step, path)
+            yield step, beside, at
+
+    def _typed_key(self, at: Type, around: Type, key: Key, path: str) -> tuple[Key, bool]:
+        """The key with its value's type, and whether it is of a list beside the list."""
         if at.container == "one":
             raise InterfaceError(f'there is no [{key.path}=…] (in "{path}"): {at} is not a list')
         kind = self._key_type(at.element, key.path)
         if kind is not None:
-            value = self._key_value(key, kind, at.name, path)
-            return node.by_field.setdefault(key.path, {}).setdefault(value, Selection())
+            return Key(key.path, self._key_value(key, kind, at.name, path)), False
         kind = next((o.type for o in self._fields(around) if o.name == key.path), None)
         if kind is None or kind.container == "one":
             raise InterfaceError(
                 f'there is no "{key.path}" (in "{path}"): {self._known_fields_text(at, around)}'
             )
-        value = self._key_value(key, kind.element, around.name, path)
-        return node.by_sibling.setdefault(key.path, {}).setdefault(value, Selection())
+        return Key(key.path, self._key_value(key, kind.element, around.name, path)), True
 
     def _key_type(self, element: Type, path: str) -> Type | None:
         """The type of a field of an element; None if it does not exist."""
@@ -118,17 +135,18 @@ class Resolver:
         what = f'"{key.path}" (in "{path}") is {kind}'
         if kind.is_nested or kind.container != "one" or kind.name in FLOAT_TYPES:
             raise InterfaceError(f"{what}: a key is a text, a whole number or a bool")
+        text = str(key.value)
         if kind.name in STRING_TYPES:
-            return key.value
+            return text
         constants = self._structures[holder].constants
-        found = BOOLS.get(key.value) if kind.name == "bool" else constants.get(key.value)
+        found = BOOLS.get(text) if kind.name == "bool" else constants.get(text)
         if found is None and kind.name != "bool":
-            found = int(key.value) if key.value.lstrip("-").isdecimal() else key.value
+            found = int(text) if text.lstrip("-").isdecimal() else text
         try:
             return scalar_check(kind)(found)
         except FieldError as error:
             has = f"; constants of {holder}: {', '.join(constants)}" if constants else ""
-            raise InterfaceError(f'{what}, and "{key.value}" is none: {error.message}{has}') from None
+            raise InterfaceError(f'{what}, and "{text}" is none: {error.message}{has}') from None
 
     def _fields(self, kind: Type) -> Iterable[Any]:
         return self._structures[kind.name].fields if kind.is_nested and kind.container == "one" else ()

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from app.interfaces import INTEGER_RANGES, Interfaces, parent_path
 from app.interfaces.definitions import FLOAT_TYPES
-from app.interfaces.field_path import field_name, path_steps
+from app.interfaces.field_path import field_name
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
@@ -61,7 +61,9 @@ class PanelFields:
         """The fields that have another value than `message` gives them."""
         fixed_by_table = self.entry(topic).message
         paths = (
-            one for one in self.paths.get(topic, ()) if get(fixed_by_table, path_steps(one)) is None
+            one
+            for one in self.paths.get(topic, ())
+            if get(fixed_by_table, self.interfaces.typed_steps(type_name, one)) is None
         )
         made = (_Field(self, topic, type_name, path, shown, message).made() for path in paths)
         return [one for one in made if one is not None]
@@ -195,7 +197,7 @@ class _Field:
         """The values that it has as a field of a type whose fields belong together; none elsewhere."""
         if self._parent not in KNOWN and self._type not in KNOWN:
             return []
-        steps = path_steps(self._path)
+        steps = self._of.interfaces.typed_steps(self._type, self._path)
         found = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
         return list(dict.fromkeys(value for value in found if value is not None))
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.interfaces import Structure, Type
+from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import zero_value
 from app.interfaces.field_path import Key, Step, path_steps
 
@@ -16,7 +17,13 @@ Structures = Mapping[str, Structure]
 
 def put(fields: Fields, type_name: str, path: str, value: Any, structures: Structures) -> None:
     """Sets one field of a message of a type."""
-    _put(fields, structures[type_name], path_steps(path), value, structures)
+    _put(
+        fields,
+        structures[type_name],
+        Resolver(structures).typed_steps(type_name, path),
+        value,
+        structures,
+    )
 
 
 def _put(
@@ -53,7 +60,7 @@ def _index(
                 return number
         index = 0 if kind.container == "array" else len(items)
         items[index : index + 1] = [{}]
-        put(items[index], kind.name, step.path, step.value, of)
+        _put(items[index], of[kind.name], path_steps(step.path), step.value, of)
         return index
     if not any(one.name == first for one in structure.fields):
         return 0

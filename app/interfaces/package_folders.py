@@ -1,0 +1,156 @@
+"""Finds ROS packages in folders, and the files of their interfaces."""
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from app.interfaces.parsing import KINDS
+
+_PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+PACKAGE_XML: Final = "package.xml"
+# Where a folder has packages: itself, its subfolders, `share` of a merged install folder, and `share`
+# of each package in an isolated one.
+_PLACES: Final = (".", "*", "share/*", "*/share/*")
+DEEPEST: Final = 4  # folders from a package to its interfaces
+DEEPEST_UNREAD: Final = 6  # folders from a folder of the panel to a file that is not read
+_SUFFIXES: Final = tuple(f".{kind}" for kind in KINDS)
+
+
+def packages(folder: Path) -> Iterator[Path]:
+    """The packages that have interfaces: folders with a package.xml, and others with a folder `msg`,
+    `srv` or `action`."""
+    for package in _places(folder):
+        if any(definition_files(package)):
+            yield package
+
+
+def definition_files(package: Path) -> Iterator[Path]:
+    """The files of a package's interfaces: those in its `msg`, `srv` and `action`, then those in other
+    folders. Of a type that is in `msg` and elsewhere too, that in `msg`.
+
+    rosidl installs a package's `srv/arm/Move.srv` as `arm/Move.srv`; both are the type
+    `<package>/srv/Move`.
+    """
+    usual: set[str] = set()
+    for kind in KINDS:
+        for file in sorted((package / kind).glob(f"*.{kind}")):
+            usual.add(file.name)
+            yield file
+    for file in _deeper_files(package, _SUFFIXES):
+        if file.name not in usual:
+            yield file
+
+
+def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
+    """(path, mtime in ns, size) of each file of the folders; differs when a file has changed."""
+    files = [file for folder in folders for each in packages(folder) for file in definition_files(each)]
+    return tuple((file, *_mtime_and_size(file)) for file in files)
+
+
+def package_files(folder: Path) -> list[Path]:
+    """The files of a folder by which its packages are known: their definitions and package.xml."""
+    return [
+        file
+        for package in packages(folder)
+        for file in (*definition_files(package), package / PACKAGE_XML)
+        if file.is_file()
+    ]
+
+
+def package_name(package: Path) -> str:
+    """The package's name from its package.xml, else from its folder."""
+    try:
+        match = _PACKAGE_NAME.search((package / PACKAGE_XML).read_text())
+    except (OSError, UnicodeDecodeError):
+        match = None
+    return match[1] if match else package.resolve().name
+
+
+def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
+    """Type → file of the interfaces that exist as `.idl` only."""
+    found = {}
+    for package in (place for folder in folders for place in _places(folder)):
+        for file in _idl_files(package):
+            if not any(file.with_suffix(suffix).is_file() for suffix in _SUFFIXES):
+                for kind in [file.parent.name] if file.parent.name in KINDS else KINDS:
+                    found[f"{package_name(package)}/{kind}/{file.stem}"] = file
+    return found
+
+
+def idl_hint(file: Path, kind: str = "") -> str:
+    """The message about an interface that exists as `.idl` only."""
+    return f"{file} is not read, as no .idl is: put {file.stem}.{kind or file.parent.name} beside it"
+
+
+def find_unread(folders: Sequence[Path], type_name: str) -> Path | None:
+    """A file below a folder of the package's name, of which this type was expected."""
+    package, _, rest = type_name.partition("/")
+    kind, _, stem = rest.partition("/")
+    for folder in folders if kind in KINDS else ():
+        for file in _walk(folder, (f".{kind}",), DEEPEST_UNREAD, into_packages=True):
+            if file.stem == stem and package in file.resolve().parts:
+                return file
+    return None
+
+
+def unread_hint(file: Path) -> str:
+    """The message about a file that is in no package."""
+    kind = file.suffix[1:]
+    where = f"its package needs a {PACKAGE_XML}, or the file must be in <package>/{kind}"
+    return f"{file} is not read as this type: {where}"
+
+
+def _mtime_and_size(file: Path) -> tuple[int, int]:
+    try:
+        about = file.stat()
+    except OSError:  # reading it will raise the error
+        return 0, 0
+    return about.st_mtime_ns, about.st_size
+
+
+def _places(folder: Path) -> Iterator[Path]:
+    """The folders that are packages. A folder in a package with a package.xml is a part of it, unless
+    it has one too."""
+    known: set[Path] = set()
+    for pattern in _PLACES:
+        for place in [folder] if pattern == "." else sorted(folder.glob(pattern)):
+            if (place / PACKAGE_XML).is_file():
+                known.add(place)
+                yield place
+            elif known.isdisjoint(place.parents) and any((place / kind).is_dir() for kind in KINDS):
+                yield place
+
+
+def _deeper_files(package: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
+    """Files below a package: anywhere with a package.xml, else below `msg`, `srv` and `action`."""
+    if (package / PACKAGE_XML).is_file():
+        yield from _walk(package, suffixes, DEEPEST)
+    else:
+        for kind in KINDS:
+            yield from _walk(package / kind, suffixes, DEEPEST - 1)
+
+
+def _idl_files(package: Path) -> Iterator[Path]:
+    return _deeper_files(package, (".idl",))
+
+
+def _walk(
+    folder: Path, suffixes: tuple[str, ...], deepest: int, *, into_packages: bool = False
+) -> Iterator[Path]:
+    """The files with one of these suffixes in a folder and `deepest` folders below it, by name; those
+    of another package only if asked for."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in sorted(entries, key=lambda one: one.name):
+            path = Path(entry.path)
+            if entry.name.endswith(suffixes) and entry.is_file():
+                yield path
+            elif (
+                deepest
+                and not entry.name.startswith(".")
+                and entry.is_dir()
+                and (into_packages or not (path / PACKAGE_XML).is_file())
+            ):
+                yield from _walk(path, suffixes, deepest - 1, into_packages=into_packages)
