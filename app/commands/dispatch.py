@@ -14,12 +14,13 @@ from app.errors import InputError, NotFound
 from app.i18n import ENGLISH, TextLike, number, say
 from app.i18n.locales import number_from
 from app.interfaces import Interfaces
+from app.panel.constants import resolve_at
 from app.panel.model import Panel
 from app.panel.template import add_now, fill, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.publish import PublishPress
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.step import Step
 from app.permission.interlocks import reported_value
@@ -73,6 +74,7 @@ class Dispatcher:
             id: input_ids(w) for id, w in self._widgets.items() if isinstance(w, PressCommand)
         }
         self._interfaces = interfaces
+        self._types = panel.subscriptions()
         self._robot = robot
         self._transport = transport
         self._calls = trackers.calls
@@ -169,12 +171,17 @@ class Dispatcher:
     async def _publish(self, widget: PublishPress, going: Outgoing) -> Outcome:
         if widget.confirm is None:
             return await self._until_flushed(widget, self._put(widget, going.fields, going.final_check))
-        equals = fill(widget.confirm.equals, going.values)
+        equals = self._expected(widget.confirm, going.values)
         since = self._monotonic()
         answer = self._put(widget, going.fields, going.final_check)
         return await self._confirmations.wait(
             widget, equals, going.press_id, since, answer.text, going.correct
         )
+
+    def _expected(self, confirm: Confirm, values: Mapping[str, Any]) -> Any:
+        """The value of the field that confirms a press with these inputs."""
+        given = fill(confirm.equals, values)
+        return resolve_at(given, self._types[confirm.topic], confirm.field, self._interfaces)
 
     def _check_message(self, widget: PublishPress, fields: dict[str, Any]) -> str:
         self._interfaces.encode(widget.type, fields)

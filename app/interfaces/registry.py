@@ -182,13 +182,10 @@ class Interfaces:
         if type_name not in self._checks:
             self.require(type_name)
             structure = self._structures[type_name]
-            checks = [self._field_check(one.type) for one in structure.fields]
+            checks = [field_check(one.type, structure, self._check) for one in structure.fields]
             make = self._codec.message_class(type_name)
             self._checks[type_name] = message_check(structure, make, checks)
         return self._checks[type_name]
-
-    def _field_check(self, kind: Type) -> Check:
-        return field_check(kind, self._check)
 
     def _find(self, type_name: str) -> Structure:
         found = self._definitions.find(type_name)

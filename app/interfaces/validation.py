@@ -4,12 +4,13 @@ import datetime
 import math
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from itertools import islice
 from typing import Any, Final
 
 from app.errors import FieldError
 from app.interfaces.cdr.formats import FORMATS
-from app.interfaces.definitions import INTEGER_RANGES, Structure, Type
+from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES, STRING_TYPES, Structure, Type
 
 Check = Callable[[Any], Any]  # given value → value to encode; FieldError with "" or "[3]" as its field
 
@@ -21,6 +22,7 @@ FLOAT_MAX: Final[Mapping[str, float]] = {
 MAX_SHOWN_CHARS: Final = 60  # characters
 MAX_SHOWN_ELEMENTS: Final = 3  # elements of a list or a table
 MAX_SHOWN_DEPTH: Final = 3
+MAX_LISTED: Final = 12  # names
 
 _shortener = reprlib.Repr()
 _shortener.maxother = MAX_SHOWN_CHARS
@@ -67,6 +69,13 @@ def _join_limited(parts: Iterable[str], count: int) -> str:
     return f"{text[:MAX_SHOWN_CHARS]}…" if len(text) > MAX_SHOWN_CHARS else text
 
 
+def list_names(names: Iterable[str]) -> str:
+    """The first names and the number of others, for a fault; "none" without names."""
+    every = list(names)
+    more = f" and {len(every) - MAX_LISTED} more" if len(every) > MAX_LISTED else ""
+    return ", ".join(every[:MAX_LISTED]) + more or "none"
+
+
 def scalar_check(kind: Type) -> Check:
     """The check of one value of a base type."""
     if kind.name == "bool":
@@ -76,6 +85,48 @@ def scalar_check(kind: Type) -> Check:
     if kind.name in FLOAT_MAX:
         return _float_check(kind.name)
     return _text_check(kind)
+
+
+def named_check(kind: Type, structure: Structure) -> Check:
+    """The same of a field of a structure: a number or a bool may be given by a constant's name."""
+    check = scalar_check(kind)
+    fitting = fitting_constants(kind, structure.constants)
+    if not fitting:
+        return check
+
+    def named(given: Any) -> Any:
+        if type(given) is not str:
+            return check(given)
+        if given in fitting:
+            return check(fitting[given])
+        raise FieldError("", unknown_constant(given, kind, structure.name, fitting))
+
+    return named
+
+
+def fitting_constants(kind: Type, constants: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The constants that a field of this type can have. None for a text: it may read like a name."""
+    return {} if kind.name in STRING_TYPES else {n: v for n, v in constants.items() if _fits(kind, v)}
+
+
+def _fits(kind: Type, value: Any) -> bool:
+    try:
+        scalar_check(kind)(value)
+    except FieldError:
+        return False
+    return True
+
+
+def unknown_constant(name: str, kind: Type, type_name: str, constants: Mapping[str, Any]) -> str:
+    """The message about a text that is not the name of a constant, in place of a number or bool."""
+    fitting = fitting_constants(kind, constants)
+    value = "true or false" if kind.name == "bool" else "a whole number"
+    value = "a number" if kind.name in FLOAT_TYPES else value
+    right = f"{value} ({kind.element}) or the name of a constant of {type_name}"
+    what = f"must be {right}, not {format_value(name)}"
+    near = get_close_matches(name, fitting, n=1, cutoff=0.5)
+    has = f"it has {list_names(fitting)}"
+    return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"
 
 
 def _to_python_scalar(given: Any) -> Any:
@@ -223,7 +274,7 @@ def _unknown_field_error(structure: Structure, given: Mapping[str, Any]) -> Fiel
     return FieldError(str(name), f"unknown field; {structure.name} has {', '.join(names) or 'none'}")
 
 
-def field_check(kind: Type, nested: Callable[[str], Check]) -> Check:
-    """The check of a field; `nested` returns the check of a structure by name."""
-    one = nested(kind.name) if kind.is_nested else scalar_check(kind)
+def field_check(kind: Type, structure: Structure, nested: Callable[[str], Check]) -> Check:
+    """The check of a field of a structure; `nested` returns the check of a structure by name."""
+    one = nested(kind.name) if kind.is_nested else named_check(kind, structure)
     return one if kind.container == "one" else list_check(kind, one)

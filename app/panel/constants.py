@@ -1,13 +1,11 @@
 """Values of a field in a panel file: names of constants, and values that the field can't have."""
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any, Final, Protocol
 
 from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field_name, parent_path
-from app.interfaces.validation import format_value
-from app.panel.faults.wording import list_names
+from app.interfaces.validation import fitting_constants, format_value, unknown_constant
 from app.panel.interlock import Interlock
 from app.panel.number_range import to_float32
 
@@ -25,8 +23,12 @@ class HasField(Protocol):
 
 def parent_type(source: HasField, interfaces: Interfaces) -> str:
     """The type of the message that contains the field: its constants are those of the field."""
-    where = parent_path(source.field)
-    return interfaces.field_type(source.type, where) if where else source.type
+    return _parent_type(source.type, source.field, interfaces)
+
+
+def _parent_type(type_name: str, field: str, interfaces: Interfaces) -> str:
+    where = parent_path(field)
+    return str(interfaces.type_at(type_name, where).element) if where else type_name
 
 
 def resolve_constant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
@@ -41,6 +43,41 @@ def comparison_value(given: Any, kind: Type, constants: Mapping[str, Any]) -> An
     """The same in the field's type: 0.1 as float32 is another number than as float64."""
     value = resolve_constant(given, kind, constants)
     return to_float32(value) if kind.name == "float32" else value
+
+
+def resolve_at(given: Any, type_name: str, field: str, interfaces: Interfaces) -> Any:
+    """A value for a field of a type: that of a constant where it is its name."""
+    kind = interfaces.type_at(type_name, field)
+    return resolve_constant(
+        given, kind, interfaces.constants(_parent_type(type_name, field, interfaces))
+    )
+
+
+def mismatch_at(value: Any, type_name: str, field: str, interfaces: Interfaces) -> str | None:
+    """Why a field of a type can have neither this value nor that of a constant of this name; None if it
+    can."""
+    kind, holder = interfaces.type_at(type_name, field), _parent_type(type_name, field, interfaces)
+    names = fitting_constants(kind, interfaces.constants(holder))
+    if isinstance(value, str) and names:
+        return None if value in names else unknown_constant(value, kind, holder, names)
+    return value_mismatch(value, kind.name)
+
+
+def resolve_names(given: Any, kind: Type, interfaces: Interfaces, names: Mapping[str, Any] = {}) -> Any:
+    """A message's value with values in place of the names of constants, for a reader: `encode` accepts
+    both. Texts with input ids are unchanged."""
+    if isinstance(given, list | tuple) and kind.container != "one":
+        return [resolve_names(one, kind.element, interfaces, names) for one in given]
+    if isinstance(given, Mapping) and kind.is_nested and kind.name in interfaces.structures:
+        structure = interfaces.structures[kind.name]
+        kinds = {field.name: field.type for field in structure.fields}
+        return {
+            name: resolve_names(one, kinds[name], interfaces, structure.constants)
+            if name in kinds
+            else one
+            for name, one in given.items()
+        }
+    return resolve_constant(given, kind, names)
 
 
 def resolve_interlock(interlock: Interlock, interfaces: Interfaces) -> Interlock:
@@ -100,13 +137,3 @@ def value_mismatch(value: Any, kind: str) -> str | None:
         inside = low <= value <= high
         return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
     return None if isinstance(value, str) else f"must be text ({kind}), not {format_value(value)}"
-
-
-def unknown_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
-    """The message about a text that is no constant's name, in place of a whole number."""
-    right = f"a whole number ({kind}) or the name of a constant of {type_name}"
-    what = f"must be {right}, not {format_value(name)}"
-    fitting = [one for one, value in constants.items() if value_mismatch(value, kind) is None]
-    near = get_close_matches(name, fitting, n=1, cutoff=0.5)
-    has = f"it has {list_names(fitting)}"
-    return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"

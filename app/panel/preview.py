@@ -6,6 +6,7 @@ from typing import Any
 
 from app.errors import Remark
 from app.interfaces import Interfaces, Type
+from app.panel.constants import resolve_names
 from app.panel.message_text import Comments, message_lines
 from app.panel.model import Panel
 from app.panel.template import NOW
@@ -30,7 +31,9 @@ def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) 
     for sent in widget.sent_messages(interfaces):
         yield sent.when
         if sent.type_name:
-            fields = complete_value(sent.fields, Type(sent.type_name), interfaces)
+            kind = Type(sent.type_name)
+            named = resolve_names(sent.fields, kind, interfaces)
+            fields = complete_value(named, kind, interfaces)
             every = {**comments, **sent.comments}
             yield from (f"  {line}" for line in message_lines(fields, every))
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from app.i18n import render
-from app.interfaces import Interfaces
+from app.interfaces import Interfaces, Type
 from app.panel.base import TopicQos
-from app.panel.constants import parent_type
+from app.panel.constants import parent_type, resolve_names
 from app.panel.template import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
@@ -178,12 +178,12 @@ def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:
     yield Published(topic=command.topic, type=command.type, qos=command.qos)
 
 
-def _pressed(command: PublishPress, _: Interfaces) -> Iterator[Need]:
+def _pressed(command: PublishPress, interfaces: Interfaces) -> Iterator[Need]:
     yield Published(
         topic=command.topic,
         type=command.type,
         qos=command.qos,
-        template=command.template,
+        template=resolve_names(command.template, Type(command.type), interfaces),
         confirm=command.confirm,
     )
 

@@ -150,7 +150,9 @@ def lamp_of(states: Iterable[LampState], value: Any) -> tuple[TextLike, str, str
 
 
 def _value(widget: Readout, value: Any, robot: RobotState) -> TextLike:
-    return cell_text(widget, value, robot.constants(widget) if widget.constants else NO_CONSTANTS)
+    return cell_text(
+        widget, value, NO_CONSTANTS if widget.constants is None else robot.constants(widget)
+    )
 
 
 class WrittenValue(WrittenNumber, Protocol):

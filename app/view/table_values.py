@@ -87,7 +87,7 @@ def _age(widget: Table, entry: Entry, now: float) -> tuple[TextLike, float]:
 def _constants(widget: Table, robot: RobotState) -> list[tuple[Column, ColumnField, Mapping[str, Any]]]:
     """The columns with their fields and the constants of these."""
     fields = ((column, widget.column_field(column)) for column in widget.columns)
-    return [(column, of, robot.constants(of) if of.constants else {}) for column, of in fields]
+    return [(column, of, {} if of.constants is None else robot.constants(of)) for column, of in fields]
 
 
 def _cells(

@@ -83,6 +83,26 @@ def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
     assert str(receipt.reason).startswith("Confirmed by /heard at ")
 
 
+def test_the_name_of_a_constant_confirms_by_its_value() -> None:
+    """As the value of an option, too."""
+    status = "diagnostic_msgs/msg/DiagnosticStatus"
+    options = [{"value": name, "label": name} for name in ("OK", "WARN")]
+    select = {"id": "level", "kind": "select", "label": "Level", "options": options}
+    confirm = {**CONFIRM, "type": status, "field": "level", "equals": "{level}"}
+    press = {**FREE, "type": status, "message": {"level": "{level}"}, "confirm": confirm}
+
+    async def pressed() -> Receipt:
+        desk = Desk(panel_with(select, press))
+        task = asyncio.create_task(desk.presses.press("free", {"level": "WARN"}, "p1", FROM))
+        await asyncio.sleep(0)
+        payload = INTERFACES.encode(status, {"level": 1})
+        desk.robot.update("heard", Sample(payload, 9, 100.2, 100.2, BRIDGE))
+        desk.confirmations.update("heard", desk.robot.reading("/heard"))
+        return await task
+
+    assert asyncio.run(pressed()).outcome == "confirmed"
+
+
 def test_what_came_unseen_confirms_by_when_it_came() -> None:
     """All in one turn: of what came and went before the newest, only what is later than the command."""
 

@@ -168,7 +168,8 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
         ),
         (
             {**HEARD, "type": "sensor_msgs/msg/NavSatStatus", "field": "status", "constants": "S"},
-            "constants: STATUS_FIX and SERVICE_UNKNOWN are both 0: a longer prefix tells them apart",
+            "constants: STATUS_FIX and SERVICE_UNKNOWN are both 0: a longer prefix tells them apart, "
+            "or a lamp",
         ),
         (
             {**HEARD, "type": IMAGE_FORMATS, "field": "datatype", "constants": "INT", "unit": "x"},

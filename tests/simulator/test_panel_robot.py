@@ -296,6 +296,35 @@ def test_a_press_has_the_effect_that_confirms_it(loaded: Loaded) -> None:
     assert robot.values("/is")[-1] == 7.25
 
 
+NAMED: Final = """
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "warn"
+kind = "publish"
+label = "Warn"
+topic = "/warn"
+type = "diagnostic_msgs/msg/DiagnosticStatus"
+message = { level = "WARN" }
+[page.widget.confirm]
+topic = "/is"
+type = "diagnostic_msgs/msg/DiagnosticStatus"
+field = "level"
+equals = "WARN"
+[demo."/is"]
+values = ["STALE", "ERROR"]
+"""
+
+
+def test_names_of_constants_confirm_and_are_simulated(loaded: Loaded) -> None:
+    robot = Stepped(loaded(NAMED)).run(40)
+    assert set(robot.values("/is", "level")) <= {3, 2}
+    robot.hear("/warn", level=1)
+    robot.run(1)
+    assert robot.values("/is", "level")[-1] == 1
+
+
 def test_what_confirms_presses_changes_with_them_only(loaded: Loaded) -> None:
     robot = Stepped(loaded(PRESSES)).run(60)
     assert len(set(robot.values("/is"))) == len(set(robot.values("/fan_state"))) == 1

@@ -82,9 +82,10 @@ def test_a_readout_shows_a_constant_by_its_name_without_the_prefix(
 def test_constants_are_those_of_the_message_around_the_field() -> None:
     level = {"level": 2, "name": "", "message": "", "hardware_id": "", "values": []}
     fields = {"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}, "status": [level]}
-    more: Any = {"constants": "E", "field": "status[0].level"}
-    view = shown(HEARD, "diagnostic_msgs/msg/DiagnosticArray", fields, **more)
-    assert view["text"] == "ERROR"
+    for prefix in ("E", ""):
+        more: Any = {"constants": prefix, "field": "status[0].level"}
+        view = shown(HEARD, "diagnostic_msgs/msg/DiagnosticArray", fields, **more)
+        assert view["text"] == "ERROR"
 
 
 JOINTS = "sensor_msgs/msg/JointState"

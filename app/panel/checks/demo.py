@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.validation import format_value
-from app.panel.constants import NUMBERS, value_mismatch
+from app.panel.constants import NUMBERS, mismatch_at
 from app.panel.demo import DemoEntry
 from app.panel.faults.places import place_of
 from app.panel.faults.wording import closest_name, list_names
@@ -150,7 +150,7 @@ def _field_faults(
         else:
             yield from _range_faults(f"{place}.ranges", path, numbers[path], limits)
     for i, value in enumerate(entry.values or ()):
-        misfits = [(path, value_mismatch(value, kind)) for path, kind in kinds.items()]
+        misfits = [(path, mismatch_at(value, type_name, path, interfaces)) for path in kinds]
         if wrong := next(((path, what) for path, what in misfits if what), None):
             yield Fault(f"{place}.values[{i}]", f'"{wrong[0]}": {wrong[1]}')
             return

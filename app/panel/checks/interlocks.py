@@ -7,14 +7,13 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError
 from app.interfaces import INTEGER_RANGES, Interfaces, Type
-from app.interfaces.validation import format_value, scalar_check
+from app.interfaces.validation import format_value, scalar_check, unknown_constant
 from app.panel.checks.types import field_faults
 from app.panel.constants import (
     NUMBERS,
     comparison_value,
     parent_type,
     resolve_constant,
-    unknown_constant,
 )
 from app.panel.interlock import Interlock
 from app.panel.values import same_value
@@ -81,7 +80,7 @@ def _value_faults(
             value = resolve_constant(one, kind, constants)
             cause = f"condition {place}"
             if isinstance(value, str) and kind.name in NUMBERS:
-                yield Fault(at, unknown_constant(value, str(kind), type_name, constants), cause=cause)
+                yield Fault(at, unknown_constant(value, kind, type_name, constants), cause=cause)
             elif fault := _value_mismatch(value, kind):
                 yield Fault(at, fault, cause=cause)
             elif any(same_value(value, other) for other in found):

@@ -6,15 +6,15 @@ from difflib import get_close_matches
 from typing import Any, Final
 
 from app.interfaces.validation import format_value
+from app.interfaces.validation import list_names as list_names
 from app.panel.values import number_text
 
 NAME_SIMILARITY: Final = 0.7
-MAX_LISTED: Final = 12
 # The rule of a text, by its key.
 PATTERNS: Final[Mapping[str, str]] = {
     "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
-    "constants": "is not how names of constants start: it must be like STATUS_",
+    "constants": 'is not how names of constants start: it must be like STATUS_, or "" for all',
     "parameter": "is not the name of a parameter: it has no spaces",
     "name": "is not a name that a message can have: it has control characters",
     "names": 'is not the name of a field: it has a-z, 0-9 and "_"',
@@ -73,13 +73,6 @@ def describe_error(error: Mapping[str, Any], key: str) -> str:
 def closest_name(name: str, known: Iterable[str]) -> str:
     """The most similar name; "" if none is similar enough: many keys are short and alike."""
     return next(iter(get_close_matches(name, list(known), n=1, cutoff=NAME_SIMILARITY)), "")
-
-
-def list_names(names: Iterable[str]) -> str:
-    """The first names and the number of others, for a fault; "none" without names."""
-    every = list(names)
-    more = f" and {len(every) - MAX_LISTED} more" if len(every) > MAX_LISTED else ""
-    return ", ".join(every[:MAX_LISTED]) + more or "none"
 
 
 def one_of(known: list[str], given: Any) -> str:

@@ -8,16 +8,17 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from app.errors import Fault
 from app.i18n import TextLike
 from app.i18n.values import alike
-from app.interfaces import INTEGER_RANGES, Interfaces
-from app.interfaces.validation import format_value
+from app.interfaces import INTEGER_RANGES, Interfaces, Type
+from app.interfaces.validation import fitting_constants, format_value, unknown_constant
 from app.panel.base import Description, Label, Span, non_empty
-from app.panel.constants import NUMBERS, HasField, parent_type, unknown_constant, value_mismatch
+from app.panel.constants import NUMBERS, HasField, parent_type, value_mismatch
 from app.panel.faults.wording import list_names
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
 
 # [+] [,] [.digits] [f, e, g, % or d]: the part of Python's format language that can't fail.
 FORMAT: Final = r"^\+?,?(\.[0-9]{1,2}[feg%]|[feg%d])$"
+CONSTANTS: Final = r"^([A-Z][A-Z0-9_]*)?$"  # what names begin with; "" for all
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
 Factor = Annotated[float, Field(allow_inf_nan=False)]
@@ -31,7 +32,7 @@ class Readout(Display):
     unit: Unit = ""
     scale: Factor = 1.0
     offset: Factor = 0.0
-    constants: Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]*$")] | None = None
+    constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         yield from _number_faults(place, self, field_type)
@@ -134,7 +135,8 @@ def constant_faults(place: str, readout: NamedByConstants, interfaces: Interface
     if readout.constants is None:
         return
     type_name = parent_type(readout, interfaces)
-    names = interfaces.constants(type_name)
+    kind = interfaces.type_at(readout.type, readout.field)
+    names = fitting_constants(kind, interfaces.constants(type_name))
     found = {name: value for name, value in names.items() if name.startswith(readout.constants)}
     if not found:
         what = f"no constant of {type_name} starts so; it has {list_names(names)}"
@@ -142,7 +144,7 @@ def constant_faults(place: str, readout: NamedByConstants, interfaces: Interface
     for name, value in found.items():
         first = next(other for other, its in found.items() if its == value)
         if first != name:
-            what = f"{first} and {name} are both {value}: a longer prefix tells them apart"
+            what = f"{first} and {name} are both {value}: a longer prefix tells them apart, or a lamp"
             yield Fault(f"{place}.constants", what)
             return
 
@@ -170,7 +172,7 @@ def state_faults(
     for i, state in enumerate(indicator.states):
         at = f"{place}.states[{i}]"
         if isinstance(given[i], str) and kind in INTEGER_RANGES:
-            what = unknown_constant(given[i], kind, type_name, constants)
+            what = unknown_constant(given[i], Type(kind), type_name, constants)
             yield Fault(f"{at}.value", what, cause=f"state {place}")
             continue
         if fault := value_mismatch(given[i], kind):

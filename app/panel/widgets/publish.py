@@ -9,7 +9,7 @@ from app.interfaces import Interfaces
 from app.panel.base import Description, FieldPath, Seconds, Span, Topic, Type
 from app.panel.checks.templates import NOW_RULE, example_values, unknown_input_faults
 from app.panel.checks.types import field_faults
-from app.panel.constants import value_mismatch
+from app.panel.constants import mismatch_at
 from app.panel.template import NOW, fill, placeholders
 from app.panel.widgets.families import CheckContext, PublishCommand
 from app.panel.widgets.templated import TemplateCommand
@@ -89,10 +89,12 @@ def _confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Ite
     yield from faults
     if not faults:
         kind = checking.interfaces.field_type(known, confirm.field)
-        yield from _equals_faults(place, confirm, kind, checking)
+        yield from _equals_faults(place, confirm, known, kind, checking)
 
 
-def _equals_faults(place: str, confirm: Confirm, kind: str, checking: CheckContext) -> Iterator[Fault]:
+def _equals_faults(
+    place: str, confirm: Confirm, type_name: str, kind: str, checking: CheckContext
+) -> Iterator[Fault]:
     if re.search(r"[/\]]", kind):
         what = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
         yield Fault(f"{place}.field", what)
@@ -108,6 +110,7 @@ def _equals_faults(place: str, confirm: Confirm, kind: str, checking: CheckConte
     if faults or {name for _, name in names} & set(checking.faulty):
         return
     for values in example_values({name: checking.inputs[name] for _, name in names}):
-        if fault := value_mismatch(fill(confirm.equals, values), kind):
+        value = fill(confirm.equals, values)
+        if fault := mismatch_at(value, type_name, confirm.field, checking.interfaces):
             yield Fault(f"{place}.equals", fault)
             return

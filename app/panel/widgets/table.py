@@ -12,6 +12,7 @@ from app.panel.base import Description, FieldPath, Label, Seconds, Span, non_emp
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS, parent_type
 from app.panel.widgets.displays import (
+    CONSTANTS,
     FORMAT,
     LampState,
     constant_faults,
@@ -36,7 +37,7 @@ class Column(Description):
     field: FieldPath | None = None
     format: Annotated[str, Field(pattern=FORMAT)] | None = None
     unit: Unit = ""
-    constants: Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]*$")] | None = None
+    constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
     states: Annotated[tuple[LampState, ...], Field(strict=False)] = ()
     width: Annotated[int, Field(ge=1, le=12)] = 1
 
@@ -156,7 +157,7 @@ class Table(TopicWidget, DisplayWidget):
         if column.states:
             yield from state_faults(place, of, kind, interfaces, "a column with states")
             for key in ("format", "unit", "constants"):
-                if getattr(column, key):
+                if key in column.model_fields_set:
                     yield Fault(f"{place}.{key}", "is not for a column with states: they are its texts")
             return
         for key in ("format", "unit"):
