@@ -23,6 +23,7 @@ from app.process import listen_sockets
 from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
+from app.repeated_records import RepeatedRecords
 from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
@@ -53,6 +54,7 @@ from app.web.routes import (
     trends,
 )
 from app.web.security import RequestGuard
+from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, urls
 
 log = logging.getLogger("kiosk")
@@ -78,12 +80,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     """The application; KioskError if its settings or its panel file are unusable."""
     settings = settings or Settings.from_environment()
     ros_logging.configure_logging(settings.log_level)
+    repeated = limit_server_log(settings.log_level == "debug")
     panel = load_panel(settings.panel, lambda of: settings.data_folder(mode_of(settings, of)))
     check_zenoh(settings, panel)
     app = Application(
         title="Operator panel",
         summary="The HTTP interface of a robot cell's touch panel.",
-        lifespan=partial(_lifespan, settings, panel),
+        lifespan=partial(_lifespan, settings, panel, repeated),
         docs_url=None,  # these pages load scripts from other servers
         redoc_url=None,
         max_body_size=LONGEST,
@@ -122,7 +125,9 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
 
 
 @asynccontextmanager
-async def _lifespan(settings: Settings, panel: Panel, app: FastAPI) -> AsyncIterator[None]:
+async def _lifespan(
+    settings: Settings, panel: Panel, repeated: RepeatedRecords, app: FastAPI
+) -> AsyncIterator[None]:
     """From the start of the server to its end."""
     async with _app_state(settings, panel, app.state.server) as state:
         app.state.app_state = state
@@ -133,6 +138,7 @@ async def _lifespan(settings: Settings, panel: Panel, app: FastAPI) -> AsyncIter
                 watchdog.run(),
                 _log_urls(app.state.server, ports, settings.hosts),
                 pages.compiled(state.templates.environment(panel.language)),
+                count_repeated(repeated),
             )
             tasks = [asyncio.create_task(work) for work in works]
             try:

@@ -55,6 +55,7 @@ COMMON = {
     "app.icons",
     "app.printable",
     "app.rate_limit",
+    "app.repeated_records",
     "app.ros_logging",
     "app.settings",
 }

@@ -1,5 +1,6 @@
 """What uvicorn has no option for: how long a request's head may take, how large it may be, and how many
-connections there may be, so that files are left for the log, the link and recordings."""
+connections each client may have, so that files are left for the log, the link and recordings, and
+places for the kiosk's own browser."""
 
 import asyncio
 import logging
@@ -7,77 +8,137 @@ import math
 import resource
 from typing import ClassVar, Final, cast
 
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn._types import ASGI3Application
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+
+from app.permission.client_places import KIOSK, ClientPlaces, client_key, shares
+from app.web.client_transport import DRAIN_MOST, DRAIN_WITHIN_S, ClientTransport
 
 log = logging.getLogger("kiosk.connections")
 
 HEAD_WITHIN_S: Final = 10.0  # from its first byte, or from the opening of the connection
 HEAD_MOST: Final = 65_536  # bytes after those that came with its first one
-CONNECTIONS_MOST: Final = 2000  # half of them from one address
+CONNECTIONS_MOST: Final = 2000
 FILES_WANTED: Final = 4096  # as the unit's LimitNOFILE
 FILES_KEPT: Final = 200  # for all that is no connection
 WARN_EVERY_S: Final = 60.0
 
 
 class Connection(HttpToolsProtocol):
-    """uvicorn's, which is closed when the head of a request takes too long or is too large, and at once
-    when there are too many."""
+    """uvicorn's, which is closed when the head of a request takes too long or is too large.
 
+    When there are too many, one that has not sent a head yet is closed: of the same client if that has
+    its share, else of any client but the kiosk's own. Without such a one the new connection is closed.
+    """
+
+    places: ClassVar = ClientPlaces(shares(CONNECTIONS_MOST))
+    waiting: ClassVar[dict["Connection", None]] = {}  # for their first head, the oldest first
     warned_at: ClassVar[float] = -math.inf
 
-    _due: asyncio.TimerHandle | None = None  # while a head is waited for
-    _head = 0
+    client_transport: ClientTransport
+    client_id: str
+    _due: asyncio.TimerHandle | None = None  # while a head, or a body that no one needs, is waited for
+    _received = 0  # bytes of it
+    _in_body = False
+    _handled: RequestResponseCycle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(cast(asyncio.Transport, transport))
-        if self._crowded():
-            self._tell()
-            transport.close()
-        else:
-            self._begin()
+        own = ClientTransport(cast(asyncio.Transport, transport), lambda: self._in_body)
+        self.client_transport = own
+        super().connection_made(cast(asyncio.Transport, own))
+        self.client_id = client_key(self.client[0] if self.client else "")
+        if not self.places.has_place(self.client_id):
+            self._warn()
+            if not self._displace():
+                own.close_now()
+                return
+        self.places.take(self.client_id)
+        own.occupy(lambda: self.places.release(self.client_id))
+        self.waiting[self] = None
+        self._begin(HEAD_WITHIN_S)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._end()
+        self.client_transport.release()
+        # uvicorn tells the last request only, which is not the one that runs if others wait.
+        self.pipeline.clear()
+        if self._handled is not None:
+            self._handled.disconnected = True
+            self._handled.message_event.set()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        before = self._due
-        if before is None and (self.cycle is None or self.cycle.response_complete):
-            self._begin()  # the next request, or a response that no client waits for
+        if self.client_transport.draining:
+            self._count(data, DRAIN_MOST)
+            return
+        before, answered = self._due, self.cycle is None or self.cycle.response_complete
+        if before is None and answered:  # the next request, or the rest of one that was answered
+            self._begin(DRAIN_WITHIN_S if self._in_body else HEAD_WITHIN_S)
+        in_body = self._in_body
         super().data_received(data)
         if before is not None and before is self._due:
-            self._head += len(data)
-            if self._head > HEAD_MOST:
-                self.transport.close()
+            self._count(data, DRAIN_MOST if in_body else HEAD_MOST)
+
+    def eof_received(self) -> None:
+        if self.client_transport.draining:
+            self.client_transport.close_now()
+
+    def send_400_response(self, msg: str) -> None:
+        self._in_body = True  # as long as it goes on
+        super().send_400_response(msg)
 
     def on_message_begin(self) -> None:
         super().on_message_begin()
         if self._due is None:
-            self._begin()
+            self._begin(HEAD_WITHIN_S)
 
     def on_headers_complete(self) -> None:
         self._end()
+        self._in_body = True
         super().on_headers_complete()
 
-    def _begin(self) -> None:
-        self._head = 0
-        self._due = self.loop.call_later(HEAD_WITHIN_S, self.transport.close)
+    def on_message_complete(self) -> None:
+        self._in_body = False
+        if self.cycle is not None and self.cycle.response_complete:
+            self._end()
+            self._begin(HEAD_WITHIN_S)  # uvicorn has ended its own timer
+        super().on_message_complete()
+
+    def handle_websocket_upgrade(self) -> None:
+        self._in_body = False
+        super().handle_websocket_upgrade()
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+        self._handled = cycle
+        super()._start_asgi_task(cycle, app)
+
+    def _begin(self, within_s: float) -> None:
+        self._received = 0
+        self._due = self.loop.call_later(within_s, self.client_transport.close_now)
+
+    def _count(self, data: bytes, most: int) -> None:
+        self._received += len(data)
+        if self._received > most:
+            self.client_transport.close_now()
 
     def _end(self) -> None:
+        self.waiting.pop(self, None)
         if self._due is not None:
             self._due.cancel()
             self._due = None
 
-    def _crowded(self) -> bool:
-        """Whether this one is too many: in all, or of its address, so that none takes all places."""
-        most, client = connections_most(), self.client
-        if len(self.connections) <= most // 2 or client is None:
-            return len(self.connections) > most
-        clients = (getattr(one, "client", None) for one in self.connections)
-        own = sum(1 for one in clients if one and one[0] == client[0])
-        return len(self.connections) > most or own > most // 2
+    def _displace(self) -> bool:
+        """Closes a connection that waits for its first head; False if there is none."""
+        own_share = self.places.client_full(self.client_id)
+        for other in self.waiting:
+            if other.client_id == self.client_id if own_share else other.client_id not in KIOSK:
+                other._end()
+                other.client_transport.release()
+                other.client_transport.close_now()
+                return True
+        return False
 
-    def _tell(self) -> None:
+    def _warn(self) -> None:
         now = self.loop.time()
         if now - Connection.warned_at >= WARN_EVERY_S:
             Connection.warned_at = now

@@ -12,9 +12,11 @@ from uvicorn import Config
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.permission.client_places import ClientPlaces, shares
 from app.process.listen_sockets import check_port_free
-from app.web.connections import Connection, want_files
+from app.web.connections import Connection, connections_most, want_files
 from app.web.request_body import LONGEST
+from app.web.sockets import Socket
 
 # Presses are short: to compress them costs time, and 30 kB of memory for each browser. Which proxies
 # are believed is a setting of the application's.
@@ -43,9 +45,12 @@ def bound(server: Config) -> None:
     server.ws_per_message_deflate = OPTIONS["ws_per_message_deflate"]
     if isinstance(server.loaded_app, ProxyHeadersMiddleware):
         server.loaded_app = server.loaded_app.app
+    want_files()
     if server.http_protocol_class is HttpToolsProtocol:
         server.http_protocol_class = Connection
-    want_files()
+        Connection.places = ClientPlaces(shares(connections_most()))
+    if server.ws_protocol_class is not None:
+        server.ws_protocol_class = Socket
 
 
 def urls(

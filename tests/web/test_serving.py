@@ -19,6 +19,8 @@ from starlette.types import Receive, Scope, Send
 from uvicorn import Config
 from websockets.exceptions import ConnectionClosed
 
+from app.permission.client_places import shares
+from app.web.client_transport import DRAIN_MOST
 from app.web.connections import FILES_WANTED
 from app.web.proxies import Proxies
 from app.web.serving import bounded, urls
@@ -27,6 +29,7 @@ from tests.support.parts import ENOUGH_S, ROOT, Server, free_port, http_client, 
 from tests.support.servers import ready
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+UPGRADE = HEAD.replace(b"healthz", b"presses") + b"Connection: Upgrade\r\nUpgrade: websocket\r\n"
 ELSEWHERE = "127.0.0.2"  # another address of this machine
 MB = 1_000_000
 
@@ -137,6 +140,9 @@ def test_a_message_in_pieces_is_bounded_as_a_whole(plain: Server) -> None:
         pytest.param([b"\r\n"] * 1000, id="empty lines"),
         pytest.param([HEAD + b"\r\n", *[b"\r\n"] * 1000], id="empty lines after a request"),
         pytest.param([HEAD + b"\r\n" + HEAD, *[b"X-A: b\r\n"] * 1000], id="a second head"),
+        pytest.param(
+            [UPGRADE + b"X-A: " + bytes(10_000).replace(b"\0", b"b") + b"\r\n\r\n"], id="a handshake"
+        ),
     ],
 )
 def test_a_head_has_its_time(shortest_heads: Server, said: list[bytes]) -> None:
@@ -186,6 +192,31 @@ def test_a_body_has_its_time(hasty: Server, path: str) -> None:
         assert "the body took longer than 0.5 s" in answer
 
 
+@pytest.mark.parametrize("more", ["", "Connection: close\r\n"], ids=["kept", "closed"])
+@pytest.mark.parametrize(
+    "path", ["/widgets/operation", "/widgets/operation/cancel", "/display", "/none"]
+)
+def test_who_sends_too_much_gets_the_answer(plain: Server, path: str, more: str) -> None:
+    head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n{more}"
+    with opened(plain) as one:
+        one.sendall(f"{head}Content-Length: {5 * MB}\r\n\r\n".encode())
+        for _ in range(50):
+            one.sendall(bytes(MB // 10))  # a client that reads only when it has sent all
+        assert one.recv(65_536).startswith(b"HTTP/1.1 413 ")
+        if not more:  # the connection goes on
+            one.sendall(HEAD + b"\r\n")
+            until(lambda: b"HTTP/1.1 200 OK" in one.recv(65_536), "the next answer")
+
+
+def test_the_rest_of_a_body_is_not_read_for_ever(plain: Server) -> None:
+    head = "POST /none HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
+    before = memory(plain)
+    with opened(plain) as one:
+        one.sendall(f"{head}Content-Length: {500 * MB}\r\n\r\n".encode())
+        assert pushed(one, bytes(65_536), 500 * MB) < DRAIN_MOST + 12 * MB
+    assert memory(plain) - before < 8 * MB
+
+
 def test_who_drops_a_body_leaves_no_traceback(plain: Server) -> None:
     lines = len(plain.process.lines)
     head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
@@ -198,19 +229,37 @@ def test_who_drops_a_body_leaves_no_traceback(plain: Server) -> None:
     assert [line for line in said if "press " not in line] == []
 
 
-def test_one_address_takes_half_of_the_places_and_no_more(hasty: Server) -> None:
+def test_other_machines_leave_places_for_the_kiosk(hasty: Server) -> None:
+    """An address has an eighth of the places, and all others together leave a tenth."""
+    limits = shares(CONNECTIONS)
     with ExitStack() as stack:
-        many = [stack.enter_context(opened(hasty, ELSEWHERE)) for _ in range(3 * CONNECTIONS)]
-        for one in many:
-            with suppress(OSError):
-                one.sendall(HEAD.replace(b"healthz", b"events") + b"\r\n")
+        streams = []
+        for address in (f"127.0.0.{number}" for number in range(2, 2 + CONNECTIONS)):
+            for _ in range(2 * limits.client):
+                one = stack.enter_context(opened(hasty, address))
+                streams.append(one)
+                with suppress(OSError):
+                    one.sendall(HEAD.replace(b"healthz", b"events") + b"\r\n")
         until(
-            lambda: sum(map(is_closed, many)) == len(many) - CONNECTIONS // 2,
-            "half of the places are taken",
+            lambda: sum(map(is_closed, streams)) == len(streams) - limits.others,
+            "others have their places",
         )
-        assert httpx.get(f"{hasty.url}/healthz", trust_env=False).status_code == 200
+        with opened(hasty) as kiosk:
+            kiosk.sendall(HEAD + b"\r\n")
+            assert kiosk.recv(65_536).startswith(b"HTTP/1.1 200 ")
         assert hasty.process.count("too many connections") == 1
-    assert hasty.process.count(f"closed one from {ELSEWHERE}")
+    assert hasty.process.count("closed one from 127.0.0.")
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", ELSEWHERE], ids=["the kiosk", "another"])
+def test_silent_connections_give_way_to_their_own_client(hasty: Server, address: str) -> None:
+    with ExitStack() as stack:
+        silent = [stack.enter_context(opened(hasty, address)) for _ in range(3 * CONNECTIONS)]
+        until(lambda: sum(map(is_closed, silent)) >= 2 * CONNECTIONS, "some have given way")
+        for _ in range(3):
+            with opened(hasty, address) as one:
+                one.sendall(HEAD + b"\r\n")
+                assert one.recv(65_536).startswith(b"HTTP/1.1 200 ")
 
 
 def test_it_takes_the_files_that_it_may(servers: Callable[[Server], Server]) -> None:

@@ -1,10 +1,12 @@
-"""The application with a short timeout of bodies and few connections, for `uvicorn
-tests.support.apps.hasty:app`."""
+"""The application with short timeouts of bodies and of repeated log lines, and few connections, for
+`uvicorn tests.support.apps.hasty:app`."""
 
-from app import main
-from app.web import connections, request_body
+from app import main, repeated_records
+from app.web import connections, request_body, server_log
 from tests.support.apps.small import CONNECTIONS
 
 vars(connections)["CONNECTIONS_MOST"] = CONNECTIONS
+vars(repeated_records)["COUNTED_FOR_S"] = 2.0
+vars(server_log)["COUNT_EVERY_S"] = 0.2
 vars(request_body)["BODY_WITHIN_S"] = 0.5
 app = main.app

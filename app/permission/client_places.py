@@ -1,0 +1,89 @@
+"""Places for clients: how many things of a kind, such as connections, each client may have open.
+
+A client is an address here, since cookies are easily invented. Some places are kept for the kiosk's own
+machine, so that no number of other clients shuts it out.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import lru_cache
+from ipaddress import IPv6Address, ip_address, ip_network
+from typing import Final
+
+KIOSK: Final = frozenset({"127.0.0.1", "::1"})
+CLIENTS_KEPT: Final = 1000
+SUBNET_BITS: Final = 64  # of IPv6: one machine has as many addresses as it likes there
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceLimits:
+    """`total` places, of which other machines together have `others`, and one of them `client`. The
+    kiosk's own machine has `kiosk`."""
+
+    total: int
+    others: int
+    client: int
+    kiosk: int
+
+
+def shares(total: int) -> PlaceLimits:
+    """The limits that keep a tenth for the kiosk and give one client an eighth, at least one."""
+    kept = max(1, total // 10)
+    others = max(1, total - kept)
+    return PlaceLimits(total, others, max(1, total // 8), max(1, total // 2))
+
+
+class ClientPlaces:
+    """The taken places by client. Used on the event loop only."""
+
+    __slots__ = ("_taken", "_total", "limits")
+
+    def __init__(self, limits: PlaceLimits) -> None:
+        self.limits = limits
+        self._taken: Counter[str] = Counter()
+        self._total = 0
+
+    def client_full(self, client: str) -> bool:
+        """Whether the client has all places that it may have."""
+        return self._taken[client] >= (self.limits.kiosk if client in KIOSK else self.limits.client)
+
+    def full(self, client: str) -> bool:
+        """Whether all places are taken that a client like this may have."""
+        limits, kiosk = self.limits, client in KIOSK
+        own = sum(self._taken[one] for one in KIOSK)
+        return self._total >= limits.total or (not kiosk and self._total - own >= limits.others)
+
+    def has_place(self, client: str) -> bool:
+        """Whether the client may have one more."""
+        return not self.client_full(client) and not self.full(client)
+
+    def take(self, client: str) -> None:
+        """Takes a place."""
+        self._taken[client] += 1
+        self._total += 1
+
+    def release(self, client: str) -> None:
+        """Gives a place back that was taken."""
+        self._total -= 1
+        self._taken[client] -= 1
+        if not self._taken[client]:
+            del self._taken[client]
+
+
+@lru_cache(CLIENTS_KEPT)
+def client_key(address: str) -> str:
+    """The client of an address: of IPv6 its subnet, as a machine chooses its addresses there. A local
+    socket, which has no address, is the kiosk's own."""
+    if not address:
+        return "127.0.0.1"
+    try:
+        found = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address[:64]
+    if not isinstance(found, IPv6Address):
+        return str(found)
+    if found.ipv4_mapped:
+        return str(found.ipv4_mapped)
+    if found.is_link_local or found.is_loopback:
+        return str(found)
+    return str(ip_network((found, SUBNET_BITS), strict=False))

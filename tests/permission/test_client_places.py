@@ -1,0 +1,65 @@
+"""How many things each client may have open."""
+
+import pytest
+
+from app.permission.client_places import ClientPlaces, PlaceLimits, client_key, shares
+
+LIMITS = PlaceLimits(total=10, others=8, client=3, kiosk=5)
+KIOSK = "127.0.0.1"
+
+
+def taken(places: ClientPlaces, client: str, tries: int = 20) -> int:
+    """How many places the client gets."""
+    got = 0
+    for _ in range(tries):
+        if places.has_place(client):
+            places.take(client)
+            got += 1
+    return got
+
+
+def test_no_number_of_other_clients_takes_the_places_of_the_kiosk() -> None:
+    places = ClientPlaces(LIMITS)
+    assert [taken(places, f"192.0.2.{number}") for number in range(5)] == [3, 3, 2, 0, 0]
+    assert taken(places, KIOSK) == 2
+
+
+def test_the_kiosk_leaves_places_for_others() -> None:
+    places = ClientPlaces(LIMITS)
+    assert taken(places, KIOSK) == 5
+    assert [taken(places, f"192.0.2.{number}") for number in range(3)] == [3, 2, 0]
+
+
+def test_a_place_that_is_given_back_can_be_taken_again() -> None:
+    places = ClientPlaces(LIMITS)
+    assert taken(places, "192.0.2.1") == 3
+    places.release("192.0.2.1")
+    assert places.has_place("192.0.2.1")
+    assert taken(places, "192.0.2.1") == 1
+
+
+@pytest.mark.parametrize("total", [1, 2, 3, 10, 20, 32, 824, 2000])
+def test_shares_fit_into_the_total(total: int) -> None:
+    limits = shares(total)
+    assert 1 <= limits.client <= limits.others <= limits.total == total
+    assert 1 <= limits.kiosk <= total
+    assert total == 1 or limits.others < total
+
+
+@pytest.mark.parametrize(
+    ("address", "key"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("::1", "::1"),
+        ("::ffff:127.0.0.1", "127.0.0.1"),
+        ("127.0.0.2", "127.0.0.2"),
+        ("2001:db8::1", "2001:db8::/64"),
+        ("2001:db8::ffff:1", "2001:db8::/64"),
+        ("fe80::1%eth0", "fe80::1"),
+        ("", "127.0.0.1"),
+        ("not an address", "not an address"),
+    ],
+)
+def test_a_client_is_an_address_and_of_ipv6_a_subnet(address: str, key: str) -> None:
+    assert client_key(address) == key
