@@ -8,7 +8,7 @@ replaces the last one undecoded; the event loop is woken only if a browser waits
 import asyncio
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Final
@@ -43,8 +43,8 @@ class Frames:
         cameras = [w for w in context.panel.widgets() if isinstance(w, Camera)]
         self._feeds = {}
         for topic, type_name in context.panel.on_demand().items():
-            max_age_s = min(camera.max_age_s for camera in cameras if camera.topic == topic)
-            self._feeds[topic] = Feed(context, update_tokens, topic, type_name, max_age_s)
+            showing = [camera for camera in cameras if camera.topic == topic]
+            self._feeds[topic] = Feed(context, update_tokens, topic, type_name, showing)
 
     def feed(self, widget: Camera) -> "Feed":
         """The topic of a camera."""
@@ -65,11 +65,12 @@ class Feed:
         update_tokens: Callable[[], None],
         topic: str,
         type_name: str,
-        max_age_s: float,
+        cameras: Sequence[Camera],
     ) -> None:
-        """`max_age_s` is the shortest of the topic's cameras."""
+        """`cameras` are those of the topic: the strictest of their limits count."""
         self.topic = topic
-        self._max_age_s = max_age_s
+        self._max_age_s = min(camera.max_age_s for camera in cameras)
+        self._max_side_px = min(camera.max_side_px for camera in cameras)
         self._type = type_name
         self._robot = context.robot
         self._key = context.robot.key(topic)
@@ -178,7 +179,7 @@ class Feed:
         return self._encoding[1]
 
     def _encode(self, payload: Buffer) -> Picture:
-        return picture(self._interfaces, self._type, bytes(payload))
+        return picture(self._interfaces, self._type, bytes(payload), self._max_side_px)
 
     def _set_problem(self, problem: TextLike) -> None:
         if self._state.problem != problem:

@@ -154,7 +154,15 @@ def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNod
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        (image("mono16", 2), "The encoding mono16 cannot be shown"),
+        (image("32FC1", 4), "The encoding 32FC1 cannot be shown"),
+        (
+            image("mono8", 1, 1, 1) | {"step": 2**32 - 1, "height": 2},
+            "not a whole sensor_msgs/msg/Image",
+        ),
+        (
+            image("mono8", 1, 5000, 1),
+            "The picture has 5000 × 1 pixels; at most 4096 each way are shown",
+        ),
         (image("rgb8", 3, 200, 100), "The picture has 600"),
         (image("rgb8", 3) | {"height": 11}, "not a whole sensor_msgs/msg/Image"),
     ],

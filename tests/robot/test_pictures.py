@@ -1,6 +1,10 @@
 """Pictures of messages as files that a browser shows."""
 
+import contextlib
 import io
+import struct
+import tracemalloc
+from itertools import pairwise
 from typing import Any, Final
 
 import pytest
@@ -13,13 +17,21 @@ from app.robot.pictures import NoPicture, Picture, picture
 INTERFACES = load_interfaces("jazzy", ())
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 RAW = "sensor_msgs/msg/Image"
-JPEG = b"\xff\xd8\xff\xe0" + bytes(40)
-WEBP = b"RIFF\x10\x00\x00\x00WEBPVP8 " + bytes(8)
-PNG = b"\x89PNG\r\n\x1a\n" + bytes(30)
+MOST = 4096
+
+
+def file(form: str, size: tuple[int, int] = (4, 3), mode: str = "RGB") -> bytes:
+    """A picture file of one colour."""
+    packed = io.BytesIO()
+    Image.new(mode, size).save(packed, form)
+    return packed.getvalue()
+
+
+JPEG, PNG, WEBP = (file(form) for form in ("JPEG", "PNG", "WEBP"))
 
 
 def of(type_name: str, **fields: Any) -> Picture:
-    return picture(INTERFACES, type_name, INTERFACES.encode(type_name, fields))
+    return picture(INTERFACES, type_name, INTERFACES.encode(type_name, fields), MOST)
 
 
 def raw(encoding: str, width: int, height: int, data: bytes, step: int | None = None) -> Picture:
@@ -87,11 +99,12 @@ def test_a_raw_picture_has_its_colours(encoding: str, pixel: bytes, colour: tupl
 @pytest.mark.parametrize(
     ("encoding", "width", "height", "data", "code"),
     [
-        ("mono16", 1, 1, b"\0\0", "camera_encoding"),
+        ("yuv422_yuy2", 1, 1, bytes(2), "camera_broken"),
+        ("mono8", MOST + 1, 1, bytes(MOST + 1), "camera_pixels"),
         ("32FC1", 1, 1, bytes(4), "camera_encoding"),
         ("rgb8", 0, 1, b"", "camera_broken"),
         ("rgb8", 2, 2, bytes(11), "camera_broken"),
-        ("mono8", 100_000, 1, bytes(100_000), "camera_broken"),
+        ("mono8", 1, 100_000, bytes(100_000), "camera_pixels"),
     ],
 )
 def test_what_is_wrong_with_a_raw_picture_is_said(
@@ -104,5 +117,105 @@ def test_what_is_wrong_with_a_raw_picture_is_said(
 
 def test_bytes_that_are_no_message_are_no_picture() -> None:
     with pytest.raises(NoPicture) as error:
-        picture(INTERFACES, COMPRESSED, b"\x00\x01\x00\x00nonsense")
+        picture(INTERFACES, COMPRESSED, b"\x00\x01\x00\x00nonsense", MOST)
     assert code_of(error.value) == "camera_broken"
+
+
+@pytest.mark.parametrize("step", [2, 2**31, 2**32 - 1])
+@pytest.mark.parametrize("height", [1, 2, 2**32 - 1])
+def test_a_claimed_size_takes_no_memory(step: int, height: int) -> None:
+    """Two pixels in a message of a few bytes."""
+    tracemalloc.start()
+    with contextlib.suppress(NoPicture):
+        found = raw("mono8", 2, height, bytes(2), step=step)
+        assert shown(found).size == (2, height) == (2, 1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+def with_size(form: str, size: tuple[int, int]) -> bytes:
+    """A small JPEG or WebP file whose head claims a size."""
+    width, height = size
+    if form == "JPEG":
+        begin, claimed = b"\xff\xc0", height.to_bytes(2, "big") + width.to_bytes(2, "big")
+    else:
+        begin, claimed = b"\x9d\x01\x2a", width.to_bytes(2, "little") + height.to_bytes(2, "little")
+    made = file(form)
+    at = made.index(begin) + (5 if form == "JPEG" else 3)
+    return made[:at] + claimed + made[at + 4 :]
+
+
+@pytest.mark.parametrize("form", ["JPEG", "PNG", "WEBP"])
+@pytest.mark.parametrize("size", [(MOST + 1, 1), (1, MOST + 1), (16_383, 16_383)])
+def test_a_file_with_more_pixels_than_a_browser_should_draw_is_not_shown(
+    form: str, size: tuple[int, int]
+) -> None:
+    """Only the head is read: the file of 16383 x 16383 pixels would need a gigabyte."""
+    head = file(form, size, "1") if form == "PNG" else with_size(form, size)
+    tracemalloc.start()
+    with pytest.raises(NoPicture) as error:
+        of(COMPRESSED, format="any", data=head)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert code_of(error.value) == "camera_pixels"
+    assert peak < 5_000_000
+
+
+@pytest.mark.parametrize("data", [JPEG, PNG, WEBP])
+def test_a_damaged_head_is_no_picture(data: bytes) -> None:
+    for length in range(12, 30):
+        with contextlib.suppress(NoPicture):
+            of(COMPRESSED, format="any", data=data[:length])
+    for at in range(len(data)):
+        damaged = data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :]
+        with contextlib.suppress(NoPicture):
+            assert of(COMPRESSED, format="any", data=damaged).data == damaged
+
+
+DEPTHS = [0] * 20 + [800 + number for number in range(400)] + [65_535] * 2  # millimetres
+
+
+@pytest.mark.parametrize("encoding", ["mono16", "16UC1", "bayer_rggb16"])
+@pytest.mark.parametrize("big", [False, True])
+def test_sixteen_bits_are_scaled_for_the_eye(encoding: str, big: bool) -> None:
+    """A depth camera's picture has 1 % of all 16 bits: as it is, it would be black."""
+    data = struct.pack(f"{'>' if big else '<'}{len(DEPTHS)}H", *DEPTHS)
+    size = {"width": len(DEPTHS), "height": 1, "step": len(data)}
+    found = of(RAW, **size, encoding=encoding, is_bigendian=int(big), data=data)
+    assert_scaled(shown(found))
+
+
+def test_a_compressed_depth_is_scaled_for_the_eye() -> None:
+    depths = Image.frombytes("I;16", (len(DEPTHS), 1), struct.pack(f"<{len(DEPTHS)}H", *DEPTHS))
+    packed = io.BytesIO()
+    depths.save(packed, "PNG")
+    for head in (bytes(12), b""):
+        found = of(COMPRESSED, format="16UC1; compressedDepth png", data=head + packed.getvalue())
+        assert_scaled(shown(found))
+    with pytest.raises(NoPicture) as error:
+        of(COMPRESSED, format="16UC1; compressedDepth png", data=bytes(12) + packed.getvalue()[:-30])
+    assert code_of(error.value) == "camera_broken"
+
+
+def assert_scaled(found: Image.Image) -> None:
+    greys = list(found.convert("L").tobytes())[20:-2]
+    assert greys[0] < 40
+    assert greys[-1] > 215
+    assert all(after > before - 8 for before, after in pairwise(greys))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "order"),
+    [("yuv422_yuy2", "yuyv"), ("yuyv", "yuyv"), ("yuv422", "uyvy"), ("uyvy", "uyvy")],
+)
+def test_yuv_pictures_have_their_colours(encoding: str, order: str) -> None:
+    y, u, v = Image.new("RGB", (1, 1), ORANGE).convert("YCbCr").tobytes()
+    pair = bytes({"y": y, "u": u, "v": v}[letter] for letter in order)
+    size = {"width": 16, "height": 9, "step": 37}
+    data = (pair * 8).ljust(37, b"\xff") * 9
+    found = shown(of(RAW, **size, encoding=encoding, data=data[:-5])).convert("RGB")
+    for at in ((0, 0), (15, 0), (0, 8), (15, 8)):
+        pixel = found.getpixel(at)
+        assert isinstance(pixel, tuple)
+        assert all(abs(a - b) <= 8 for a, b in zip(pixel, ORANGE, strict=True)), pixel

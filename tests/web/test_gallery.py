@@ -65,7 +65,7 @@ def test_it_reads_in_the_language_of_the_cookie(server: Server) -> None:
         assert reason in page
         for sentence in ("bridge", "parameter_read", "hold_since", "table_empty", "camera_encoding"):
             at = time_of_day("14:31:52" if sentence == "parameter_read" else "14:31:58")
-            assert render(say(sentence, encoding="mono16", time=at), language) in page, sentence
+            assert render(say(sentence, encoding="32FC1", time=at), language) in page, sentence
         assert '<p class="text-small" lang="en">locked by several</p>' in page
 
 

@@ -15,7 +15,8 @@ PictureType = Literal["sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 class Camera(TopicWidget, DisplayWidget):
     """Shows the newest picture of a topic, which is subscribed to only while a browser shows it.
 
-    One older than `max_age_s` is marked as old; of one with more than `max_bytes` nothing is shown.
+    One older than `max_age_s` is marked as old; of one with more than `max_bytes`, or more than
+    `max_side_px` pixels a side, nothing is shown.
     Each browser gets at most `max_hz` pictures per second, and as few as it takes.
     """
 
@@ -25,6 +26,7 @@ class Camera(TopicWidget, DisplayWidget):
     max_age_s: Seconds = 1.0
     max_hz: Annotated[float, Field(ge=0.1, le=60)] = 15.0
     max_bytes: Annotated[int, Field(ge=1_000, le=64_000_000)] = 8_000_000
+    max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 4096
     span: Span = 6
     rows: Annotated[int, Field(ge=1, le=8)] = 2
 

@@ -77,7 +77,7 @@ CAMERAS: Final = (
         "unreadable",
         "camera",
         CAMERA,
-        {"state": "unreadable", "note": say("camera_encoding", encoding="mono16")},
+        {"state": "unreadable", "note": say("camera_encoding", encoding="32FC1")},
     ),
     Example(
         "none reaches this screen",
