@@ -149,17 +149,18 @@ def open_read_only(folder: Path) -> sqlite3.Connection:
 
 
 class Files:
-    """The log's files, to notice if one is replaced after the log was opened.
+    """The files of an open database, to notice if one is replaced after it was opened.
 
     Identified by inode instead of an open descriptor: closing any descriptor of a file releases all of
     SQLite's locks on it.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._known = {str(path): _inode(str(path)) for path in _paths(folder)}
+    def __init__(self, folder: Path, name: str = NAME) -> None:
+        self._main = name
+        self._known = {str(path): _inode(str(path)) for path in _paths(folder, name)}
 
     def check(self) -> None:
-        """LogGone if a file was removed, renamed or replaced; LogCorrupt if the log was emptied."""
+        """LogGone if a file was removed, renamed or replaced; LogCorrupt if it was emptied."""
         for path, known in self._known.items():
             try:
                 found = _inode(path)
@@ -167,13 +168,13 @@ class Files:
                 found = None
             if found != known:
                 name = os.path.basename(path)
-                raise LogGone(say("log_taken", name=name), itself=name == NAME)
+                raise LogGone(say("log_taken", name=name), itself=name == self._main)
         if not os.stat(next(iter(self._known))).st_size:
             raise LogCorrupt(say("log_emptied"))
 
 
-def _paths(folder: Path) -> list[Path]:
-    return [folder / (NAME + suffix) for suffix in SUFFIXES]
+def _paths(folder: Path, name: str = NAME) -> list[Path]:
+    return [folder / (name + suffix) for suffix in SUFFIXES]
 
 
 def _inode(path: str) -> tuple[int, int]:

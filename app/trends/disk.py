@@ -6,23 +6,24 @@ and are written as soon as the disk takes them again.
 
 import asyncio
 import logging
+import math
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from app.audit.database import as_log_error
-from app.errors import LogCorrupt, LogError
+from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.trend import disk_fields, trends_of
 from app.robot.history import Bucket, FieldHistory, History, Level
 from app.robot.state import RobotState
-from app.trends.file import FieldName, Rows, TrendFile, set_aside
+from app.trends.file import FieldName, Rows, TrendFile, remove_journal, set_aside
 
 log = logging.getLogger("kiosk.trends")
 
@@ -47,6 +48,14 @@ class Kept(NamedTuple):
         return min(self.field.keep_s, level.width * level.most)
 
 
+def _by_wall_clock(buckets: Iterable[Bucket], history: History) -> list[Bucket]:
+    """Buckets with the time of the wall clock: of those of this run as it is now."""
+    return [
+        bucket._replace(at=bucket.at + history.shift) if bucket.at >= history.start else bucket
+        for bucket in buckets
+    ]
+
+
 class TrendDisk:
     """The histories of all robots of a panel on disk, from `start` to `stop`."""
 
@@ -61,6 +70,7 @@ class TrendDisk:
         self._file: TrendFile | None = None
         self._fault: TextLike = ""
         self._busy = False
+        self._more = False  # whether one transaction does not take all that is due
         self._transactions = 0
         self._timer: asyncio.TimerHandle | None = None
         self._thread = threading.Thread(target=self._run, name="trends", daemon=True)
@@ -113,6 +123,7 @@ class TrendDisk:
         monotonic, wall = time.monotonic(), time.time()
         rows: dict[FieldName, dict[int, list[Bucket]]] = {}
         newest: dict[int, float] = {}
+        more = False
         for one in self._kept:
             one.history.set_clock(monotonic, wall)
             for level in one.field.levels:
@@ -120,11 +131,10 @@ class TrendDisk:
                 due = list(islice(level.since(since), MOST_ROWS))
                 if due:
                     newest[id(level)] = due[-1].at
-                    shift = one.history.shift
-                    moved = [bucket._replace(at=bucket.at + shift) for bucket in due]
-                    rows.setdefault(one.name, {})[int(level.width)] = moved
+                    rows.setdefault(one.name, {})[int(level.width)] = _by_wall_clock(due, one.history)
+                    more = more or len(due) == MOST_ROWS
         if rows:
-            self._busy = True
+            self._busy, self._more = True, more
             self._queue.put(lambda: self._write(rows, newest, wall))
 
     def _take(self, found: Loaded) -> None:
@@ -147,6 +157,11 @@ class TrendDisk:
             history.fault = fault
             show()
 
+    def _begin_again(self, _: None) -> None:
+        self._saved = {
+            id(level): -math.inf for field_on_disk in self._kept for level in field_on_disk.field.levels
+        }
+
     # Below: on the thread.
 
     def _run(self) -> None:
@@ -165,6 +180,7 @@ class TrendDisk:
 
     def _load(self, now: float) -> Loaded:
         found: Loaded = {}
+        dropped = 0
         try:
             with as_log_error():
                 file = self._open()
@@ -172,10 +188,13 @@ class TrendDisk:
                     for level in one.field.levels:
                         since = now - one.keep_s(level)
                         width = int(level.width)
+                        dropped += file.remove_future(one.name, width, now)
                         found[one.name, width] = list(file.buckets(one.name, width, since))
                 file.remove_unused([one.name for one in self._kept], now)
         except LogError as error:
             self._failed(error)
+        if dropped:
+            log.error("%s: %d stored values are in the future and are dropped", self._folder, dropped)
         return found
 
     def _write(self, rows: Rows, newest: dict[int, float], now: float) -> None:
@@ -199,19 +218,25 @@ class TrendDisk:
         """On the event loop: what was written is due no more; the newest buckets still grow."""
         self._busy = False
         self._saved |= newest
+        if newest and self._more:
+            self._submit()
         if newest and self._fault:
             log.info("trends are written to %s again", self._folder)
             self._show_fault("")
 
     def _failed(self, error: LogError) -> None:
-        """Sets the fault, logged once; the file is opened again for the next transaction, and a new one
-        in place of a damaged one."""
+        """Sets the fault, logged once; the file is opened again for the next transaction. In place of
+        one that is damaged or gone a new one is begun, with all that is in memory."""
         if self._file is not None:
             self._file.close()
             self._file = None
-        if isinstance(error, LogCorrupt):
+        if isinstance(error, LogCorrupt | LogGone):
             with suppress(OSError):
-                set_aside(self._folder)
+                if isinstance(error, LogCorrupt):
+                    set_aside(self._folder)
+                elif error.is_main_file:
+                    remove_journal(self._folder)
+            self._call(self._begin_again, None)
         if not self._fault:
             log.error("trends are not written to %s: %s", self._folder, error)
         self._call(self._show_fault, say("trend_not_kept", why=error.text))

@@ -5,12 +5,14 @@ while it is written.
 """
 
 import logging
+import math
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from app.audit.database import Files
 from app.robot.history import Bucket
 
 log = logging.getLogger("kiosk.trends")
@@ -20,6 +22,7 @@ SUFFIXES: Final = ("", "-wal", "-shm")
 VERSION: Final = 1
 BUSY_TIMEOUT_S: Final = 1.0
 WAL_BYTES: Final = 4_000_000
+FUTURE_S: Final = 31 * 86_400.0  # a clock that was set back by more has written no rows that help
 UNUSED_S: Final = 31 * 86_400.0  # what no trend of the panel shows any more is kept for so long
 
 SCHEMA: Final = """
@@ -49,13 +52,21 @@ def set_aside(folder: Path) -> None:
             file.replace(folder / (name + suffix))
 
 
+def remove_journal(folder: Path) -> None:
+    """Removes what belongs to a file that is gone: a new file must not be opened with it."""
+    for suffix in SUFFIXES[1:]:
+        (folder / (NAME + suffix)).unlink(missing_ok=True)
+
+
 class TrendFile:
-    """The open file. Each method may raise sqlite3.Error or OSError."""
+    """The open file. Each method may raise sqlite3.Error or OSError, `write` also LogGone or LogCorrupt
+    if the file was removed, replaced or emptied."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.path = folder / NAME
         self._db = self._open()
+        self._files = Files(folder, NAME)
         self._numbers: dict[FieldName, int] = {}
 
     def _open(self) -> sqlite3.Connection:
@@ -67,7 +78,7 @@ class TrendFile:
             if db.execute("PRAGMA user_version").fetchone()[0] > VERSION:
                 raise sqlite3.OperationalError("the file is of a newer version of this program")
             db.executescript(SCHEMA)
-            db.execute(f"PRAGMA user_version = {VERSION}")
+            db.execute(f"PRAGMA user_version = {VERSION}")  # also makes the journal's files
         except BaseException:
             db.close()
             raise
@@ -77,17 +88,20 @@ class TrendFile:
         self._db.close()
 
     def buckets(self, name: FieldName, width: int, since: float) -> Iterator[Bucket]:
-        """The buckets of a field in order, from a time on."""
+        """The buckets of a field in order, from a time on; those that can't be drawn are left out."""
         rows = self._db.execute(
             "SELECT at, low, high, last, gap FROM bucket WHERE field = ? AND width = ? AND at >= ? "
             "ORDER BY at",
             (self._number(name), width, since),
         )
-        yield from (Bucket(at, low, high, last, bool(gap)) for at, low, high, last, gap in rows)
+        for at, low, high, last, gap in rows:
+            if all(map(math.isfinite, (at, low, high, last))):
+                yield Bucket(at, low, high, last, bool(gap))
 
     def write(self, rows: Rows, keep_s: Mapping[tuple[FieldName, int], float], now: float) -> None:
         """Writes buckets, in place of those with the same time, and removes the oldest: `keep_s` is by
         field and width."""
+        self._files.check()
         self._db.execute("BEGIN IMMEDIATE")
         try:
             for name, levels in rows.items():
@@ -106,6 +120,13 @@ class TrendFile:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
             raise
+
+    def remove_future(self, name: FieldName, width: int, now: float) -> int:
+        """Removes the buckets of a field that are far in the future: nothing could follow them. Returns
+        how many there were."""
+        where = (self._number(name), width, now + FUTURE_S)
+        delete = "DELETE FROM bucket WHERE field = ? AND width = ? AND at > ?"
+        return self._db.execute(delete, where).rowcount
 
     def remove_unused(self, names: Iterable[FieldName], now: float) -> None:
         """Removes old buckets of fields that the panel no longer names."""

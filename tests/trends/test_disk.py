@@ -2,6 +2,8 @@
 
 import asyncio
 import logging
+import math
+import os
 import shutil
 import sqlite3
 import time
@@ -286,3 +288,78 @@ def test_a_field_that_is_not_kept_on_disk_is_not_in_the_file(tmp_path: Path) -> 
         file.close()
 
     run(work())
+
+
+@pytest.mark.parametrize("how", ["removed", "moved", "replaced", "emptied", "journal"])
+def test_a_file_that_goes_while_it_is_written_is_begun_again_with_all_that_is_known(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """Values of the run before and of this one, in several transactions."""
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr(disks, "MOST_ROWS", 2)
+    folder = tmp_path / "data"
+    path = folder / NAME
+    now = time.time()
+    before = [Bucket(now - 60 + n, 0.0, 5.0 + n, 0.0, gap=False) for n in range(7)]
+
+    async def work() -> None:
+        file = TrendFile(folder)
+        file.write({FIELD: {1: before}}, {}, now)
+        file.close()
+        cell = Cell(folder)
+        await cell.disk.start()
+        cell.says(1.0)
+        await settled(lambda: path.with_name(f"{NAME}-wal").stat().st_size)
+        go(path, how)
+        cell.says(20.0)
+        await settled(lambda: cell.robot.history.fault)
+        cell.says(21.0)
+        await settled(lambda: not cell.robot.history.fault)
+        await cell.disk.stop()
+        again = Cell(folder)
+        await again.disk.start()
+        kept = again.robot.history.fields["speed", "data"].levels[0]
+        assert set(kept.high) >= {5.0 + n for n in range(7)}
+        assert 21.0 in kept.high
+        await again.disk.stop()
+
+    run(work())
+    assert caplog.text.count("trends are not written") == 1
+    assert "are written to" in caplog.text
+
+
+def go(path: Path, how: str) -> None:
+    if how == "removed":
+        path.unlink()
+    elif how == "moved":
+        path.rename(path.with_name("elsewhere"))
+    elif how == "emptied":
+        os.truncate(path, 0)
+    elif how == "journal":
+        path.with_name(f"{NAME}-wal").unlink()
+    else:
+        other = TrendFile(path.parent.parent / "other")
+        other.close()
+        other.path.replace(path)
+
+
+@pytest.mark.parametrize("at", [1e300, NOW + 1e9, math.inf])
+def test_values_far_in_the_future_are_dropped_at_the_start(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, at: float
+) -> None:
+    """Else no value would come after them."""
+    file = TrendFile(tmp_path)
+    rows = [Bucket(at, 0.0, 99.0, 0.0, gap=False), Bucket(time.time() - 5, 0.0, 3.0, 0.0, gap=False)]
+    file.write({FIELD: {1: [*rows, rows[1]._replace(at=rows[1].at + 1, high=math.inf)]}}, {}, NOW)
+    file.close()
+
+    async def work() -> None:
+        cell = Cell(tmp_path)
+        await cell.disk.start()
+        cell.says(7.0)
+        assert max(cell.peaks()) == 7.0
+        assert list(cell.field.levels[0].high) == [3.0, 7.0]
+        await cell.disk.stop()
+
+    run(work())
+    assert "1 stored values are in the future" in caplog.text
