@@ -53,6 +53,7 @@ COMMON = {
     "app.i18n.text",
     "app.i18n.values",
     "app.icons",
+    "app.pictures",
     "app.printable",
     "app.rate_limit",
     "app.repeated_records",

@@ -4,10 +4,12 @@ Exit status, of `update` and `uninstall` too: 0 done, 1 it could not be done, 2 
 line, or not confirmed.
 """
 
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Final
 
 from app.cli.parser import USAGE_ERROR, Parser
 from app.errors import SettingsError
@@ -17,6 +19,7 @@ from app.install.plan import SCREEN, SERVER, Options, steps
 from app.install.step import apply, describe
 
 PROG = "python -m app.cli install"
+UMASK: Final = 0o022  # the server's user has to read what root's shell may keep for itself
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -25,6 +28,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def exit_status(work: Callable[[Namespace], int], given: Namespace) -> int:
     """That of the work; 1 with the sentence if it can't be done."""
+    os.umask(UMASK)
     try:
         return work(given)
     except (SettingsError, OSError) as error:

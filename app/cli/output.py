@@ -45,6 +45,8 @@ def draft_of(file: Path, force: bool) -> Iterator[Path]:
     draft = target.with_name(f".{target.name}.new")
     try:
         with writing(file):
+            draft.unlink(missing_ok=True)
+            draft.touch(exist_ok=False)  # not a link that somebody has put there
             yield draft
             check_absent(file, force)
             draft.replace(target)

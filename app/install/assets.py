@@ -2,6 +2,7 @@
 
 import sys
 import zipfile
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,7 @@ NAME: Final = "operator_panel-"
 class Assets:
     """The shipped files of a wheel; without one those of this program."""
 
-    def __init__(self, wheel: Path | None = None) -> None:
+    def __init__(self, wheel: Path | BytesIO | None = None) -> None:
         self._wheel = wheel
 
     def text(self, name: str) -> str:
@@ -27,7 +28,8 @@ class Assets:
             with zipfile.ZipFile(self._wheel) as archive:
                 return archive.read(f"app/{name}").decode()
         except (OSError, KeyError, zipfile.BadZipFile) as error:
-            raise SettingsError(f"{self._wheel} is no wheel of the operator panel: {error}") from error
+            name = f"{self._wheel}" if isinstance(self._wheel, Path) else "the release's wheel"
+            raise SettingsError(f"{name} is no wheel of the operator panel: {error}") from error
 
 
 def own_wheel() -> Path | None:

@@ -1,6 +1,5 @@
 """Steps that write files, and the folders around them."""
 
-import shutil
 from dataclasses import dataclass
 
 from app.install.host import Host, StepFailed
@@ -19,24 +18,22 @@ class OwnFile:
         return f"write {self.path} ({self.about})"
 
     def is_done(self, host: Host) -> bool:
-        path = host.path(self.path)
-        return path.is_file() and path.read_text(errors="replace") == self.content
+        return has_content(host, self.path, self.content.encode())
 
     def do(self, host: Host) -> None:
-        write(host, self.path, self.content.encode(), self.mode)
+        host.files.write(self.path, self.content.encode(), self.mode)
 
     def undo(self, host: Host) -> str:
-        path = host.path(self.path)
-        if not path.is_file():
+        if not host.files.is_file(self.path):
             return ""
-        path.unlink()
+        host.files.remove(self.path)
         return f"removed {self.path}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UsersFile:
     """A file that the user changes: written if there is none, or if a new one is given; kept at the
-    end."""
+    end. A new one has the mode and owner of the one before."""
 
     path: str
     content: str
@@ -47,19 +44,17 @@ class UsersFile:
         return f"write {self.path} ({self.about})"
 
     def is_done(self, host: Host) -> bool:
-        path = host.path(self.path)
         if not self.replaces:
-            return path.exists()
-        return path.is_file() and path.read_text(errors="replace") == self.content
+            return host.files.exists(self.path)
+        return has_content(host, self.path, self.content.encode())
 
     def do(self, host: Host) -> None:
-        path = host.path(self.path)
-        if path.exists():
-            shutil.copy2(path, path.with_name(f"{path.name}.before"))
-        write(host, self.path, self.content.encode(), 0o644)
+        if host.files.is_file(self.path):
+            host.files.copy(self.path, f"{self.path}.before")
+        host.files.write(self.path, self.content.encode())
 
     def undo(self, host: Host) -> str:
-        return f"kept {self.path}" if host.path(self.path).exists() else ""
+        return f"kept {self.path}" if host.files.exists(self.path) else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,28 +72,20 @@ class Masked:
         return f"mask {self.unit} ({self.about})"
 
     def is_done(self, host: Host) -> bool:
-        path = host.path(self.path)
-        return path.is_symlink() and str(path.readlink()) == "/dev/null"
+        return host.files.link_target(self.path) == "/dev/null"
 
     def do(self, host: Host) -> None:
-        path = host.path(self.path)
-        if path.exists() or path.is_symlink():
+        if host.files.link_target(self.path) or host.files.exists(self.path):
             raise StepFailed(f"{self.path} is not of this installation: remove it, then run this again")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.symlink_to("/dev/null")
+        host.files.link(self.path, "/dev/null")
 
     def undo(self, host: Host) -> str:
         if not self.is_done(host):
             return ""
-        host.path(self.path).unlink()
+        host.files.remove(self.path)
         return f"unmasked {self.unit}"
 
 
-def write(host: Host, path: str, content: bytes, mode: int) -> None:
-    """Writes a file as a whole: after a power cut it is the old one or the new one."""
-    target = host.path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_name(f".{target.name}.new")
-    draft.write_bytes(content)
-    draft.chmod(mode)
-    draft.replace(target)
+def has_content(host: Host, path: str, content: bytes) -> bool:
+    """Whether a file is there, with this content."""
+    return host.files.is_file(path) and host.files.read(path) == content

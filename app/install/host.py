@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import SettingsError
+from app.install.file_tree import FileTree
 
 APT_ENV: Final = {"DEBIAN_FRONTEND": "noninteractive"}
 
@@ -31,9 +32,10 @@ class Host:
         """Whether units can be started: sd_booted(3)."""
         return self.is_this_machine and Path("/run/systemd/system").is_dir()
 
-    def path(self, path: str) -> Path:
-        """Where an absolute path of the machine is."""
-        return self.root / path.lstrip("/")
+    @property
+    def files(self) -> FileTree:
+        """The machine's files by their absolute paths: no link leads out of `root`."""
+        return FileTree(self.root)
 
     def run(self, command: Sequence[str], env: Mapping[str, str] | None = None) -> str:
         """The standard output of a command on the machine; StepFailed with its last lines."""
@@ -70,8 +72,8 @@ def release_of(host: Host) -> tuple[str, str]:
     """(id, version) of the system, such as ("debian", "12"); os-release(5)."""
     found = {}
     for name in ("/etc/os-release", "/usr/lib/os-release"):
-        if host.path(name).exists():
-            for line in host.path(name).read_text().splitlines():
+        if host.files.is_file(name):
+            for line in host.files.read(name).decode(errors="replace").splitlines():
                 key, _, value = line.partition("=")
                 found[key] = value.strip('"')
             break

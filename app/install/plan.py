@@ -9,7 +9,7 @@ from app.errors import SettingsError
 from app.install.assets import Assets, own_wheel
 from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
-from app.install.panel_files import copies_for
+from app.install.panel_files import copies_for, users_file
 from app.install.release import CheckedPanel, Current, Release
 from app.install.step import Step
 from app.install.system import Packages, Unit, User
@@ -158,7 +158,7 @@ def _packages(options: Options, host: Host) -> list[str]:
             f"{name} is not supported: Debian 12, 13 or Ubuntu 24.04 (--any-system goes on anyway)"
         )
     names = [*ALWAYS, *(FOR_THE_SCREEN if options.screen else ())]
-    if not options.screen or any(host.path(path).exists() for path in OTHER_BROWSERS):
+    if not options.screen or any(map(host.files.exists, OTHER_BROWSERS)):
         return names
     if system[0] == "ubuntu":
         raise SettingsError(
@@ -173,8 +173,6 @@ def _content(given: Path | None, assets: Assets, shipped: str) -> str:
     if given is None:
         return assets.text(shipped)
     try:
-        return given.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SettingsError(f"{given} can't be read: {error.strerror}") from error
+        return users_file(given).decode()
     except UnicodeDecodeError as error:
         raise SettingsError(f"{given} can't be read: it is not UTF-8 text") from error

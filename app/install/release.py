@@ -3,11 +3,12 @@ says which one runs, `previous` which one ran before."""
 
 import hashlib
 import os
-import shutil
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Final
 
+from app.install.assets import SUFFIX
+from app.install.file_tree import FileTree
 from app.install.host import Host, StepFailed
 
 BASE: Final = "/opt/operator-panel"
@@ -24,33 +25,29 @@ def release_name(wheel: Path) -> str:
 
 def linked(host: Host, link: str) -> str:
     """The name of the release that `current` or `previous` leads to; "" for none."""
-    path = host.path(f"{BASE}/{link}")
-    return Path(os.readlink(path)).name if path.is_symlink() else ""
+    return PurePosixPath(host.files.link_target(f"{BASE}/{link}")).name
 
 
 def link_to(host: Host, link: str, name: str) -> None:
     """Points `current` or `previous` to a release. At each moment it leads to the old or the new."""
-    draft = host.path(f"{BASE}/.{link}.new")
-    draft.unlink(missing_ok=True)
-    draft.symlink_to(f"releases/{name}")
-    draft.replace(host.path(f"{BASE}/{link}"))
+    host.files.link(f"{BASE}/{link}", f"releases/{name}")
 
 
 def forget(host: Host, name: str) -> None:
     """Removes a release that is no good: nothing goes back to it."""
     if linked(host, "previous") == name:
-        host.path(f"{BASE}/previous").unlink()
-    shutil.rmtree(host.path(f"{RELEASES}/{name}"), ignore_errors=True)
+        host.files.remove(f"{BASE}/previous")
+    host.files.remove_tree(f"{RELEASES}/{name}")
 
 
-def wheel_in(host: Host, name: str) -> Path:
+def wheel_in(host: Host, name: str) -> bytes:
     """The wheel that a release was made of; StepFailed if it is gone."""
-    found = list(host.path(f"{RELEASES}/{name}").glob("*.whl"))
+    found = [file for file in host.files.names(f"{RELEASES}/{name}") if file.endswith(SUFFIX)]
     if not found:
         raise StepFailed(
             f"{RELEASES}/{name} has no wheel: remove the folder and install that release again"
         )
-    return found[0]
+    return host.files.read(f"{RELEASES}/{name}/{found[0]}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,34 +72,32 @@ class Release:
         return f"install {self.wheel.name} into {self.folder} (needs from {source})"
 
     def is_done(self, host: Host) -> bool:
-        return host.path(f"{self.folder}/{COMPLETE}").exists()
+        return host.files.exists(f"{self.folder}/{COMPLETE}")
 
     def do(self, host: Host) -> None:
-        folder = host.path(self.folder)
-        shutil.rmtree(folder, ignore_errors=True)  # a run that was cut off
-        host.path(RELEASES).mkdir(parents=True, exist_ok=True)
+        files = host.files
+        files.remove_tree(self.folder)  # a run that was cut off
+        files.make_folder(RELEASES)
         host.run(["python3", "-m", "venv", self.folder])
-        shutil.copy2(self.wheel, folder)
-        (folder / "requirements.lock").write_text(self.lock)
+        files.write(f"{self.folder}/{self.wheel.name}", self.wheel.read_bytes())
+        files.write(f"{self.folder}/requirements.lock", self.lock.encode())
         pip = [f"{self.folder}/bin/python", "-m", "pip", "install", "--quiet"]
         pip += ["--disable-pip-version-check", "--no-cache-dir", *self._sources(host)]
         host.run([*pip, "--require-hashes", "-r", f"{self.folder}/requirements.lock"])
         host.run([*pip, "--no-deps", f"{self.folder}/{self.wheel.name}"])
         os.sync()
-        (folder / COMPLETE).touch()
+        files.write(f"{self.folder}/{COMPLETE}", b"")
 
     def undo(self, host: Host) -> str:
-        base = host.path(BASE)
-        if not base.exists():
-            return ""
-        shutil.rmtree(base)
-        return f"removed {BASE}"
+        return f"removed {BASE}" if host.files.remove_tree(BASE) else ""
 
     def _sources(self, host: Host) -> list[str]:
         if self.wheels is None:
             return []
         if not host.is_this_machine:  # the command runs inside
-            shutil.copytree(self.wheels, host.path(f"{self.folder}/wheels"))
+            wheels = FileTree(self.wheels, confined=True)
+            for name in wheels.names(""):
+                host.files.write(f"{self.folder}/wheels/{name}", wheels.read(name))
             return ["--no-index", f"--find-links={self.folder}/wheels"]
         return ["--no-index", f"--find-links={self.wheels}"]
 
@@ -110,9 +105,9 @@ class Release:
 def remove_old(host: Host) -> None:
     """Removes all releases but that which runs and the one before it."""
     keep = {linked(host, "current"), linked(host, "previous")}
-    for release in host.path(RELEASES).iterdir():
-        if release.name not in keep:
-            shutil.rmtree(release, ignore_errors=True)
+    for release in host.files.names(RELEASES):
+        if release not in keep:
+            host.files.remove_tree(f"{RELEASES}/{release}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,8 +149,7 @@ class CheckedPanel:
         return f"check {self.panel}"
 
     def is_done(self, host: Host) -> bool:
-        program = host.path(self._command()[0])
-        return program.exists() and host.succeeds(self._command())
+        return host.files.exists(self._command()[0]) and host.succeeds(self._command())
 
     def do(self, host: Host) -> None:
         host.run(self._command())

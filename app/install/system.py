@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from app.install.host import APT_ENV, Host, StepFailed
+
+WANTED: Final = "/etc/systemd/system/multi-user.target.wants"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +53,10 @@ class User:
         return f"add the user {self.name}, without log-in"
 
     def is_done(self, host: Host) -> bool:
-        passwd = host.path("/etc/passwd")
-        return passwd.exists() and f"\n{self.name}:" in f"\n{passwd.read_text(errors='replace')}"
+        if not host.files.is_file("/etc/passwd"):
+            return False
+        users = host.files.read("/etc/passwd").splitlines()
+        return any(user.startswith(f"{self.name}:".encode()) for user in users)
 
     def do(self, host: Host) -> None:
         host.run(["systemd-sysusers", self.file])
@@ -74,8 +79,7 @@ class Unit:
         return f"enable {self.name}" + (" and start it" if host.runs_systemd else "")
 
     def is_done(self, host: Host) -> bool:
-        wanted = host.path("/etc/systemd/system/multi-user.target.wants") / self.name
-        if not wanted.is_symlink():
+        if not host.files.link_target(f"{WANTED}/{self.name}"):
             return False
         return not host.runs_systemd or host.succeeds(["systemctl", "is-active", "--quiet", self.name])
 
@@ -86,7 +90,7 @@ class Unit:
             host.run(["systemctl", "restart", "--no-block", self.name])
 
     def undo(self, host: Host) -> str:
-        if not (host.path("/etc/systemd/system/multi-user.target.wants") / self.name).is_symlink():
+        if not host.files.link_target(f"{WANTED}/{self.name}"):
             return ""
         if host.runs_systemd:
             host.run(["systemctl", "stop", self.name])

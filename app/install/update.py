@@ -6,6 +6,7 @@ import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass
 from http.client import HTTPException
+from io import BytesIO
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -103,9 +104,9 @@ class Updater:
 
     def _start(self, name: str, was_ready: bool) -> str:
         """Starts a release; why it is not good, "" if it is."""
-        screen = self.host.path(f"/etc/systemd/system/{SCREEN}").exists()
+        screen = self.host.files.exists(f"/etc/systemd/system/{SCREEN}")
         try:
-            files = own_files(Assets(wheel_in(self.host, name)), screen)
+            files = own_files(Assets(BytesIO(wheel_in(self.host, name))), screen)
             apply([*files, Current(name, removes_old=False)], self.host, self.say)
             self.services.restart()
         except (SettingsError, OSError) as error:

@@ -24,6 +24,7 @@ from app.i18n import ENGLISH, PanelText, TextLike, render, say
 from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import format_value
+from app.pictures import picture_files
 
 
 class FileContext(NamedTuple):
@@ -111,10 +112,32 @@ def _resolve_file(given: Any, info: ValidationInfo) -> Path:
     """The file's path, relative to the panel file's folder."""
     if not isinstance(given, str) or not given:
         raise ValueError(f"must be the path of a file, not {format_value(given)}")
-    file = _context(info).folder / given
+    folder = _context(info).folder
+    file = folder / given
     if not file.is_file():
         raise ValueError(f"{file} is not a file: the path is relative to the panel file")
+    if not is_inside(file, folder):
+        raise ValueError(
+            f"{file} is not below the panel file's folder, or is a link that leads out of it: put the"
+            f' file itself there, and name it like "pages/{file.name}"'
+        )
     return file
+
+
+def _check_pictures(folder: Path, info: ValidationInfo) -> Path:
+    """Links out of it are not followed: the server sends pictures to everyone."""
+    for file in picture_files(folder).values():
+        if not is_inside(file, folder, _context(info).folder):
+            raise ValueError(
+                f"{file} is a link to {file.resolve()}, which is not below the folder of pictures: put"
+                " the picture itself there"
+            )
+    return folder
+
+
+def is_inside(file: Path, *folders: Path) -> bool:
+    """Whether a file really is below one of the folders, with all links followed."""
+    return any(file.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
 def _check_field_path(given: str) -> str:
@@ -211,6 +234,7 @@ FieldPath = Annotated[str, AfterValidator(_check_field_path)]
 WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
+PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]
 File = Annotated[Path, BeforeValidator(_resolve_file)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 

@@ -1,6 +1,5 @@
 """The descriptions of a panel and its pages. docs/reference/panel-file.md describes each key."""
 
-import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +11,16 @@ from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
 from app.interfaces.validation import format_value
-from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
+from app.panel.base import (
+    Description,
+    Endpoint,
+    Folder,
+    Id,
+    Label,
+    PictureFolder,
+    TopicQos,
+    parse_namespace,
+)
 from app.panel.demo import DemoEntry
 from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
@@ -32,7 +40,7 @@ from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
-from app.panel.widgets.static import PICTURE
+from app.pictures import picture_files
 
 
 def _check_language(given: str) -> str:
@@ -88,7 +96,7 @@ class Panel(Description):
     text_size: TextSize = "normal"
     hand: Hand = "right"
     screens: Screens = ()
-    pictures: Folder | None = None
+    pictures: PictureFolder | None = None
     keyboard: Keyboard = "auto"
     screen: ScreenRules = ScreenRules()
     frame: Frame = Frame.model_validate({})
@@ -115,8 +123,7 @@ class Panel(Description):
     @cached_property
     def picture_files(self) -> dict[str, Path]:
         """The files of the folder of pictures by their names."""
-        files = sorted(self.pictures.iterdir()) if self.pictures else []
-        return {file.name: file for file in files if re.fullmatch(PICTURE, file.name)}
+        return picture_files(self.pictures) if self.pictures else {}
 
     @cached_property
     def styles(self) -> tuple[Path, ...]:

@@ -436,6 +436,16 @@ def test_a_folder_has_one_holder_at_a_time(tmp_path: Path) -> None:
     second.release()
 
 
+def test_the_lock_is_not_written_through_a_link(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_text("not mine")
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / LOCK).symlink_to(other)
+    with pytest.raises(OSError, match="symbolic links"):
+        DataDir(tmp_path / "state").hold()
+    assert other.read_text() == "not mine"
+
+
 def test_a_file_that_is_no_log_is_corrupt_and_can_be_put_aside(tmp_path: Path) -> None:
     (tmp_path / NAME).write_bytes(b"garbage" * 1000)
     with pytest.raises(LogCorrupt):

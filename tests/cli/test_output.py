@@ -20,6 +20,15 @@ def test_a_new_file_is_written_and_nothing_else(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.toml": "new"}
 
 
+def test_a_link_in_place_of_the_draft_is_not_written_through(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_text("not mine")
+    (tmp_path / ".a.toml.new").symlink_to(other)
+    write(tmp_path / "a.toml")
+    assert (tmp_path / "a.toml").read_text() == "new"
+    assert other.read_text() == "not mine"
+
+
 def test_a_file_that_exists_is_replaced_by_force_only(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
     file.write_text("mine")

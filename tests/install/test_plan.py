@@ -51,6 +51,11 @@ def host(tmp_path: Path) -> Host:
     return Host(root)
 
 
+def path_on(host: Host, path: str) -> Path:
+    """Where an absolute path of the machine is."""
+    return host.root / path.lstrip("/")
+
+
 def of_files(plan: list[Step]) -> list[Step]:
     """The steps that need no program of the machine."""
     return [step for step in plan if isinstance(step, (OwnFile, UsersCopy, UsersFile, Masked))]
@@ -103,11 +108,11 @@ def test_a_panel_of_the_users_is_kept_by_the_next_run_and_replaced_by_a_new_one(
     mine.write_text("# first\n")
     apply(of_files(steps(Options(wheel=wheel, panel=mine), host)), host, str)
     apply(of_files(steps(Options(wheel=wheel), host)), host, str)
-    assert host.path(PANEL).read_text() == "# first\n"
+    assert path_on(host, PANEL).read_text() == "# first\n"
     mine.write_text("# second\n")
     apply(of_files(steps(Options(wheel=wheel, panel=mine), host)), host, str)
-    assert host.path(PANEL).read_text() == "# second\n"
-    assert host.path(f"{PANEL}.before").read_text() == "# first\n"
+    assert path_on(host, PANEL).read_text() == "# second\n"
+    assert path_on(host, f"{PANEL}.before").read_text() == "# first\n"
 
 
 def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: Path) -> None:
@@ -132,7 +137,7 @@ def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: P
 
     assert "copy pictures into /etc/operator-panel (1 file)" in "\n".join(describe(plan(), host))
     apply(plan(), host, str)
-    etc = tree(host.path("/etc/operator-panel"))
+    etc = tree(path_on(host, "/etc/operator-panel"))
     assert {name: text for name, text in etc.items() if "/" in name} == files
     assert apply(plan(), host, str) == 0
     (tmp_path / "pictures/plan.svg").write_text("<svg>2</svg>")
@@ -162,7 +167,7 @@ def test_units_of_another_version_replace_those_that_are_there(host: Host, tmp_p
     apply(own_files(Assets(make_wheel(tmp_path / "1")), True), host, str)
     other = make_wheel(tmp_path / "2", "0.2.0", **{f"deploy/{SERVER}": "# other\n"})
     assert apply(own_files(Assets(other), True), host, str) == 1
-    assert host.path(f"/etc/systemd/system/{SERVER}").read_text() == "# other\n"
+    assert path_on(host, f"/etc/systemd/system/{SERVER}").read_text() == "# other\n"
 
 
 def test_the_server_alone_needs_no_screen(host: Host, tmp_path: Path) -> None:
@@ -183,14 +188,14 @@ def test_the_server_alone_needs_no_screen(host: Host, tmp_path: Path) -> None:
 def test_a_system_that_can_not_be_used_is_named(
     host: Host, tmp_path: Path, system: str, said: str
 ) -> None:
-    host.path("/etc/os-release").write_text(system)
+    path_on(host, "/etc/os-release").write_text(system)
     with pytest.raises(SettingsError, match=said):
         steps(Options(wheel=make_wheel(tmp_path)), host)
 
 
 def test_ubuntu_with_chrome_is_good(host: Host, tmp_path: Path) -> None:
-    host.path("/etc/os-release").write_text('ID=ubuntu\nVERSION_ID="24.04"\n')
-    chrome = host.path("/usr/bin/google-chrome-stable")
+    path_on(host, "/etc/os-release").write_text('ID=ubuntu\nVERSION_ID="24.04"\n')
+    chrome = path_on(host, "/usr/bin/google-chrome-stable")
     chrome.parent.mkdir(parents=True)
     chrome.touch()
     packages = steps(Options(wheel=make_wheel(tmp_path)), host)[0]
@@ -218,25 +223,25 @@ def test_a_file_of_the_users_is_never_the_shipped_one(host: Host, tmp_path: Path
     given = Options(wheel=wheel, panel=mine) if option == "panel" else Options(wheel=wheel, zenoh=mine)
     apply(of_files(steps(given, host)), host, str)
     name = {"panel": PANEL, "zenoh": "/etc/operator-panel/zenoh.json5"}[option]
-    assert host.path(name).read_text() == ""
+    assert path_on(host, name).read_text() == ""
     mine.write_bytes(b'title = "caf\xe9"\n')
     with pytest.raises(SettingsError, match="mine can't be read: it is not UTF-8 text"):
         steps(given, host)
 
 
 def test_a_file_in_another_encoding_is_replaced(host: Host, tmp_path: Path) -> None:
-    host.path(PANEL).parent.mkdir(parents=True)
-    host.path(PANEL).write_bytes(b"# caf\xe9\n")
+    path_on(host, PANEL).parent.mkdir(parents=True)
+    path_on(host, PANEL).write_bytes(b"# caf\xe9\n")
     mine = tmp_path / "cell1.toml"
     mine.write_text("# mine\n")
     apply(of_files(steps(Options(wheel=make_wheel(tmp_path), panel=mine), host)), host, str)
-    assert host.path(PANEL).read_text() == "# mine\n"
-    assert host.path(f"{PANEL}.before").read_bytes() == b"# caf\xe9\n"
+    assert path_on(host, PANEL).read_text() == "# mine\n"
+    assert path_on(host, f"{PANEL}.before").read_bytes() == b"# caf\xe9\n"
 
 
 def test_a_unit_that_is_linked_elsewhere_is_not_masked_and_is_kept(host: Host) -> None:
     masked = Masked(unit="ctrl-alt-del.target", about="")
-    link = host.path(masked.path)
+    link = path_on(host, masked.path)
     link.parent.mkdir(parents=True)
     link.symlink_to("/lib/systemd/system/reboot.target")
     assert not masked.is_done(host)
@@ -255,15 +260,15 @@ class Started(Unit):
         return True
 
     def do(self, host: Host) -> None:
-        host.path("/started").touch()
+        path_on(host, "/started").touch()
 
 
 @pytest.mark.parametrize("changed", [False, True])
 def test_a_unit_that_runs_is_started_again_when_something_changed(host: Host, changed: bool) -> None:
     file = OwnFile(path="/etc/x", content="new", about="")
-    host.path("/etc/x").write_text("old" if changed else "new")
+    path_on(host, "/etc/x").write_text("old" if changed else "new")
     assert apply([file, Started(SERVER)], host, str) == 2 * changed
-    assert host.path("/started").exists() is changed
+    assert path_on(host, "/started").exists() is changed
 
 
 def test_an_installed_release_has_its_wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -278,30 +283,30 @@ def test_a_user_is_there_when_the_machine_has_it(host: Host) -> None:
     user = User("operator-kiosk", "")
     assert not user.is_done(host)
     assert user.undo(host) == ""
-    with host.path("/etc/passwd").open("a") as file:
+    with path_on(host, "/etc/passwd").open("a") as file:
         file.write("operator-kiosk:x:999:999::/:/usr/sbin/nologin\n")
     assert user.is_done(host)
 
 
 def test_a_release_that_was_cut_off_is_no_release(host: Host, tmp_path: Path) -> None:
     release = Release(wheel=make_wheel(tmp_path), lock="")
-    host.path(f"{release.folder}/bin").mkdir(parents=True)
+    path_on(host, f"{release.folder}/bin").mkdir(parents=True)
     assert not release.is_done(host)
-    host.path(f"{release.folder}/.complete").touch()
+    path_on(host, f"{release.folder}/.complete").touch()
     assert release.is_done(host)
 
 
 def test_only_the_release_that_runs_and_the_one_before_stay(host: Host) -> None:
     names = ["0.1.0-a", "0.2.0-b", "0.3.0-c"]
     for name in names[:2]:
-        host.path(f"/opt/operator-panel/releases/{name}").mkdir(parents=True)
+        path_on(host, f"/opt/operator-panel/releases/{name}").mkdir(parents=True)
     link_to(host, "current", names[0])
     Current(names[1]).do(host)
     assert (linked(host, "previous"), linked(host, "current")) == (names[0], names[1])
-    host.path(f"/opt/operator-panel/releases/{names[2]}").mkdir()
+    path_on(host, f"/opt/operator-panel/releases/{names[2]}").mkdir()
     Current(names[2]).do(host)
     assert (linked(host, "previous"), linked(host, "current")) == (names[1], names[2])
-    left = {path.name for path in host.path("/opt/operator-panel/releases").iterdir()}
+    left = {path.name for path in path_on(host, "/opt/operator-panel/releases").iterdir()}
     assert left == set(names[1:])
 
 

@@ -13,7 +13,7 @@ from app.cli.command import main
 from app.install.host import Host, StepFailed
 from app.install.release import RELEASES, Current, link_to, linked, release_name
 from app.install.update import Updater
-from tests.install.test_plan import make_wheel
+from tests.install.test_plan import make_wheel, path_on
 
 UP = {"/healthz": (200, "ok"), "/": (200, "<p data-widget>"), "/readyz": (200, "ready")}
 CUT = "cut off"  # the text of a response that ends before its length
@@ -70,7 +70,7 @@ class Machine:
         self.wheels = [make_wheel(folder / f"{n}", f"0.{n}.0") for n in (1, 2)]
         self.first, self.second = map(release_name, self.wheels)
         for wheel, name in zip(self.wheels, (self.first, self.second), strict=True):
-            release = self.host.path(f"{RELEASES}/{name}")
+            release = path_on(self.host, f"{RELEASES}/{name}")
             (release / "bin").mkdir(parents=True)
             (release / wheel.name).write_bytes(wheel.read_bytes())
             (release / ".complete").touch()
@@ -106,7 +106,7 @@ def test_a_release_that_comes_up_stays(tmp_path: Path) -> None:
     machine = Machine(tmp_path, UP)
     machine.update()
     assert machine.runs == machine.second
-    assert machine.host.path("/etc/systemd/system/operator-panel.service").exists()
+    assert path_on(machine.host, "/etc/systemd/system/operator-panel.service").exists()
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_what_does_not_come_up_is_replaced_by_the_release_before(
     assert machine.runs == machine.first
     assert machine.services.pages == UP
     assert linked(machine.host, "previous") == ""
-    assert not machine.host.path(f"{RELEASES}/{machine.second}").exists()
+    assert not path_on(machine.host, f"{RELEASES}/{machine.second}").exists()
 
 
 def test_a_page_without_widgets_is_no_page(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_only_an_update_that_is_good_takes_the_place_of_the_way_back(
     tmp_path: Path, good: bool
 ) -> None:
     machine = Machine(tmp_path, UP if good else {})
-    older = machine.host.path(f"{RELEASES}/0.0.1-a")
+    older = path_on(machine.host, f"{RELEASES}/0.0.1-a")
     older.mkdir()
     link_to(machine.host, "previous", older.name)
     with nullcontext() if good else pytest.raises(StepFailed):

@@ -106,6 +106,51 @@ def test_a_file_that_is_not_there_is_a_fault_of_its_key(write: Write, key: str) 
     assert "gone.file is not a file" in fault.message
 
 
+@pytest.mark.parametrize("key", ["template", "styles"])
+@pytest.mark.parametrize("how", ["absolute", "up", "a link", "a link to its folder"])
+def test_a_file_out_of_the_panels_folder_is_a_fault(
+    write: Write, tmp_path: Path, key: str, how: str
+) -> None:
+    path = write(BOTH)
+    outside = tmp_path.with_name(f"{tmp_path.name}-outside")
+    outside.mkdir()
+    (outside / "a.file").write_text(BOTH)
+    (tmp_path / "a.file").symlink_to(outside / "a.file")
+    (tmp_path / "pages").symlink_to(f"../{outside.name}")
+    name = {
+        "absolute": str(outside / "a.file"),
+        "up": f"../{outside.name}/a.file",
+        "a link": "a.file",
+        "a link to its folder": "pages/a.file",
+    }[how]
+    path.write_text(PANEL.replace('template = "plan.html"', f'{key} = "{name}"'))
+    fault = the_fault(path)
+    assert fault.place == f"page[0].{key}"
+    assert "a.file is not below the panel file's folder, or is a link" in fault.message
+    assert 'name it like "pages/a.file"' in fault.message
+
+
+def test_a_link_inside_of_the_panels_folder_is_followed(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "pages").mkdir()
+    (tmp_path / "pages/plan.html").symlink_to(tmp_path / "plan.html")
+    path = write(BOTH, PANEL.replace('"plan.html"', '"pages/plan.html"'))
+    assert check_panel(path).notes == ()
+
+
+def test_a_picture_that_is_a_link_out_of_its_folder_is_a_fault(write: Write, tmp_path: Path) -> None:
+    """The server sends pictures to everyone."""
+    path = write(BOTH)
+    (tmp_path / "pictures/inside.svg").symlink_to("cell.svg")
+    (tmp_path / "pictures/notes.txt").symlink_to("/etc/passwd")
+    assert list(check_panel(path).panel.picture_files) == ["cell.svg", "inside.svg"]
+    (tmp_path / "pictures/key.svg").symlink_to("/etc/passwd")
+    with pytest.raises(PanelError) as caught:
+        load_panel(path)
+    (fault,) = caught.value.faults
+    assert fault.place == "pictures"
+    assert "key.svg is a link to /etc/passwd, which is not below" in fault.message
+
+
 def test_a_widget_with_a_faulty_id_is_one_fault(write: Write) -> None:
     fault = the_fault(write(BOTH, PANEL.replace('id = "speed"', 'id = "Speed"')))
     assert fault.place == "page[0].widget[0].id"

@@ -1,7 +1,7 @@
 """What only stands on a page: texts, pictures, links to other pages."""
 
 from collections.abc import Iterator
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -10,8 +10,7 @@ from app.panel.base import Id
 from app.panel.faults.wording import list_names
 from app.panel.icons import Icon
 from app.panel.widgets.families import BaseWidget, CheckContext
-
-PICTURE: Final = r"^[A-Za-z0-9_-]+\.(svg|png|jpg|jpeg|webp)$"
+from app.pictures import PICTURE
 
 
 class Static(BaseWidget):
