@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import pytest
 import zenoh
+import zstandard
 from mcap.writer import Writer
 
 from app.errors import RecordingError
@@ -71,8 +72,8 @@ def mcap_file(folder: Path, *, also_json: bool = False) -> Path:
     return path
 
 
-def sqlite_file(folder: Path) -> Path:
-    """A .db3 file as rosbag2 of ROS 2 Humble writes it."""
+def sqlite_file(folder: Path, pack: Callable[[bytes], bytes] = bytes) -> Path:
+    """A .db3 file as rosbag2 of ROS 2 Humble writes it; `pack` is what it does to each message."""
     path = folder / "cell_0.db3"
     with closing(sqlite3.connect(path)) as base:
         base.execute(
@@ -87,17 +88,21 @@ def sqlite_file(folder: Path) -> Path:
         for topic, (name, qos) in TOPICS.items():
             base.execute("INSERT INTO topics VALUES(?, ?, ?, 'cdr', ?)", (ids[topic], topic, name, qos))
         for at, topic, payload in MESSAGES:
-            row = (ids[topic], START_NS + int(at * 1e9), payload)
+            row = (ids[topic], START_NS + int(at * 1e9), pack(payload))
             base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", row)
         base.commit()
     return path
 
 
-def folder_of_rosbag2(folder: Path) -> Path:
-    """A folder whose metadata.yaml names its files."""
+def folder_of_rosbag2(
+    folder: Path, *, qos: str | None = None, mode: str = "", more: int = 0, mcap: bool = False
+) -> Path:
+    """A folder whose metadata.yaml names its file: with another QoS than the file (`qos`), with `more`
+    messages than the file, or with a `mode` of compression."""
     bag = folder / "bag"
     bag.mkdir()
-    name = sqlite_file(bag).name
+    pack = zstandard.ZstdCompressor().compress if mode == "MESSAGE" else bytes
+    name = (mcap_file(bag) if mcap else sqlite_file(bag, pack)).name
     counts = {topic: sum(t == topic for _, t, _ in MESSAGES) for topic in TOPICS}
     topics = [
         {
@@ -105,21 +110,21 @@ def folder_of_rosbag2(folder: Path) -> Path:
                 "name": topic,
                 "type": kind,
                 "serialization_format": "cdr",
-                "offered_qos_profiles": qos,
+                "offered_qos_profiles": offered if qos is None else qos,
             },
             "message_count": counts[topic],
         }
-        for topic, (kind, qos) in TOPICS.items()
+        for topic, (kind, offered) in TOPICS.items()
     ]
     about = {
         "version": 5,
-        "storage_identifier": "sqlite3",
+        "storage_identifier": "mcap" if mcap else "sqlite3",
         "duration": {"nanoseconds": int(MESSAGES[-1][0] * 1e9)},
         "starting_time": {"nanoseconds_since_epoch": START_NS},
-        "message_count": len(MESSAGES),
+        "message_count": len(MESSAGES) + more,
         "topics_with_message_count": topics,
-        "compression_format": "",
-        "compression_mode": "",
+        "compression_format": "zstd" if mode else "",
+        "compression_mode": mode,
         "relative_file_paths": [name],
         "files": [],
     }
@@ -169,6 +174,71 @@ def test_each_message_comes_in_its_time_as_it_was_recorded(
     ]
 
 
+@pytest.mark.parametrize("mcap", [False, True])
+@pytest.mark.parametrize("qos", ["", LATCHED + SENSOR])
+def test_a_folder_whose_metadata_has_other_qos_than_its_file_is_replayed_whole(
+    tmp_path: Path, opened: Opened, qos: str, mcap: bool
+) -> None:
+    recording = opened(folder_of_rosbag2(tmp_path, qos=qos, mcap=mcap))
+    assert [one.payload for one in recording.messages()] == [payload for *_, payload in MESSAGES]
+    assert recording.topics["/joint_states"].qos == (Qos(True, True, 1) if qos else Qos())
+
+
+def test_messages_that_are_compressed_are_replayed_as_cdr(tmp_path: Path, opened: Opened) -> None:
+    """From the folder, whose metadata.yaml says so, and from its file alone, which does not."""
+    folder = folder_of_rosbag2(tmp_path, mode="MESSAGE")
+    for path in (folder, folder / "cell_0.db3"):
+        assert [one.payload for one in opened(path).messages()] == [payload for *_, payload in MESSAGES]
+
+
+@pytest.mark.parametrize(
+    ("pack", "words"),
+    [
+        (lambda payload: b"\x04\x22\x4d\x18" + payload, "is neither CDR nor compressed by zstd"),
+        (lambda payload: zstandard.ZstdCompressor().compress(payload)[:-2], "is cut off"),
+    ],
+    ids=["lz4", "cut"],
+)
+def test_a_message_that_is_no_cdr_is_not_replayed(
+    tmp_path: Path, opened: Opened, pack: Callable[[bytes], bytes], words: str
+) -> None:
+    recording = opened(sqlite_file(tmp_path, pack))
+    with pytest.raises(RecordingError, match=words) as raised:
+        list(recording.messages())
+    assert str(raised.value).endswith("saves the messages that are whole")
+
+
+def test_messages_that_a_folder_names_and_its_files_lack_are_noted(
+    tmp_path: Path, opened: Opened
+) -> None:
+    (note,) = opened(folder_of_rosbag2(tmp_path, more=3)).notes
+    assert note.endswith("its files have 4 messages, its metadata.yaml names 7")
+
+
+@pytest.mark.parametrize("kept", [1, 8, 100, 200, -1, -9, -50])
+@pytest.mark.parametrize("in_folder", [False, True])
+def test_a_file_that_is_cut_off_is_named_with_what_helps(
+    tmp_path: Path, kept: int, in_folder: bool
+) -> None:
+    path = folder_of_rosbag2(tmp_path, mcap=True) if in_folder else mcap_file(tmp_path)
+    file = path / "cell.mcap" if in_folder else path
+    file.write_bytes(file.read_bytes()[:kept])
+    with pytest.raises(RecordingError) as raised:
+        Recording(path)
+    helps = f"`mcap recover {file} -o recovered.mcap` saves the messages that are whole"
+    what = "can't be read: it is not an MCAP file" if kept == 1 else "was not finished, or is cut off"
+    assert str(raised.value) in (f"{file} {what}", f"{file} {what}; {helps}")
+
+
+def test_a_file_of_messages_that_are_not_there_ends_with_an_error(
+    tmp_path: Path, opened: Opened, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = opened(sqlite_file(tmp_path))
+    monkeypatch.setattr(recording._file, "messages", lambda _: iter(()))
+    with pytest.raises(RecordingError, match="it has 0 of 4 messages"):
+        list(recording.messages())
+
+
 def test_the_rate_is_how_many_times_as_fast(tmp_path: Path, opened: Opened) -> None:
     fast = ReplayedRobot(opened(mcap_file(tmp_path)), rate=2)
     assert [t for t, *_ in stepped(fast, [0, 0.05, 0.1, 0.2, 0.3])] == [0, 0.05, 0.1, 0.3]
@@ -198,6 +268,7 @@ def test_what_is_no_ros_topic_is_left_out_and_named(tmp_path: Path, opened: Open
     [
         ("gone.mcap", None, "does not exist: it must be an .mcap or a .db3 file, or a folder"),
         ("cell.bag", b"#ROSBAG V2.0\n", "is not a recording: it must be"),
+        ("cell_0.db3.zstd", b"", "is a compressed file of a bag: play its folder, or unpack it"),
         ("cell.mcap", b"no mcap at all", "can't be read"),
         ("cell.db3", b"no database at all", "can't be read"),
         ("empty.mcap", b"", "can't be read"),
@@ -233,6 +304,14 @@ def test_what_a_panel_misses_in_a_recording_is_named(tmp_path: Path, opened: Ope
     assert lacks[-1].startswith(
         "a recording does not answer: no node receives what the panel publishes"
     )
+
+
+def test_a_recording_that_is_cut_off_ends_with_status_2(tmp_path: Path) -> None:
+    path = mcap_file(tmp_path)
+    path.write_bytes(path.read_bytes()[:-60])
+    command = [sys.executable, "-m", "app.simulator", "tcp/127.0.0.1:0", "--bag", str(path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, "mcap recover" in done.stderr) == (2, True), done.stderr
 
 
 def replaying(path: Path, endpoint: str, *options: str) -> Process:
