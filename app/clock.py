@@ -1,6 +1,7 @@
 """The server's clock, and times and ages as text."""
 
 import time
+from datetime import datetime
 from functools import lru_cache
 from typing import Final
 
@@ -33,15 +34,36 @@ def age_changes_at(at: float, now: float) -> float:
 
 def format_datetime(wall: float) -> Text:
     """Date and time of `wall` (seconds since the epoch) in the server's time zone."""
-    return date_and_time(time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall)))
+    at = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall))
+    return date_and_time(f"{at} {offset_if_twice(wall)}".rstrip())
 
 
 def format_time(wall: float) -> Text:
-    """Time of day of `wall` (seconds since the epoch) in the server's time zone."""
+    """Time of day of `wall` (seconds since the epoch) in the server's time zone, with its offset where
+    the clock shows this time twice."""
     return _time(int(wall), time.timezone)
+
+
+def iso_time(wall: float) -> str:
+    """`wall` as ISO 8601 with milliseconds and the offset of the server's time zone."""
+    return datetime.fromtimestamp(wall).astimezone().isoformat(timespec="milliseconds")
+
+
+def offset_text(wall: float) -> str:
+    """The offset of the server's time zone from UTC at `wall`: "+02:00"."""
+    return datetime.fromtimestamp(int(wall)).astimezone().isoformat()[19:]
+
+
+def offset_if_twice(wall: float) -> str:
+    """The offset from UTC, if the clock shows the time of day of `wall` twice on this day, as at the
+    end of summer time; else ""."""
+    local = datetime.fromtimestamp(int(wall))
+    other = local.replace(fold=1 - local.fold)
+    return "" if other.timestamp() == local.timestamp() else offset_text(wall)
 
 
 @lru_cache(maxsize=1000)
 def _time(second: int, _: int) -> Text:
     """What is shown at a time has the same one many times over."""
-    return time_of_day(time.strftime("%H:%M:%S", time.localtime(second)))
+    at = time.strftime("%H:%M:%S", time.localtime(second))
+    return time_of_day(f"{at} {offset_if_twice(second)}".rstrip())

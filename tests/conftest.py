@@ -217,13 +217,22 @@ def peer() -> Iterator[tuple[str, zenoh.Session]]:
 
 
 @pytest.fixture
-def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The server's time zone is UTC."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
+def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Sets the server's time zone, until the end of the test."""
+
+    def set_zone(name: str) -> None:
+        monkeypatch.setenv("TZ", name)
+        time.tzset()
+
+    yield set_zone
     monkeypatch.undo()
     time.tzset()
+
+
+@pytest.fixture
+def utc(time_zone: Callable[[str], None]) -> None:
+    """The server's time zone is UTC."""
+    time_zone("UTC")
 
 
 @pytest.fixture(scope="module")

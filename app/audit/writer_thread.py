@@ -17,6 +17,7 @@ from app.audit.opening import Opening, unfinished_entries
 from app.audit.store import Store
 from app.audit.syncer import Syncer
 from app.audit.ticket import Limits, Repeated, Results, Ticket
+from app.clock import format_time
 from app.errors import FolderInUse, LogError, LogGone
 from app.i18n import TextLike, say
 
@@ -78,7 +79,7 @@ class WriterThread:
         self._start_logged = False
         self._sync_error: LogError | None = None
         self._failures = 0
-        self._fault_since = ""
+        self._fault_since: TextLike = ""
         self._try_at = 0.0
         self._hourly_at = 0.0
         self._checkpoint_at = 0.0
@@ -202,7 +203,7 @@ class WriterThread:
         self._try_at = time.monotonic() + wait
         if self.fault != error.text:
             log.error("the operator's log can't be written: %s", error)
-            self._fault_since = self._fault_since or time.strftime("%H:%M:%S")
+            self._fault_since = self._fault_since or format_time(time.time())
             self.fault = error.text
             self._report([], True)
 
@@ -222,7 +223,7 @@ class WriterThread:
         self.displaced = False
         if self.fault:
             log.info("the operator's log can be written again")
-            self.fault = self._fault_since = ""
+            self.fault, self._fault_since = "", ""
             self._report([], True)
 
     def _write_first_entries(self, store: Store) -> None:

@@ -79,8 +79,9 @@ def number_from(text: str, language: str) -> str:
 
 
 def time_in(text: str, language: str) -> str:
-    """A time of day, "14:02:11", as this language writes it."""
-    return text.replace(":", symbols(language).time)
+    """A time of day, "14:02:11" or "02:30:07 +01:00", as this language writes it."""
+    at, space, offset = text.partition(" ")
+    return f"{at.replace(':', symbols(language).time)}{space}{offset.replace('-', MINUS)}"
 
 
 def date_in(text: str, language: str) -> str:

@@ -80,7 +80,7 @@ def with_unit(text: str, unit: str | PanelText) -> TextLike:
 
 
 def time_of_day(at: str) -> Text:
-    """A time of day like "14:02:11"."""
+    """A time of day like "14:02:11", or "02:30:07 +01:00" with an offset from UTC."""
     return Text(TIME, (("at", at),))
 
 

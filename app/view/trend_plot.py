@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from app.clock import offset_text
 from app.i18n import TextLike, number
+from app.i18n.locales import MINUS
 from app.i18n.values import together
 from app.panel.widgets.trend import Pen, Trend
 from app.robot.history import Column, History
@@ -197,18 +199,26 @@ def value_ticks(low: float, high: float, most: int = VALUE_TICKS) -> Iterator[tu
 
 
 def time_ticks(begin: float, end: float) -> Iterator[Tick]:
-    """The lines of the grid at whole times of day in the server's time zone."""
-    zone = time.localtime(end).tm_gmtoff
+    """The lines of the grid at whole times of day, all by the server's time zone at the end."""
+    zone, offset = time.localtime(end).tm_gmtoff, shown_offset(begin, end)
     step = next((s for s in STEPS if s >= (end - begin) / TIME_TICKS), STEPS[-1])
     number = math.ceil((begin + zone) / step)
     while (at := number * step - zone) <= end:
-        yield Tick(round((at - begin) / (end - begin) * 100, 2), _time_text(at, step))
+        yield Tick(round((at - begin) / (end - begin) * 100, 2), _time_text(at + zone, step, offset))
         number += 1
 
 
-def _time_text(at: float, step: int) -> str:
+def shown_offset(begin: float, end: float) -> str:
+    """The offset from UTC at the end, if the clock was changed since the beginning: times of day have
+    it then, as the clock did not show all of them, or some twice; else ""."""
+    zones = {time.localtime(at).tm_gmtoff for at in (begin, end)}
+    return offset_text(end).replace("-", MINUS) if len(zones) > 1 else ""
+
+
+def _time_text(local: float, step: int, offset: str) -> str:
     form = "%H:%M:%S" if step < 60 else "%H:%M" if step < DAY else "%m-%d"
-    return time.strftime(form, time.localtime(at))
+    shown = time.strftime(form, time.gmtime(local))
+    return f"{shown} {offset}".rstrip() if step < DAY else shown
 
 
 def _line(columns: Sequence[Column], begin: float, end: float, width: float, place: Place) -> Line:

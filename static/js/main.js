@@ -123,6 +123,7 @@ const source = new Source({
   browser: noop, // this client's id: for programs
   beat(now) {
     setText(clock, now.clock);
+    clock.dateTime = now.at;
     if (reconnected) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
     reconnected = false;
     control.beat();

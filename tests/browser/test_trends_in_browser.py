@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Response, expect
+from playwright.sync_api import Browser, Page, Response, Route, expect
 
 from app.view.trend_plot import axis_range, value_ticks
 from tests.support.browser.pages import HIDE, place
@@ -85,6 +85,22 @@ def says(node: RosNode, value: float) -> None:
     node.publish("/test_inlet", {"data": value})
     joints = {"name": ["a", "b"], "position": [0.0, value / 2], "velocity": [], "effort": []}
     node.publish("/test_joints", joints)
+
+
+def test_times_have_their_offset_where_the_clock_was_changed(cell: Server, page: Page) -> None:
+    """The server says so; it judges the time of the plot."""
+
+    def changed(route: Route) -> None:
+        answer = route.fetch()
+        route.fulfill(json={**answer.json(), "zone_s": 3600, "offset": "+01:00"})
+
+    page.route("**/widgets/course/trend?*", changed)
+    page.goto(cell.url)
+    times = page.locator(f"{TREND} .times text")
+    expect(times.first).to_have_text(re.compile(r"^\d\d:\d\d:\d\d \+01:00$"))
+    page.locator(f"{TREND} .area").click()
+    expect(page.locator(f"{TREND} .cursor-values b")).to_have_text(re.compile(r" \+01:00$"))
+    page.unroute_all()
 
 
 def highest(server: Server) -> float:

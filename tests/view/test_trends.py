@@ -3,6 +3,8 @@
 import itertools
 import math
 import sys
+from collections.abc import Callable
+from datetime import datetime
 from typing import Any, Final
 
 import pytest
@@ -179,6 +181,22 @@ def test_lines_of_the_grid_are_at_round_times(span: int, texts: list[str]) -> No
     end = 1_769_162_760.0  # 2026-01-23 10:06 UTC
     ticks = list(time_ticks(end - span, end))
     assert [tick.text for tick in ticks] == texts
+
+
+@pytest.mark.parametrize(
+    ("end", "texts"),
+    [
+        ("2026-10-25T01:50", ["01:30 +01:00", "02:00 +01:00", "02:30 +01:00"]),
+        ("2026-10-25T03:50", ["03:30", "04:00", "04:30"]),
+        ("2026-03-29T01:50", ["02:30 +02:00", "03:00 +02:00", "03:30 +02:00"]),
+    ],
+)
+def test_times_have_their_offset_where_the_clock_was_changed_within_the_plot(
+    time_zone: Callable[[str], None], end: str, texts: list[str]
+) -> None:
+    time_zone("Europe/Berlin")
+    until = datetime.fromisoformat(f"{end}Z").timestamp()
+    assert [tick.text for tick in time_ticks(until - 5400, until)] == texts
 
 
 def test_the_plot_of_a_page_has_the_window_until_now() -> None:

@@ -2,7 +2,7 @@
 
 from typing import Any, Final
 
-from app.clock import format_time
+from app.clock import format_time, iso_time
 from app.i18n import render, say
 from app.panel.widgets.log_view import LEVELS, Level, LogView
 from app.robot.log_lines import Line, Wanted
@@ -37,6 +37,7 @@ def line_values(number: int, line: Line, language: str) -> dict[str, Any]:
     return {
         "number": number,
         "time": render(format_time(line.stamp), language),
+        "at": iso_time(line.stamp),
         "level": line.level,
         "word": render(LEVEL_WORDS[line.level], language),
         "node": line.node,

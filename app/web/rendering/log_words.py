@@ -6,6 +6,7 @@ from datetime import datetime
 from functools import cache
 from typing import Any, Final
 
+from app.clock import offset_if_twice
 from app.i18n import Param, Text, TextLike, render, say
 from app.i18n.locales import date_in, number_in, time_in
 from app.printable import printable
@@ -22,9 +23,17 @@ def _time(ms: int) -> datetime:
 
 
 def time_of(ms: int, language: str) -> str:
-    """The time of day with milliseconds, in the language's notation."""
-    at = _time(ms)
-    return f"{time_in(at.strftime('%H:%M:%S'), language)}{number_in(at.strftime('.%f')[:-3], language)}"
+    """The time of day with milliseconds, in the language's notation, and its offset where the clock
+    shows this time twice."""
+    at, offset = _time(ms), offset_if_twice(ms // 1000)
+    fraction = number_in(at.strftime(".%f")[:-3], language)
+    clock, _, shown = time_in(f"{at.strftime('%H:%M:%S')} {offset}", language).partition(" ")
+    return f"{clock}{fraction} {shown}".rstrip()
+
+
+def iso_of(ms: int) -> str:
+    """The time in ISO 8601, for programs."""
+    return _time(ms).isoformat(timespec="milliseconds")
 
 
 def date_of(ms: int, language: str) -> str:

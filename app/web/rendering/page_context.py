@@ -10,7 +10,7 @@ from fastapi import Request
 from markupsafe import Markup
 
 from app import clock
-from app.clock import format_datetime, format_time
+from app.clock import format_datetime, format_time, iso_time
 from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike, say
 from app.panel.layout import Page
@@ -48,6 +48,7 @@ class PageContext(TypedDict):
     event_id: str
     revision: str
     clock: Text
+    clock_at: str
     loaded: Text
     press_id: str
     receipt: Receipt | None
@@ -92,6 +93,7 @@ def page_context(
         event_id=publisher.id,
         revision=publisher.revision,
         clock=format_time(wall),
+        clock_at=iso_time(wall),
         loaded=format_datetime(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,

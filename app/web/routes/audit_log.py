@@ -25,7 +25,16 @@ from app.web.app_state import AppState, CurrentState
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
 from app.web.rendering.display_choice import Display, display_of
-from app.web.rendering.log_words import OUTCOMES, date_of, outcome_of, time_of, values_of, who_of, word
+from app.web.rendering.log_words import (
+    OUTCOMES,
+    date_of,
+    iso_of,
+    outcome_of,
+    time_of,
+    values_of,
+    who_of,
+    word,
+)
 
 log = logging.getLogger("kiosk.log")
 
@@ -71,7 +80,7 @@ class Wanted(BaseModel):
         """Raises InputError for what is no time."""
         return Filter(
             since=_ms("since", self.since),
-            until=_ms("until", self.until),
+            until=_ms("until", self.until, fold=1),
             **self.model_dump(include={"widget", "outcome", "who", "text", "every"}),
         )
 
@@ -143,6 +152,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         language,
         **context,
         time_of=partial(time_of, language=language),
+        iso_of=iso_of,
         date_of=partial(date_of, language=language),
         values_of=partial(values_of, language=language),
         outcome_of=outcome_of,
@@ -233,10 +243,11 @@ def _shown(row: Row, language: str) -> Row:
     return replace(row, entry=Entry._make(cells))
 
 
-def _ms(name: str, given: str) -> int | None:
+def _ms(name: str, given: str, fold: int = 0) -> int | None:
+    """`fold` is which of two times, where the clock shows a time twice: 1 for the later."""
     if not given:
         return None
     try:
-        return int(datetime.fromisoformat(given).timestamp() * 1000)
+        return int(datetime.fromisoformat(given).replace(fold=fold).timestamp() * 1000)
     except (ValueError, OverflowError, OSError):
         raise InputError(f'{name}: "{given}" is no time: it must be like 2026-11-21T10:00') from None

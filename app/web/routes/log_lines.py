@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from app.i18n import render, say
 from app.panel.widgets.log_view import Level, LogView
@@ -22,6 +22,7 @@ class LogLine(BaseModel):
 
     number: int
     time: str
+    at: Annotated[str, Field(description="the same as ISO 8601, with milliseconds and offset")]
     level: Level
     word: str
     node: str

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 from app.errors import InputError
 from app.panel.widgets.trend import Trend
 from app.robot.history import Column
-from app.view.trend_plot import pen_columns
+from app.view.trend_plot import pen_columns, shown_offset
 from app.web.app_state import CurrentSession
 from app.web.openapi_parts import JSON, errors
 
@@ -36,7 +36,11 @@ class TrendAnswer(BaseModel):
     now: Annotated[float, Field(description="the server's clock")]
     width_s: Annotated[float, Field(description="the time of a column: `span_s / points`")]
     shift: Annotated[float, Field(description="differs when the clock was set: ask for all again")]
-    zone_s: Annotated[int, Field(description="the server's time zone, east of UTC")]
+    zone_s: Annotated[int, Field(description="the server's time zone at the end, east of UTC")]
+    offset: Annotated[
+        str,
+        Field(description='the same as "+01:00", if the clock was changed within it; else ""'),
+    ]
     pens: list[list[tuple[Number, Value] | tuple[Number, Value, Value, Value] | None]]
 
 
@@ -73,6 +77,7 @@ async def trend(
         "width_s": width,
         "shift": round(history.shift, 3),
         "zone_s": time.localtime(until).tm_gmtoff,
+        "offset": shown_offset(until - span_s, until),
     }
     pens = []
     for pen in found.pens:

@@ -91,6 +91,7 @@ class Log {
     const rows = lines.reverse().map((line) => {
       const row = template.content.firstElementChild.cloneNode(true);
       row.dataset.level = line.level;
+      row.querySelector("time").dateTime = line.at;
       for (const name of ["time", "word", "node", "text"]) row.querySelector(`.${name}`).textContent = line[name];
       return row;
     });

@@ -95,11 +95,11 @@ class Trend {
 
   // Columns from `since` on take the place of those that are there.
   #receive(answer, since, live) {
-    const { end, shift, width_s: width, zone_s: zone } = answer;
+    const { end, shift, width_s: width, zone_s: zone, offset } = answer;
     const begin = end - this.#span;
     const isBefore = (number) => (number + 1) * width < begin;
     this.#columns = answer.pens.map((items, i) => merged(this.#columns[i], items, since, isBefore));
-    this.#drawn = { begin, end: this.#end ?? end, width, zone, shift, span: this.#span, live: live && this.#end === null };
+    this.#drawn = { begin, end: this.#end ?? end, width, zone, offset, shift, span: this.#span, live: live && this.#end === null };
     this.#plot.draw(this.#drawn, this.#columns);
     this.#cursor.show(this.#drawn, this.#columns);
     this.#showState();

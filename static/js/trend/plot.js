@@ -17,7 +17,7 @@ const numberOr = (text) => (text === undefined ? undefined : Number(text));
 export class Plot {
   #root;
   #area;
-  #view; // {begin, end, width, zone}: from when to when, the time of a column, the time zone, in seconds
+  #view; // {begin, end, width, zone, offset}: from when to when, the time of a column, the time zone, in seconds; its text if shown
 
   constructor(root) {
     this.#root = root;
@@ -103,7 +103,8 @@ export class Plot {
     const step = STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? STEPS.at(-1);
     for (let number = Math.ceil((begin + zone) / step); number * step - zone <= end; number++) {
       const time = number * step - zone;
-      yield [time, step < 60 ? this.clockOf(time) : step < 86400 ? this.clockOf(time).slice(0, 5) : this.#local(time).slice(5, 10)];
+      const [from, to] = step < 60 ? [11, 19] : step < 86400 ? [11, 16] : [5, 10];
+      yield [time, this.#local(time).slice(from, to) + (step < 86400 ? this.#zoneText : "")];
     }
   }
 
@@ -111,8 +112,13 @@ export class Plot {
     return new Date((time + this.#view.zone) * 1000).toISOString();
   }
 
+  // After a time of day: the clock was changed within the time that is drawn.
+  get #zoneText() {
+    return this.#view.offset ? ` ${this.#view.offset}` : "";
+  }
+
   clockOf(time) {
-    return this.#local(time).slice(11, 19);
+    return this.#local(time).slice(11, 19) + this.#zoneText;
   }
 }
 
