@@ -34,6 +34,12 @@ class BoundedQueue(Generic[Item]):
         self._bytes -= self._sizes.popleft()
         return self._items.popleft()
 
+    def clear(self) -> None:
+        """Removes all items."""
+        self._items.clear()
+        self._sizes.clear()
+        self._bytes = 0
+
     def __len__(self) -> int:
         return len(self._items)
 

@@ -15,6 +15,25 @@ _HIDDEN: Final = re.compile(
 )
 
 
+# What colours text on a terminal, moves its cursor or links it: CSI and OSC sequences, and the choice
+# of a character set. Source: ECMA-48, 5.4 and 8.3.89; xterm's OSC.
+_TERMINAL_CODE: Final = re.compile(
+    "(?:\x1b\\[|\x9b)[0-?]*[ -/]*(?:[@-~]|\\Z)"
+    "|\x1b\\][^\x07\x1b\n]{0,2000}(?:\x07|\x1b\\\\)"
+    "|\x1b[()][0-9A-Z]"
+)
+
+
+def without_terminal_codes(text: str) -> str:
+    """The text without the codes by which a terminal colours it."""
+    return _TERMINAL_CODE.sub("", text) if "\x1b" in text or "\x9b" in text else text
+
+
+def readable(text: str) -> str:
+    """The text of a robot for people: printable, without the codes of terminals."""
+    return printable(without_terminal_codes(text))
+
+
 def printable(text: str) -> str:
     """The text with an escape, such as `\\u202e`, for each character that must not be shown."""
     return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)

@@ -13,12 +13,17 @@ import pytest
 
 from app.errors import InputError
 from app.i18n import say
-from app.printable import printable
+from app.interfaces import plain_text
+from app.printable import printable, readable, without_terminal_codes
+from tests.support.builders import INTERFACES
 from tests.support.parts import ROOT, Server, until
 
 HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+KEY_VALUE = "diagnostic_msgs/msg/KeyValue"
+RED = "\x1b[31mhot\x1b[0m"
 BAD = "in \u202everted\u202c \x1b[31mred\u2028\u2066line\x85"
-SHOWN = "in \\u202everted\\u202c \\u001b[31mred\\u2028\\u2066line\\u0085"
+ESCAPED = "in \\u202everted\\u202c \\u001b[31mred\\u2028\\u2066line\\u0085"
+SHOWN = "in \\u202everted\\u202c red\\u2028\\u2066line\\u0085"
 
 
 @pytest.mark.parametrize(
@@ -57,9 +62,34 @@ def test_in_json_an_escape_says_the_same() -> None:
     assert json.loads(printable(text)) == {"text": BAD + "\x7f"}
 
 
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("\x1b[31mred\x1b[0m", "red"),
+        ("\x1b[1;38;5;196mbold\x1b[m \x1b(B", "bold "),
+        ("\x9b32mgreen", "green"),
+        ("\x1b]8;;http://robot\x07link\x1b]8;;\x1b\\", "link"),
+        ("cut off \x1b[3", "cut off "),
+        ("\x1b]0;no end, so all is shown", "\\u001b]0;no end, so all is shown"),
+        ("a bell\x07 and \x1bc", "a bell\\u0007 and \\u001bc"),
+        ("[31m is text", "[31m is text"),
+    ],
+)
+def test_codes_of_terminals_are_no_text(text: str, shown: str) -> None:
+    assert readable(text) == shown
+
+
+def test_values_in_a_value_have_no_codes_of_terminals() -> None:
+    status = INTERFACES.decode_whole(
+        KEY_VALUE, INTERFACES.encode(KEY_VALUE, {"key": RED, "value": RED})
+    )
+    assert plain_text(status, 100, without_terminal_codes) == "{'key': 'hot', 'value': 'hot'}"
+    assert plain_text(RED, 100, without_terminal_codes) == "hot"
+
+
 def test_sentences_and_errors_are_printable() -> None:
     assert str(say("no_option", label="Speed", options="1, 2", given=BAD)).endswith(f"not {SHOWN}")
-    assert str(InputError(f'no input "{BAD}"')) == f'no input "{SHOWN}"'
+    assert str(InputError(f'no input "{BAD}"')) == f'no input "{ESCAPED}"'
 
 
 def test_what_a_robot_and_a_browser_say_is_shown_by_its_escapes(
@@ -71,7 +101,7 @@ def test_what_a_robot_and_a_browser_say_is_shown_by_its_escapes(
     until(lambda: SHOWN in kiosk.widget("last_heard")["text"], "the robot says it again")
     refused = kiosk.press("operation", BAD, id="bad-1", inputs={BAD: 1}).json()
     assert refused["outcome"] == "refused"
-    assert SHOWN in kiosk.http.post("/widgets/operation", json={"inputs": {}, BAD: 1}).json()["error"]
+    assert ESCAPED in kiosk.http.post("/widgets/operation", json={"inputs": {}, BAD: 1}).json()["error"]
     assert SHOWN[:20] in kiosk.http.get(f"/nothing/{quote(BAD)}").json()["error"]
     pages = {path: kiosk.http.get(path).text for path in ("/", "/log", f"/log?text={quote(BAD[:10])}")}
     for path, text in pages.items():

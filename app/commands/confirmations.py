@@ -99,10 +99,12 @@ class Confirmations:
         one effect does not prove two commands."""
         done: set[str] = set()
         for waiting in [w for w in self._waiting.get(key, []) if not w.confirmed.done()]:
-            if waiting.widget.id in done or reading.status != "message" or reading.at < waiting.since:
+            field = waiting.confirm.field
+            own = reading.of_field(field, math.inf)
+            if waiting.widget.id in done or own.status != "message" or own.at < waiting.since:
                 continue
-            if equal(reading.value(waiting.confirm.field), waiting.equals):
-                waiting.confirmed.set_result(reading.wall)
+            if equal(own.value(field), waiting.equals):
+                waiting.confirmed.set_result(own.wall)
                 done.add(waiting.widget.id)
 
     def _confirmed(self, waiting: _Waiting) -> Outcome:

@@ -21,7 +21,7 @@ from app.i18n.values import filled_in, together
 from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.template import RESPONSE_PLACEHOLDER, response_paths
 from app.panel.widgets.service_action import Call
-from app.printable import printable
+from app.printable import printable, without_terminal_codes
 from app.robot.command_status import CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog, rosout_extra
@@ -233,7 +233,7 @@ def with_fields(template: str | PanelText, fields: Fields, within: str = "") -> 
         value = fields.get(within + path)
         if value is None:
             return NO_VALUE
-        text = printable(plain_text(value, MAX_VALUE_CHARS))
+        text = printable(plain_text(value, MAX_VALUE_CHARS, without_terminal_codes))
         return number(text) if isinstance(value, float) else text
 
     def filled(one: str) -> TextLike:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal, get_args
 
 from app.diagnose import wording
-from app.printable import printable
+from app.printable import readable
 
 # An error keeps the panel, or a part of it, from working. A warning lets it work, but not always or not
 # as meant. A note is worth knowing, and is no reason for another exit status.
@@ -60,10 +60,10 @@ class Finding:
 
     def _filled(self, sentence: str) -> str:
         """The sentence with its details. Texts of robots and other programs are made printable."""
-        return printable(sentence.format(about=self.about, **self.details))
+        return readable(sentence.format(about=self.about, **self.details))
 
     def as_json(self) -> dict[str, str]:
-        found = {"severity": self.severity, "code": self.code, "about": printable(self.about)}
+        found = {"severity": self.severity, "code": self.code, "about": readable(self.about)}
         return found | {"robot": self.robot, "what": self.what, "do": self.do}
 
 
@@ -83,7 +83,7 @@ class Report:
             self.findings.append(found)
 
     def fact(self, text: str) -> None:
-        self.facts.append(printable(text))
+        self.facts.append(readable(text))
 
     @property
     def is_well(self) -> bool:

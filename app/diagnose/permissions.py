@@ -1,15 +1,17 @@
 """The panel's interlocks: whether their publishers stay, repeat themselves and permit now. Pure."""
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
 from app.diagnose.observation import Observation
 from app.errors import DecodeError
 from app.i18n import TextLike, render, say
-from app.interfaces import Interfaces
+from app.interfaces import Interfaces, has_key
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits, unmet
+from app.robot.sample import Sample
 
 REGULAR: Final = 2  # messages while one listens
 
@@ -65,9 +67,8 @@ def _check_value(
     samples = observed.samples[behind.robot.key(interlock.topic)]
     if not samples:
         return
-    reader = interfaces.field_reader(interlock.type, [interlock.field])
     try:
-        value = reader.read(bytes(samples[-1].payload)).get(interlock.field)
+        value = _last_value(samples, interlock, interfaces)
     except DecodeError:  # another type, which is said of the topic
         return
     if permits(interlock, value):
@@ -80,3 +81,11 @@ def _check_value(
     else:
         reason = say("forbidden", name=interlock.name)
     report.find("permission_refused", interlock.topic, robot=behind.robot.id, detail=render(reason))
+
+
+def _last_value(samples: Sequence[Sample], interlock: Interlock, interfaces: Interfaces) -> Any:
+    """The newest value; of a field with a key, that of the newest message which has it."""
+    reader = interfaces.field_reader(interlock.type, [interlock.field])
+    newest = samples[::-1] if has_key(interlock.field) else samples[-1:]
+    values = (reader.read(bytes(sample.payload)).get(interlock.field) for sample in newest)
+    return next((value for value in values if value is not None), None)

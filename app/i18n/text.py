@@ -12,7 +12,7 @@ from typing import Any, Final, NoReturn, Union
 
 from app.i18n.catalogue import ENGLISH, sentences, when_changed
 from app.i18n.locales import date_time_in, number_in, time_in
-from app.printable import printable
+from app.printable import readable
 
 # Stands in a sentence: a name or a number, which are in no language; another sentence; or several,
 # which are listed.
@@ -101,7 +101,7 @@ def render(text: TextLike, language: str = ENGLISH) -> str:
 
 @lru_cache(maxsize=1024)  # the same few sentences lock and open
 def _rendered(text: Text, language: str) -> str:
-    return printable(_filled(text, language))
+    return readable(_filled(text, language))
 
 
 when_changed(_rendered.cache_clear)

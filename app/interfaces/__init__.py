@@ -8,7 +8,7 @@ from app.interfaces.cdr.fields import FieldReader, Fields, Walk
 from app.interfaces.definitions import INTEGER_RANGES, PLACEHOLDER, STRING_TYPES, Field, Structure, Type
 from app.interfaces.derived_types import ActionTypes
 from app.interfaces.distributions import DISTROS, read_distribution
-from app.interfaces.field_path import field_name, parent_path
+from app.interfaces.field_path import field_name, has_key, parent_path
 from app.interfaces.json_values import plain_text, to_plain
 from app.interfaces.registry import Interfaces, load_interfaces
 
@@ -26,6 +26,7 @@ __all__ = [
     "Type",
     "Walk",
     "field_name",
+    "has_key",
     "load_interfaces",
     "parent_path",
     "plain_text",

@@ -75,6 +75,12 @@ def path_steps(path: str) -> tuple[Step, ...]:
     return _parse(path).steps
 
 
+def has_key(path: str) -> bool:
+    """Whether the path selects an element by a key, whatever its index is in a message."""
+    ordered = (step for step in path_steps(path) if not isinstance(step, str))
+    return isinstance(next(ordered, None), Key)
+
+
 def parent_path(path: str) -> str:
     """The path of the message that contains the field, or the list; "" for the whole message."""
     return _parse(path).parent

@@ -1,7 +1,7 @@
 """Decoded messages as plain values for JSON and the browser."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -40,36 +40,40 @@ def message_fields(message: Any) -> Iterator[tuple[str, Any]]:
     return ((name, getattr(message, each)) for each, name in _field_names(message.__class__))
 
 
-def plain_text(value: Any, most: int) -> str:
-    """A value in a decoded message as `str(to_plain(value))`, cut to `most` characters. The rest is not
-    read: a list may have any length."""
+def plain_text(value: Any, most: int, clean: Callable[[str], str] = str) -> str:
+    """A value in a decoded message as `str(to_plain(value))`, with its texts as `clean` returns them,
+    cut to `most` characters. The rest is not read: a list may have any length."""
     text = ""
-    for piece in _text_pieces(value, most) if _is_compound(value) else [str(to_plain(value))]:
+    for piece in _text_pieces(value, most, clean) if _is_compound(value) else [_text_of(value, clean)]:
         text += piece
         if len(text) > most:
             return text[: most - 1] + "…"
     return text
 
 
+def _text_of(value: Any, clean: Callable[[str], str]) -> str:
+    return clean(value) if isinstance(value, str) else str(to_plain(value))
+
+
 def _is_compound(value: Any) -> bool:
     return isinstance(value, memoryview | list | tuple | bytes | bytearray) or is_dataclass(value)
 
 
-def _text_pieces(value: Any, most: int) -> Iterator[str]:
+def _text_pieces(value: Any, most: int, clean: Callable[[str], str]) -> Iterator[str]:
     """The text of a value, in pieces."""
     if isinstance(value, str):
-        yield repr(value[: most + 1])
+        yield repr(clean(value[: most + 1]))
     elif not _is_compound(value):
         yield repr(to_plain(value))
     elif is_dataclass(value):
         for number, (each, name) in enumerate(_field_names(value.__class__)):
             yield f"{', ' if number else '{'}{name!r}: "
-            yield from _text_pieces(getattr(value, each), most)
+            yield from _text_pieces(getattr(value, each), most, clean)
         yield "}" if _field_names(value.__class__) else "{}"
     else:
         for number, item in enumerate(value):
             yield ", " if number else "["
-            yield from _text_pieces(item, most)
+            yield from _text_pieces(item, most, clean)
         yield "]" if len(value) else "[]"
 
 

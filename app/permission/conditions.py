@@ -1,5 +1,6 @@
 """Whether the value of an interlock's field permits, and the sentence if it does not: pure."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
@@ -36,6 +37,11 @@ def unmet(interlock: Interlock, value: Any) -> Text:
     return say("unmet", name=interlock.name, value=_now(interlock, value, must), wanted=must)
 
 
+def not_finite(value: float) -> Text:
+    """What stands for NaN and infinities in a sentence."""
+    return say("value_nan") if math.isnan(value) else say("value_infinite")
+
+
 def _wanted(interlock: Interlock) -> Iterator[TextLike]:
     if interlock.equals is not None:
         yield _value_text(interlock, interlock.equals, interlock.unit)
@@ -60,6 +66,8 @@ def _now(interlock: Interlock, value: Any, must: TextLike) -> TextLike:
     """The value that was received, in as few digits as distinguish it from the one that is needed."""
     if not isinstance(value, float):
         return _value_text(interlock, value, interlock.unit)
+    if not math.isfinite(value):
+        return not_finite(value)
     rounded = (float(f"{value:.{digits}g}") for digits in DIGITS)
     candidates = [_value_text(interlock, one, interlock.unit) for one in (*rounded, value)]
     written = render(must)  # its numbers have the same digits in every language

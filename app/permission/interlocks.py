@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from app.i18n import number, say
+from app.interfaces import has_key
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
@@ -18,11 +19,12 @@ from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
-from app.permission.conditions import permits, unmet
+from app.permission.conditions import not_finite, permits, unmet
 from app.permission.mismatches import topic_mismatch
 from app.permission.servers import call_blocked, set_blocked
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.command_status import IDLE
+from app.robot.keyed_values import kept_s
 from app.robot.state import Reading, RobotState
 
 # The codes of a `link_verdict` that locks.
@@ -77,7 +79,7 @@ def interlock_verdict(
         return doubt
     if interlock.require_publisher and not robot.graph.has_endpoint("MP", key):
         return locked("no_publisher", topic=topic)
-    reading = robot.reading(topic)
+    reading = robot.reading(topic).of_field(interlock.field, kept_s(interlock.max_age_s))
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
     if robot.silent_publishers.has_silent(key, robot.graph.bridges):
@@ -90,8 +92,16 @@ def interlock_verdict(
         return locked("waiting", topic=topic)
     stale_at = reading.at + interlock.max_age_s
     if now >= stale_at:
-        return locked("stale", topic=topic, limit=number(f"{interlock.max_age_s:g}"))
+        return stale(topic, interlock.field, interlock.max_age_s)
     return Verdict(True, until=stale_at)
+
+
+def stale(topic: str, field: str, max_age_s: float) -> Verdict:
+    """The lock for a value that is too old; one with a key may be older than the last message."""
+    limit = number(f"{max_age_s:g}")
+    if has_key(field):
+        return locked("stale_entry", topic=topic, field=field, limit=limit)
+    return locked("stale", topic=topic, limit=limit)
 
 
 def _fresh_since(robot: RobotState, key: str) -> float:
@@ -133,16 +143,20 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
     of = step.value
     if doubt := topic_mismatch("MS", of, robot):
         return None, doubt
-    reading = robot.reading(of.topic)
+    reading = robot.reading(of.topic).of_field(of.field, kept_s(of.max_age_s))
     if reading.status != "message":
         return None, locked(reading.status, topic=of.topic, wanted=of.type)
     value = reading.value(of.field)
-    if value is None or not math.isfinite(value):
+    if value is None:
         return None, locked("missing", field=of.field, topic=of.topic)
-    stale_at = math.inf if of.max_age_s is None else reading.at + of.max_age_s
+    if not math.isfinite(value):
+        return None, locked("not_a_number", field=of.field, topic=of.topic, value=not_finite(value))
+    if of.max_age_s is None:
+        return value, PERMITTED
+    stale_at = reading.at + of.max_age_s
     if now >= stale_at:
-        return None, locked("stale", topic=of.topic, limit=number(f"{of.max_age_s:g}"))
-    return value, PERMITTED if stale_at == math.inf else Verdict(True, until=stale_at)
+        return None, stale(of.topic, of.field, of.max_age_s)
+    return value, Verdict(True, until=stale_at)
 
 
 def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:

@@ -10,13 +10,14 @@ from typing import Final, NamedTuple
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import Interfaces
-from app.printable import printable
+from app.printable import readable
 from app.robot.sample import Buffer
 
 LOG_TYPE: Final = "rcl_interfaces/msg/Log"
 KEPT_BYTES: Final = 4_000_000
 LONGEST_LINE: Final = 100_000  # bytes of a message; a longer one is counted, and not kept
 LONGEST_TEXT: Final = 1_000  # characters of a line that are shown
+MOST_READ: Final = 4 * LONGEST_TEXT  # with the codes of terminals
 LONGEST_NAME: Final = 100
 SLICE: Final = 50  # lines that are decoded in one turn of the event loop: some milliseconds
 # From the severity's number on; ROS 2 has 10, 20, 30, 40 and 50.
@@ -126,7 +127,7 @@ class LogLines:
         except DecodeError:
             return
         stamp = message.stamp.sec + message.stamp.nanosec / 1e9
-        text = printable(message.msg[: LONGEST_TEXT + 1])
+        text = readable(message.msg[:MOST_READ])[: LONGEST_TEXT + 1]
         if len(text) > LONGEST_TEXT:
             text = text[: LONGEST_TEXT - 1] + "…"
-        kept.line = Line(message.level, stamp, printable(message.name[:LONGEST_NAME]), text)
+        kept.line = Line(message.level, stamp, readable(message.name[:LONGEST_NAME]), text)

@@ -15,7 +15,7 @@ from typing import Any
 from app.dialect.dialect import Dialect
 from app.errors import DecodeError
 from app.i18n import Text, TextLike
-from app.interfaces import Interfaces
+from app.interfaces import Interfaces, has_key
 from app.interfaces.names import ROSOUT_TOPIC, key_of
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
@@ -104,13 +104,14 @@ class RobotState:
         lossless = {one.topic for one in panel.interlocks}
         lossless |= {one.topic for one in panel.confirmations()}
         for topic, type_name in panel.subscriptions().items():
-            key = self.key(topic)
+            key, paths = self.key(topic), fields.get(topic, ())
             made = Topic(
-                self._interfaces.field_reader(type_name, fields.get(topic, ())),
+                self._interfaces.field_reader(type_name, paths),
                 self.slices,
                 lossless=topic in lossless,
                 on_unreadable=partial(self.count_unreadable, key),
                 on_late_reading=partial(self._notify_late_reading, key),
+                keyed=[path for path in dict.fromkeys(paths) if has_key(path)],
             )
             yield key, made
 
@@ -136,6 +137,7 @@ class RobotState:
         """A bridge was lost at `seq`: its earlier samples are no longer valid."""
         self.silent_publishers.remove_bridge(bridge)
         for key, topic in self._topics.items():
+            topic.forget_source(bridge)
             sample = topic.sample
             if sample is not None and sample.seq < seq and sample.source in (bridge, None):
                 topic.invalidate()
@@ -181,6 +183,11 @@ class RobotState:
         if sample is None or sample.source is None or sample.source in self.graph.bridges:
             return found
         return replace(found, status="cut")
+
+    @property
+    def keyed_topics(self) -> frozenset[str]:
+        """The keys of topics of which fields with keys are read: each message counts."""
+        return frozenset(key for key, topic in self._topics.items() if topic.is_keyed)
 
     def cuts(self, key: str) -> int:
         """How often a topic's last value was no longer valid: its bridge, its publisher or the link was

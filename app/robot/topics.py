@@ -5,19 +5,22 @@ continued in the next turns. Until the newest is decoded, the topic's value is u
 """
 
 import math
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
+from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import FieldReader, Fields, Walk
+from app.robot.keyed_values import NO_VALUES, KeyedValues, updated, without_source
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 
-MAX_UNREAD: Final = (
-    16  # undecoded messages of a lossless topic; of other topics only the newest is kept
-)
+# Undecoded messages of a lossless topic; of other topics only the newest is kept.
+MAX_UNREAD: Final = 16
+# Of a topic with fields that have keys.
+MAX_UNREAD_PARTS: Final = 256
+MAX_UNREAD_BYTES: Final = 32_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,20 +29,36 @@ class Reading:
 
     `status`: no message yet ("waiting"); received before a cut ("cut"); not decodable ("unreadable");
     being decoded, with the fields of the one before ("reading"); a valid message ("message"). `at` is
-    in monotonic seconds, `wall` in seconds since the epoch.
+    in monotonic seconds, `wall` in seconds since the epoch. `keyed` are the newest values of fields
+    with keys, over several messages.
     """
 
     status: Literal["waiting", "cut", "unreadable", "reading", "message"]
     fields: Fields | None = None
     at: float = -math.inf
     wall: float = 0.0
+    keyed: KeyedValues = field(default_factory=lambda: NO_VALUES)
+
+    def of_field(self, path: str, kept_s: float) -> "Reading":
+        """The reading with the times of a field; one with a key has its own, see `keyed_values`.
+        `kept_s` is how long newer messages may lack it."""
+        known = self.keyed.get(path)
+        if known is None:
+            return self
+        if self.at - known.at > kept_s:
+            return replace(self, keyed=NO_VALUES)
+        return replace(self, at=known.at, wall=known.wall)
 
     def value(self, path: str) -> Any:
         """The field at a path; None if the message has no such element."""
+        if (known := self.keyed.get(path)) is not None:
+            return known.value
         return None if self.fields is None else self.fields.get(path)
 
     def is_ambiguous(self, path: str) -> bool:
         """Whether the value is unknown because several elements have the path's key."""
+        if (known := self.keyed.get(path)) is not None:
+            return known.is_ambiguous
         return self.fields is not None and self.fields.is_ambiguous(path)
 
 
@@ -57,27 +76,37 @@ class Topic:
         lossless: bool,
         on_unreadable: Callable[[Sample, DecodeError], None],
         on_late_reading: Callable[[Reading], None],
+        keyed: Collection[str] = (),
     ) -> None:
-        """Of a `lossless` topic each message counts. `on_late_reading` takes a reading that needed more
-        than one turn; `on_unreadable` a sample that can't be decoded."""
+        """Of a `lossless` topic each message counts, and of one with the paths `keyed` each message
+        that has arrived. `on_late_reading` takes a reading that needed more than one turn;
+        `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
         self._on_unreadable = on_unreadable
         self._on_late_reading = on_late_reading
         self._lossless = lossless
-        self._unread: deque[Sample] = deque(maxlen=MAX_UNREAD)
+        self._keyed = keyed
+        self._values = NO_VALUES
+        most = MAX_UNREAD_PARTS if keyed else MAX_UNREAD
+        self._unread: BoundedQueue[Sample] = BoundedQueue(most, MAX_UNREAD_BYTES)
         self._walk: _PendingRead | None = None  # before the unread
         self._deferred = False
         self._last_reading = WAITING
         self.sample: Sample | None = None  # the newest
         self.cuts = 0  # how often the value before was no longer valid
 
+    @property
+    def is_keyed(self) -> bool:
+        """Whether fields with keys are read."""
+        return bool(self._keyed)
+
     def update(self, sample: Sample) -> None:
         """Adds a newer message."""
         self.sample = sample
-        if self._walk is None or not self._lossless:
+        if not self._keyed and (self._walk is None or not self._lossless):
             self._unread.clear()
-        self._unread.append(sample)
+        self._unread.add(sample, len(sample.payload))
 
     def reading(self) -> Reading:
         """The current reading."""
@@ -97,6 +126,13 @@ class Topic:
             self._last_reading = replace(self.reading(), status="cut")
             self._unread.clear()
             self._walk = None
+            self._values = NO_VALUES
+
+    def forget_source(self, source: str) -> None:
+        """A bridge was lost: values of fields with keys that came from it are no longer valid."""
+        if self._values:
+            self._values = without_source(self._values, source)
+            self._last_reading = replace(self._last_reading, keyed=self._values)
 
     def _read(self) -> bool:
         """Decodes as much as this turn allows; returns whether that was all."""
@@ -121,7 +157,7 @@ class Topic:
     def _next_read(self) -> "_PendingRead | None":
         """The message to be decoded now; None without one."""
         if self._walk is None and self._unread:
-            sample = self._unread.popleft()
+            sample = self._unread.take()
             data = bytes(sample.payload)
             self._walk = _PendingRead(sample, self._reader.walk(data), len(data))
         return self._walk
@@ -137,7 +173,9 @@ class Topic:
         else:
             if fields is None:
                 return None
-            self._last_reading = Reading("message", fields, sample.at, sample.wall)
+            if self._keyed:
+                self._values = updated(self._values, self._keyed, fields, sample)
+            self._last_reading = Reading("message", fields, sample.at, sample.wall, self._values)
         self._walk = None
         return self._last_reading
 

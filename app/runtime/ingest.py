@@ -92,10 +92,9 @@ class Ingest:
         sources = (source for widget in panel.commands for source in widget.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
-        self.lossless = self._interlocks.keys() | {
-            robot.key(one.topic) for one in panel.confirmations()
-        }
-        self.immediate = self.lossless | self._status.keys() | {self._events}
+        permitting = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
+        self.lossless = permitting | robot.keyed_topics
+        self.immediate = permitting | self._status.keys() | {self._events}
         self._by_key: dict[str, list[SampleListener]] = {}
         for listener in listeners:
             for key in listener.keys:

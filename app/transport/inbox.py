@@ -129,9 +129,9 @@ class Inbox:
         self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
     ) -> None:
         """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
-        loop at once. `lossless` topics are immediate, and values that were replaced between two drains
-        are kept. Every sample of a `recorded` topic is kept."""
-        self._immediate = frozenset(immediate) | frozenset(lossless)
+        loop at once. Of `lossless` topics values that were replaced between two drains are kept. Every
+        sample of a `recorded` topic is kept."""
+        self._immediate = frozenset(immediate)
         self._lossless = frozenset(lossless)
         self._recorded = frozenset(recorded)
 

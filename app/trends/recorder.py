@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
-from app.interfaces import FieldReader, Interfaces
+from app.interfaces import FieldReader, Interfaces, has_key
 from app.panel.model import Panel
 from app.panel.widgets.trend import kept_fields, trends_of
 from app.robot.history import FieldHistory
@@ -45,7 +45,7 @@ class TrendRecorder:
         self._slices = slices or robot.slices
         self._readers: dict[str, FieldReader] = {}
         self._fields: dict[str, list[tuple[str, FieldHistory]]] = {}
-        self._origins: dict[str, tuple[str | None, int]] = {}
+        self._origins: dict[tuple[str, str | None], int] = {}  # (topic's key, bridge) → cuts
         self._pending: BoundedQueue[Pending] = BoundedQueue(MAX_PENDING, MAX_PENDING_BYTES)
         self._timer: asyncio.TimerHandle | None = None
         self._batches = 0
@@ -65,9 +65,12 @@ class TrendRecorder:
 
     def record_sample(self, key: str, sample: Sample) -> None:
         """A sample was received: it is decoded within a moment."""
-        origin = sample.source, self._robot.cuts(key)
-        whole = self._origins.get(key) == origin
-        self._origins[key] = origin
+        cuts = self._robot.cuts(key)
+        whole = self._origins.get((key, sample.source)) == cuts
+        if not whole:
+            current = [(o, n) for o, n in self._origins.items() if o[0] != key or n == cuts]
+            self._origins = dict(current)
+            self._origins[key, sample.source] = cuts
         one = Pending(key, sample.at, bytes(sample.payload), whole)
         for lost in self._pending.add(one, len(one.data)):
             self._interrupt(lost.key)
@@ -117,7 +120,10 @@ class TrendRecorder:
             return
         at = self._robot.history.time(one.at)
         for field, history in self._fields[one.key]:
-            history.add(at, _number(values.get(field)))
+            value = values.get(field)
+            if value is None and has_key(field) and not values.is_ambiguous(field):
+                continue  # another node's part of the list
+            history.add(at, _number(value))
 
 
 def _number(value: Any) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
@@ -14,7 +14,8 @@ from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, LampState, Readout, WrittenNumber
 from app.panel.widgets.families import Display
 from app.permission.mismatches import topic_mismatch
-from app.printable import printable
+from app.printable import readable
+from app.robot.keyed_values import kept_s
 from app.robot.state import Reading, RobotState
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
@@ -74,12 +75,16 @@ def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState
     reading = _reading(widget, robot)
     if isinstance(reading, FieldState):
         return reading
+    reading = reading.of_field(widget.field, kept_s(widget.max_age_s))
     value = reading.value(widget.field)
     if value is None:
         code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
         time = format_time(reading.wall)
         return FieldState("missing", say(code, field=widget.field, time=time))
-    return _dated(reading, value, widget.max_age_s, now)
+    dated = _dated(reading, value, widget.max_age_s, now)
+    if is_nan(value) and dated.state == "live":
+        return replace(dated, note=say("gauge_no_number"))
+    return dated
 
 
 def _reading(widget: ShownTopic, robot: RobotState) -> Reading | FieldState:
@@ -214,6 +219,11 @@ def shown_value(value: Any, unit: str | PanelText = "") -> TextLike:
     return number(text, unit) if is_number(value) else with_unit(text, unit)
 
 
+def is_nan(value: Any) -> bool:
+    """Whether a value is a float that is not a number."""
+    return isinstance(value, float) and math.isnan(value)
+
+
 def is_number(value: Any) -> bool:
     """Whether a field's value is a number."""
     return isinstance(value, int | float) and not isinstance(value, bool)
@@ -226,8 +236,13 @@ def written(value: Any) -> str:
         return NOTHING
     if isinstance(value, bool):
         return "true" if value else "false"
-    text = _number(value) if isinstance(value, float) else printable(str(value)[: LONGEST_TEXT + 1])
+    text = _number(value) if isinstance(value, float) else _shown_text(value)
     return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
+
+
+def _shown_text(value: Any) -> str:
+    """The beginning of a text; the codes of terminals in it are not shown."""
+    return readable(str(value)[: 4 * LONGEST_TEXT])[: LONGEST_TEXT + 1]
 
 
 def _number(value: float) -> str:

@@ -34,7 +34,7 @@ def _shown(widget: Gauge, field: FieldState) -> Attributes:
     if field.value is None:
         return shown
     value = scaled(widget, field.value)
-    if math.isnan(value):
+    if math.isnan(value):  # also infinity times zero
         return shown | {"state": "unreadable", "note": say("gauge_no_number")}
     shown |= {"text": written_number(value, widget.format), "pointer": widget.percent(value)}
     if value < widget.min or value > widget.max:

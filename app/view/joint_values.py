@@ -7,7 +7,7 @@ from app.i18n import TextLike, number, say
 from app.panel.values import number_text
 from app.panel.widgets.joints import Joint, Joints
 from app.robot.state import RobotState
-from app.view.display_values import NOTHING, FieldOf, FieldState, field_state, written_number
+from app.view.display_values import NOTHING, FieldOf, FieldState, field_state, is_nan, written_number
 from app.view.gauge_values import is_beyond
 
 # From the hardest: beyond the mechanical range, beyond a soft limit, near one.
@@ -23,12 +23,12 @@ def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any
     beyond a soft limit, "low_low" and "high_high" beyond the range, "missing", "" where unknown).
     """
     fields = [field_state(_field(widget, joint), robot, now) for joint in widget.joints]
-    whole = next((one for one in fields if one.state != "missing"), fields[0])
-    shown = [_joint(widget, *pair) for pair in zip(widget.joints, fields, strict=True)]
+    whole = _whole(fields)
+    shown = [_joint(widget, *pair, whole) for pair in zip(widget.joints, fields, strict=True)]
     values, bars, levels, words = zip(*shown, strict=True)
     attributes = {
         "state": whole.state,
-        "note": whole.note if whole.state != "missing" else say("joint_none"),
+        "note": say("joint_none") if whole.state == "missing" else whole.note,
         "said": _hardest(levels, words),
         "joint_values": list(values),
         "joint_bars": list(bars),
@@ -37,12 +37,18 @@ def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any
     return attributes, min(one.until for one in fields)
 
 
+def _whole(fields: list[FieldState]) -> FieldState:
+    """The state of the widget: live while a joint is, as several nodes may publish parts of an arm."""
+    known = [one for one in fields if one.state != "missing" and not is_nan(one.value)]
+    return next((one for one in known if one.state == "live"), known[0] if known else fields[0])
+
+
 def _field(widget: Joints, joint: Joint) -> FieldOf:
     return FieldOf(widget.topic, widget.type, widget.qos, widget.path(joint), widget.max_age_s)
 
 
 def _joint(
-    widget: Joints, joint: Joint, field: FieldState
+    widget: Joints, joint: Joint, field: FieldState, whole: FieldState
 ) -> tuple[TextLike, float | None, str, TextLike]:
     """Its value, its bar, its level and what is said of that."""
     label = joint.shown_label
@@ -53,7 +59,9 @@ def _joint(
     value = field.value * joint.shown_unit.factor
     text = written_number(value, widget.format)
     if math.isnan(value):
-        return text, None, "missing", say("joint_is_missing", joint=label)
+        return text, None, "missing", say("joint_not_a_number", joint=label)
+    if field.state != "live" and whole.state == "live":
+        return text, None, "missing", say("joint_is_old", joint=label, note=field.note)
     if field.state != "live":
         return text, joint.percent(value), "", ""
     level, limit = _level(joint, value)

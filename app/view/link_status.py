@@ -13,6 +13,7 @@ from typing import Final, Literal, TypedDict
 from app.clock import format_datetime
 from app.i18n import Text, TextLike, number, say
 from app.i18n.values import longest
+from app.interfaces import has_key
 from app.panel.model import Panel
 from app.permission.interlocks import NO_WAY
 from app.permission.mismatches import topic_mismatch
@@ -27,10 +28,12 @@ NODE: Final = GONE | {
     "waiting",
     "cut",
     "stale",
+    "stale_entry",
     "unreadable",
     "new_publisher",
     "reading",
     "missing",
+    "not_a_number",
     "several",
     "wrong_type",
     "publishes_best_effort",
@@ -130,14 +133,17 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
     for of in panel.interlocks:
         if of.max_age_s is None:
             continue
-        key, reading = robot.key(of.topic), robot.reading(of.topic)
+        key, reading = robot.key(of.topic), robot.reading(of.topic).of_field(of.field, math.inf)
         if reading.status not in ("message", "unreadable") or not robot.graph.has_endpoint("MP", key):
             continue
         if topic_mismatch("MS", of, robot):
             continue
         stale_at = reading.at + of.max_age_s
         if now >= stale_at:
-            return say("node_stale", topic=of.topic, limit=number(f"{of.max_age_s:g}")), math.inf
+            limit = number(f"{of.max_age_s:g}")
+            if has_key(of.field):
+                return say("node_stale_entry", field=of.field, topic=of.topic, limit=limit), math.inf
+            return say("node_stale", topic=of.topic, limit=limit), math.inf
         until = min(until, stale_at)
     return "", until
 

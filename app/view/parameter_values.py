@@ -8,7 +8,7 @@ from app.i18n import Text, TextLike, say
 from app.panel.number_range import decimal_text
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, MAX_TEXT, Parameter, Scalar, Value
 from app.permission.servers import parameters_offered
-from app.printable import printable
+from app.printable import readable
 from app.robot.parameter_state import (
     MAX_LIST_LENGTH,
     UNKNOWN,
@@ -44,7 +44,7 @@ def parameter(parameter: Parameter, robot: RobotState) -> dict[str, Any]:
         "state": "waiting" if never_received(known) else LOOKS[known.state],
         "text": NOTHING if known.value is None else _text(parameter, known.value),
         "note": _note(parameter, known, robot),
-        "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
+        "hint": readable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
         "limits": limits_text(parameter, limits),
         "settable": not known.read_only,
         "askable": parameter.id not in robot.querying

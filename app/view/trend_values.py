@@ -6,7 +6,7 @@ from typing import Any
 from app.i18n import TextLike, joined, say
 from app.panel.widgets.trend import Pen, Trend
 from app.robot.state import RobotState
-from app.view.display_values import FieldState, field_state, readout
+from app.view.display_values import FieldState, field_state, is_nan, readout
 
 
 def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
@@ -19,7 +19,9 @@ def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any],
     for number, (pen, one) in enumerate(zip(widget.pens, widget.readouts, strict=True)):
         field = field_state(one, robot, now)
         until = min(until, field.until)
-        if field.state != "live":
+        if is_nan(field.value) and field.state == "live":
+            notes.append(say("trend_pen", label=pen.label, note=field.note))
+        elif field.state != "live":
             state = field.state if state == "live" else state
             notes.append(say("trend_pen", label=pen.label, note=field.note))
         shown[f"text{number}"] = readout(one, robot, now)[0]["text"]
@@ -32,6 +34,8 @@ def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any],
 def _state(pen: Pen, field: FieldState) -> str:
     if field.state != "live" or not isinstance(field.value, int | float):
         return field.state
+    if is_nan(field.value):
+        return "unreadable"
     value = pen.shown(field.value)
     if pen.low is not None and value < pen.low:
         return "low"

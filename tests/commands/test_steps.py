@@ -107,7 +107,9 @@ def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
     assert desk.shown()["reason"] == str(desk.reason())
     assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("", "")
     desk.reports(float("nan"))
-    assert desk.reason() == say("missing", topic="/speed", field="data")
+    nan = say("value_nan")
+    assert desk.reason() == say("not_a_number", topic="/speed", field="data", value=nan)
+    assert desk.shown()["note"] == "the value is not a number (NaN)"
     desk.reports(120.0)
     assert coded(desk.reason(), "value", "low", "high") == ("step_outside", "120", "0", "100")
     desk.reports(40.0)

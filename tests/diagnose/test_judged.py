@@ -17,6 +17,7 @@ from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge, PanelRobot
 from app.diagnose.observation import Observation
+from app.diagnose.permissions import check_permissions
 from app.diagnose.robot import check_copies
 from app.diagnose.topics import TopicChecks
 from app.graph.model import (
@@ -213,3 +214,19 @@ def test_a_host_that_does_not_answer(error: OSError, monkeypatch: pytest.MonkeyP
     report = Report()
     assert not link.connects(report, "tcp/192.0.2.1:7447", "")
     assert report.codes() == ["no_route"]
+
+
+def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: Path) -> None:
+    """Another node publishes other joints on the same topic."""
+    state = "sensor_msgs/msg/JointState"
+    lock = f'id = "lift"\ntopic = "/joints"\ntype = "{state}"\nfield = "position[name=lift]"\nmax = 0.5'
+    here = robot(tmp_path, panel_of(f"[[interlock]]\n{lock}", button("/go", "lift")))
+    graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(topic("/joints", state),)),))
+    behind = NamesBehindBridge.of(here, graph)
+    for lift, codes in ((0.25, []), (0.75, ["permission_refused"])):
+        report, observed = Report(), Observation()
+        for name, position in (("lift", lift), ("finger", 0.9)):
+            payload = INTERFACES.encode(state, {"name": [name], "position": [position]})
+            observed.samples["joints"].append(Sample(payload, 1, 0.0, 0.0, "b1"))
+        check_permissions(report, behind, observed, INTERFACES)
+        assert report.codes() == codes

@@ -29,6 +29,7 @@ from tests.support.builders import (
     panel_of,
     permits,
     robot_there,
+    says,
     small_panel,
 )
 
@@ -202,6 +203,18 @@ def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
 
 
 @pytest.mark.parametrize("permitted", [True, False])
+@pytest.mark.parametrize(
+    ("value", "text"), [(math.nan, "not a number (NaN)"), (-math.inf, "infinite"), (0.5, "0.5")]
+)
+def test_a_number_that_is_none_is_named_so(value: float, text: str) -> None:
+    float64 = "std_msgs/msg/Float64"
+    panel = small_panel({"type": float64, "min": 1.0, "label": "Air"})
+    cell = robot_there(panel)
+    says(cell, ENABLED, value, float64)
+    reason = interlock_verdict(panel.interlocks[0], cell, NOW).reason
+    assert str(reason) == f"Air is {text}: it must be at least 1."
+
+
 def test_a_bool_of_a_larger_message_can_permit(permitted: bool) -> None:
     interlock = {"type": "sensor_msgs/msg/RegionOfInterest", "field": "do_rectify"}
     robot = robot_there(small_panel(interlock))

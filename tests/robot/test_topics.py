@@ -13,7 +13,7 @@ from app.panel.model import Panel
 from app.permission.interlocks import interlock_verdict
 from app.robot.slices import Slices
 from app.robot.state import Reading, RobotState, Sample
-from app.robot.topics import MAX_UNREAD
+from app.robot.topics import MAX_UNREAD, MAX_UNREAD_BYTES, MAX_UNREAD_PARTS
 from app.view.view import build_view
 from tests.support.builders import (
     BRIDGE,
@@ -29,12 +29,13 @@ from tests.support.builders import (
     panel_of,
 )
 from tests.support.form import several
-from tests.support.large import KINDS, LITTLE, TEN_MB, diagnostics, garbage
+from tests.support.large import KINDS, LITTLE, STATUS, TEN_MB, diagnostics, garbage
 
 LONGEST_TURN_S: Final = 0.05
 MEGABYTES: Final = several(3_000_000, TEN_MB)
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
 SIZE: Final = 200_000  # of a message that takes several turns of a clock that runs fast
+COUNT: Final = SIZE // len(STATUS)
 LEVEL: Final[Table] = {
     "type": DIAGNOSTICS, "field": "status[name=drive].level", "max": 1,
 }  # fmt: skip
@@ -58,7 +59,7 @@ class Clock:
 class Cell:
     """A robot that is there, whose large messages take several turns."""
 
-    def __init__(self, *widgets: Table, interlock: Table = LEVEL) -> None:
+    def __init__(self, *widgets: Table, interlock: Table = LEVEL, path: str = LEVEL["field"]) -> None:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
         self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK, None, Slices(Clock()))
         self.robot.link_up, self.robot.settled_at = True, 0.0
@@ -66,9 +67,10 @@ class Cell:
         self.read: list[tuple[str, Any]] = []
         self.robot.on_late_reading = self._read_later
         self._seq = 0
+        self._path = path
 
     def _read_later(self, key: str, reading: Reading) -> None:
-        self.read.append((key, reading.value("status[name=drive].level")))
+        self.read.append((key, reading.value(self._path)))
 
     def says(self, level: int | None, topic: str = ENABLED, size: int = SIZE) -> None:
         """A large message; None is one that is no message, which shows at its end."""
@@ -167,19 +169,47 @@ def test_a_readout_shows_what_was_said_before_until_the_newest_is_read() -> None
         assert cell.shown == ("waiting", "—")
         await cell.all_read("/heard")
         assert cell.shown == ("live", "0")
-        for level in (1, 2, 3):  # the ones between are passed over
+        for level in (1, 2, 3):
             cell.says(level, "/heard")
             assert cell.shown == ("live", "0")
         await cell.all_read("/heard")
         assert cell.shown == ("live", "3")
-        assert [value for _, value in cell.read] == [0, 1, 3]
+        assert [value for _, value in cell.read] == [0, 1, 2, 3]
+
+    run(test)
+
+
+def test_without_a_key_the_newest_counts_and_those_between_are_passed_over() -> None:
+    async def test() -> None:
+        cell = Cell(MESSAGE, FREE, {**SHOWN, "field": f"status[{COUNT - 1}].level"})
+        cell.says(0, "/heard")
+        await cell.all_read("/heard")
+        for level in (1, 2, 3):
+            cell.says(level, "/heard")
+            assert cell.shown == ("live", "0")
+        await cell.all_read("/heard")
+        assert cell.shown == ("live", "3")
+        assert len(cell.read) == 3
+
+    run(test)
+
+
+def test_of_parts_of_a_list_so_many_are_read_and_then_the_newest() -> None:
+    async def test() -> None:
+        cell = Cell()
+        for level in range(2 * MAX_UNREAD_PARTS):
+            cell.says(level % 200, "/heard")
+        await cell.all_read("/heard")
+        assert MAX_UNREAD_BYTES // SIZE - 1 <= len(cell.read) <= MAX_UNREAD_PARTS + 1
+        assert cell.shown == ("live", str((2 * MAX_UNREAD_PARTS - 1) % 200))
 
     run(test)
 
 
 def test_of_a_lossless_topic_each_is_read_in_its_order() -> None:
     async def test() -> None:
-        cell = Cell(MESSAGE, {**FREE, "confirm": CONFIRM})
+        place = f"status[{COUNT - 1}].level"
+        cell = Cell(MESSAGE, {**FREE, "confirm": {**CONFIRM, "field": place}}, path=place)
         for level in range(5):
             cell.says(level, "/heard")
             cell.robot.reading("/heard")

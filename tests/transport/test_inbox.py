@@ -28,9 +28,9 @@ def woken() -> list[bool]:
 
 @pytest.fixture
 def inbox(woken: list[bool]) -> Inbox:
-    """`permit` is lossless, `status` immediate, and `taped` recorded."""
+    """`permit` is lossless and immediate, `parts` lossless, `status` immediate, `taped` recorded."""
     mine = Inbox(woken.append)
-    mine.expect(["status"], ["permit"], ["taped"])
+    mine.expect(["status", "permit"], ["permit", "parts"], ["taped"])
     return mine
 
 
@@ -66,6 +66,14 @@ def test_immediate_data_waits_for_no_value(inbox: Inbox, woken: list[bool], key:
     inbox.put(key, b"", None)
     inbox.put("heard", b"", None)
     assert woken == [False, True]
+
+
+def test_parts_of_a_list_are_kept_and_wait_for_a_frame(inbox: Inbox, woken: list[bool]) -> None:
+    for said in (b"arm", b"gripper", b"arm"):
+        inbox.put("parts", said, None)
+    sample = inbox.drain().samples["parts"]
+    assert woken == [False]
+    assert [one.payload for one in sample.skipped_payloads] == [b"arm", b"gripper"]
 
 
 def test_the_graph_and_the_link_are_immediate(inbox: Inbox, woken: list[bool]) -> None:

@@ -85,6 +85,12 @@ def test_a_joint_that_is_not_known_is_missing(
     assert view["joint_bars"][levels.index("missing")] is None
 
 
+def test_a_joint_that_is_not_a_number_is_named_so() -> None:
+    view = shown(["a", "it's"], [math.nan, math.nan])
+    assert view["said"] == "J1 is not a number (NaN) and 1 more"
+    assert view["joint_values"] == ["NaN", "NaN"]
+
+
 def test_old_joints_have_no_level() -> None:
     view = shown(["a", "it's"], [math.pi, 0.5], now=NOW + 2)
     assert (view["state"], view["note"], view["said"]) == ("old", "2 s old", "")

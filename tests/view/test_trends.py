@@ -60,6 +60,15 @@ def test_each_pen_that_is_not_live_is_named() -> None:
     assert (shown["state0"], until) == ("old", NOW + 8)
 
 
+def test_a_pen_that_is_not_a_number_says_so() -> None:
+    widget, robot = cell()
+    says(robot, "/inlet", math.nan, FLOAT)
+    says(robot, "/gripper", 0.46, FLOAT)
+    shown, _ = show(widget, robot, NOW)
+    assert (shown["state"], shown["state0"], shown["state1"]) == ("live", "unreadable", "live")
+    assert str(shown["note"]) == "Inlet: the value is not a number (NaN)"
+
+
 def test_a_lost_bridge_makes_values_old() -> None:
     widget, robot = cell()
     says(robot, "/inlet", 6.0, FLOAT)

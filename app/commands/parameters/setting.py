@@ -10,7 +10,7 @@ from app.commands.service_calls import MAX_VALUE_CHARS, Request, with_reply
 from app.i18n import say
 from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.widgets.parameter import SET, Parameter, Value
-from app.printable import printable
+from app.printable import printable, without_terminal_codes
 from app.robot.command_status import Outcome
 from app.robot.parameter_state import encode_value
 
@@ -34,5 +34,5 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
-    text = printable(plain_text(reason, MAX_VALUE_CHARS)) if reason else ""
+    text = printable(plain_text(reason, MAX_VALUE_CHARS, without_terminal_codes)) if reason else ""
     return Outcome("rejected", with_reply(say("said_no", time=now), text))

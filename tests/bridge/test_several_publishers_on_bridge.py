@@ -1,0 +1,114 @@
+"""Two real nodes publish on one topic of a real bridge: parts of a list, or each another value."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.servers import live_server
+
+STATE: Final = "sensor_msgs/msg/JointState"
+LOOKS: Final = 100
+PANEL: Final = """
+title = "Cell"
+mode = "live"
+
+[[interlock]]
+id = "lift"
+topic = "/joint_states"
+type = "sensor_msgs/msg/JointState"
+field = "position[name=lift]"
+max = 0.5
+max_age_s = 1.5
+
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "go"
+kind = "publish"
+label = "Go"
+topic = "/go"
+type = "std_msgs/msg/Bool"
+message = { data = true }
+interlock = "lift"
+[[page.widget]]
+id = "arm"
+kind = "joints"
+label = "Arm"
+max_age_s = 1.5
+joint = [
+  { name = "lift", unit = "m", min = 0, max = 1 },
+  { name = "finger", unit = "m", min = 0, max = 1 },
+]
+[[page.widget]]
+id = "past"
+kind = "trend"
+label = "Past"
+disk = false
+
+[[page.widget.pen]]
+label = "Finger"
+topic = "/joint_states"
+type = "sensor_msgs/msg/JointState"
+field = "position[name=finger]"
+"""
+
+
+@pytest.fixture
+def nodes(domain: int, own_bridge: Bridge) -> Iterator[Callable[[str], RosNode]]:
+    """Starts nodes behind `own_bridge`."""
+    with ExitStack() as stack:
+
+        def started(name: str) -> RosNode:
+            node = RosNode(own_bridge.domain, name)
+            stack.callback(node.end)
+            return node
+
+        yield started
+
+
+def joint(name: str, position: float) -> dict[str, Any]:
+    return {"name": [name], "position": [position]}
+
+
+def test_joints_of_two_nodes_do_not_disturb_each_other(
+    own_bridge: Bridge, nodes: Callable[[str], RosNode], tmp_path: Path
+) -> None:
+    lift, finger = nodes("lift"), nodes("finger")
+    for node, name in ((lift, "lift"), (finger, "finger")):
+        node.advertise("/joint_states", STATE)
+        node.every("/joint_states", joint(name, 0.25), 0.05)
+    with live_server(own_bridge, tmp_path, PANEL) as kiosk:
+        until(lambda: kiosk.widget("go")["enabled"], "the lift's position is received")
+        until(lambda: "—" not in kiosk.widget("arm")["joint_values"], "both parts are received")
+        until(lambda: gaps(kiosk), "the trend has begun")
+        assert looks(kiosk) == {(True, ("+0.2", "+0.2"))}
+        assert gaps(kiosk) == 1  # where it begins
+        lift.end()
+        until(lambda: not kiosk.widget("go")["enabled"], "the lift's position is old")
+        assert kiosk.widget("go")["reason"].startswith(
+            "Locked: position[name=lift] on /joint_states is"
+        )
+        arm = kiosk.widget("arm")
+        assert (arm["state"], arm["joint_levels"]) == ("live", ["missing", "normal"])
+
+
+def looks(kiosk: Server) -> set[Any]:
+    """What the page shows, looked at so often."""
+    found = set()
+    for _ in range(LOOKS):
+        widgets = kiosk.snapshot()["widgets"]
+        found.add((widgets["go"]["enabled"], tuple(widgets["arm"]["joint_values"])))
+        time.sleep(0.01)
+    return found
+
+
+def gaps(kiosk: Server) -> int:
+    """The number of gaps in the trend."""
+    trend = kiosk.http.get("/widgets/past/trend", params={"span_s": 60}).json()
+    return int(trend["pens"][0].count(None))
