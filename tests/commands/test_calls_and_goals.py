@@ -142,8 +142,10 @@ def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
     async def test(bench: Bench) -> None:
         call = bench.call()
         await queried(bench, 1)
-        bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
-        assert str((await call).text).endswith(": no \\u202e\\u001b[2Jon")
+        bench.line.answer(
+            f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2J\x1b[1;31mon\x1b[0m"
+        )
+        assert str((await call).text).endswith(": no \\u202eon")
 
     run(test)
 

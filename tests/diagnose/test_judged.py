@@ -33,7 +33,7 @@ from app.graph.model import (
 from app.interfaces import load_interfaces
 from app.panel import load_panel
 from app.robot.sample import Sample
-from tests.diagnose.setups import BOOL, STRING, action, button, named, panel_of, readout
+from tests.diagnose.setups import BOOL, STRING, action, button, interlock, named, panel_of, readout
 
 QOS = EndpointQos(reliable=True)
 BRIDGE = Bridge(zid="b1", version="v1.10.2", config={"namespace": "/", "domain": 0})
@@ -219,8 +219,8 @@ def test_a_host_that_does_not_answer(error: OSError, monkeypatch: pytest.MonkeyP
 def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: Path) -> None:
     """Another node publishes other joints on the same topic."""
     state = "sensor_msgs/msg/JointState"
-    lock = f'id = "lift"\ntopic = "/joints"\ntype = "{state}"\nfield = "position[name=lift]"\nmax = 0.5'
-    here = robot(tmp_path, panel_of(f"[[interlock]]\n{lock}", button("/go", "lift")))
+    lock = interlock("/joints", type=state, field="position[name=lift]", max=0.5)
+    here = robot(tmp_path, panel_of(lock, button("/go")))
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(topic("/joints", state),)),))
     behind = NamesBehindBridge.of(here, graph)
     for lift, codes in ((0.25, []), (0.75, ["permission_refused"])):

@@ -7,7 +7,7 @@ import pytest
 
 from app.interfaces import load_interfaces
 from app.robot import log_lines
-from app.robot.log_lines import LOG_TYPE, Found, LogLines, Wanted
+from app.robot.log_lines import LOG_TYPE, LONGEST_TEXT, Found, LogLines, Wanted
 
 INTERFACES = load_interfaces("jazzy", ())
 
@@ -82,6 +82,13 @@ def test_lines_are_chosen(wanted: Wanted, fitting: list[int]) -> None:
         line(4, 10, node="web_ui"),
     ]
     assert numbers(find(filled(payloads), wanted)) == fitting
+
+
+def test_colours_of_a_terminal_are_no_text() -> None:
+    long = "\x1b[31m" + "x" * (LONGEST_TEXT - 2) + "\x1b[0m"
+    lines = filled([line(1, text="\x1b[1;33m[WARN]\x1b[0m hot"), line(2, text=long)])
+    shown = [one.text for _, one in find(lines).lines]
+    assert shown == ["[WARN] hot 1", "x" * (LONGEST_TEXT - 2) + " 2"]
 
 
 def test_what_is_no_line_is_passed_over_and_text_can_not_hide() -> None:
