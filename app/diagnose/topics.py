@@ -7,14 +7,13 @@ from typing import Final
 from app.diagnose.bridges import denies
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
-from app.errors import InterfaceError
 from app.graph.model import Server, TopicEndpoint
 from app.interfaces import Interfaces
 from app.interfaces.names import Qos
 from app.panel.widgets.parameter import DESCRIBE, EVENTS, GET, SET
 from app.panel.widgets.service_action import Call
+from app.robot.definitions import differs, own_hash
 
-HASH: Final = "RIHS01_"
 BEST_EFFORT: Final = "it is published best effort, and the panel asks for reliable."
 VOLATILE: Final = "it is published volatile, and the panel asks for transient local."
 WANTS_RELIABLE: Final = "its node asks for reliable, and the panel publishes best effort."
@@ -117,11 +116,8 @@ class TopicChecks:
                 self._find("definition_differs", topic, type=wanted)
 
     def _differs(self, theirs: str, type_name: str) -> bool:
-        """Whether the robot's definition is known to be another one, by its hash (REP 2016)."""
-        try:
-            return theirs.startswith(HASH) and theirs != self._interfaces.type_hash(type_name)
-        except InterfaceError:  # a distribution without hashes
-            return False
+        """Whether the robot's definition is known to be another one."""
+        return differs(theirs, own_hash(type_name, self._interfaces))
 
     def _check_server(self, what: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
         """`what` is "service" or "action"."""
@@ -137,6 +133,10 @@ class TopicChecks:
                 self._find(f"{what}_type", name, found=server.type, wanted=wanted)
             elif not server.can_be_called:
                 self._find("wrong_rmw", name, vendor=server.dds)
+            else:
+                found = (one for one, theirs in server.hashes if self._differs(theirs, one))
+                if (part := next(found, None)) is not None:
+                    self._find("definition_differs", name, type=part)
 
     def _check_parameters(self, node: str) -> None:
         names = [f"{node}/{service}" for service, _ in (GET, DESCRIBE, SET)]

@@ -5,18 +5,16 @@ a second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Iterable
+from typing import Final
 
 from app.dialect.endpoint import Direction, Endpoint, OwnEndpoint, ServerRole, TopicRole
 from app.interfaces.names import (
     ACTION_TYPE,
-    MAX_NAME,
     MESSAGE_TYPE,
     TOPIC,
     Qos,
     is_valid_name,
-    key_of,
     valid_type,
 )
 
@@ -28,9 +26,10 @@ NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their 
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]{1,64})/@ros2_lv"
     r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/"
-    r"K?:(?P<reliability>[^:/]*):(?P<durability>[^:/]*):.*"
+    r"K?:(?P<reliability>[^:/]*):(?P<durability>[^:/]*):(?P<more>.*)"
     r"|/(?P<server>SS|AS)/(?P<name>[^/]+)/(?P<server_type>[^/]+))?"
 )
+_HASH = re.compile(r"typehash=(RIHS\d\d_[0-9a-f]{64});")
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
 
 
@@ -78,7 +77,9 @@ def parsed(token_key: str) -> Endpoint | None:
     if not is_valid_name(key):
         return None
     reliable = {"0": False, "1": True}.get(found["reliability"])
-    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable)
+    type_hash = _HASH.search(found["more"])
+    hashes = ((type_name, type_hash[1]),) if type_hash else ()
+    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable, hashes)
 
 
 def version(zid: str) -> str:
@@ -89,17 +90,6 @@ def version(zid: str) -> str:
 def config(zid: str) -> str:
     """The key expression of one bridge's `CONFIG`."""
     return f"@/{zid}/ros2/config"
-
-
-def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:
-    """The publishers and subscribers of one node, from its bridge's answer to `NODES`."""
-    roles: tuple[tuple[TopicRole, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
-    for role, name in roles:
-        for topic in node[name]:
-            whole = namespace + topic["name"]
-            if len(whole) <= MAX_NAME and TOPIC.fullmatch(whole):
-                key = key_of(topic["name"], namespace)
-                yield Endpoint(zid_of(admin_key), role, key, valid_type(topic["type"]))
 
 
 def zid_of(admin_key: str) -> str:

@@ -5,13 +5,16 @@ on Cyclone DDS.
 """
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from app.dialect.endpoint import Endpoint, Role
 from app.interfaces.names import is_valid_name, valid_type
 
 DDS: Final = "@/*/ros2/dds/**"  # participants, readers and writers of a robot's nodes, not the bridge's
+CALLS: Final[Mapping[str, str]] = {"rq": "Request", "rr": "Reply"}  # the endings of services' topics
+ACTION_PART: Final = "/_action/"  # between the name of an action and those of its topics and services
 EVERY_ROUTE: Final = "@/*/ros2/route/**"
 
 CYCLONE: Final = "0110"
@@ -38,7 +41,8 @@ _TOKEN_QOS = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DdsEntity:
-    """A DDS reader or writer of a ROS 2 topic; `name` is the topic's on the robot ("/speed")."""
+    """A DDS reader or writer of a ROS 2 topic, or of a service's requests or responses if
+    `of_service`; `name` is the topic's or the service's on the robot ("/speed")."""
 
     zid: str
     participant: str
@@ -50,6 +54,7 @@ class DdsEntity:
     keep_all: bool
     depth: int | None
     type_hash: str
+    of_service: bool = False
 
     @property
     def vendor(self) -> str:
@@ -62,15 +67,19 @@ def vendor_of(guid: str) -> str:
 
 
 def entity_of(admin_key: str, answer: Any) -> DdsEntity | None:
-    """A reader or writer of a topic from an answer to `DDS`; None for participants, for services and
-    for what is not of ROS 2."""
+    """A reader or writer from an answer to `DDS`; None for participants and for what is not of
+    ROS 2."""
     place = _ENTITY.fullmatch(admin_key)
     if place is None or not isinstance(answer, dict):
         return None
     topic, dds_type = answer.get("topic_name"), _DDS_TYPE.fullmatch(str(answer.get("type_name")))
-    if not isinstance(topic, str) or not topic.startswith("rt/") or dds_type is None:
+    if not isinstance(topic, str) or dds_type is None:
         return None
-    if not is_valid_name(topic.removeprefix("rt/")):
+    prefix, _, rest = topic.partition("/")
+    ending = CALLS.get(prefix, "")
+    if (not ending and prefix != "rt") or not rest.endswith(ending):
+        return None
+    if not is_valid_name(rest.removesuffix(ending)):
         return None
     qos = answer["qos"] if isinstance(answer.get("qos"), dict) else {}
     writer = place["role"] == "writer"
@@ -78,7 +87,7 @@ def entity_of(admin_key: str, answer: Any) -> DdsEntity | None:
         zid=place["zid"],
         participant=place["participant"],
         writer=writer,
-        name=topic.removeprefix("rt"),
+        name=f"/{rest.removesuffix(ending)}",
         type=valid_type("/".join(dds_type.group("package", "kind", "name"))),
         # Left out where it is DDS's default, which differs between readers and writers.
         reliable=_kind(qos, "reliability", "RELIABLE" if writer else "BEST_EFFORT") == "RELIABLE",
@@ -86,6 +95,7 @@ def entity_of(admin_key: str, answer: Any) -> DdsEntity | None:
         keep_all=_kind(qos, "history", "KEEP_LAST") == "KEEP_ALL",
         depth=_depth(qos, place["participant"]),
         type_hash=_type_hash(qos.get("user_data")),
+        of_service=bool(ending),
     )
 
 
@@ -109,6 +119,11 @@ def _type_hash(user_data: Any) -> str:
         return ""
     found = _HASH.search(text)
     return found[1] if found else ""
+
+
+def of_participant(zid: str, participant: str) -> str:
+    """The key expression of a participant's readers and writers."""
+    return f"@/{zid}/ros2/dds/{participant}/**"
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,3 +174,49 @@ def names_of(answer: Mapping[str, Any], part: str) -> Iterator[tuple[str, str]]:
         name = str(one.get("name")) if isinstance(one, dict) else ""
         if name.startswith("/") and is_valid_name(name[1:]):
             yield name, valid_type(str(one.get("type")))
+
+
+# The lists of an answer for a node, by the roles of what is in them.
+NODE_PARTS: Final[Mapping[Role, str]] = {
+    "MP": "publishers",
+    "MS": "subscribers",
+    "SS": "service_servers",
+    "AS": "action_servers",
+}
+
+
+def node_endpoints(admin_key: str, answer: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:
+    """The publishers, subscribers and servers of one node, without QoS and hashes. `namespace` is its
+    bridge's. Nothing for a malformed answer."""
+    place = node_place(admin_key)
+    if place is None:
+        return
+    zid, participant, node = place
+    for role, part in NODE_PARTS.items():
+        for name, type_name in names_of(answer, part):
+            key = f"{namespace}{name}"[1:]
+            if is_valid_name(key):
+                yield Endpoint(zid, role, key, type_name, node=node, dds=vendor_of(participant))
+
+
+def with_entities(endpoint: Endpoint, name: str, entities: Iterable[DdsEntity]) -> Endpoint:
+    """An endpoint of a node with its QoS and hashes, from the readers and writers of the node's
+    participant. `name` is the endpoint's on the robot."""
+    own = [one for one in entities if _is_part(one, endpoint.role, name)]
+    hashes = tuple(dict.fromkeys((one.type, one.type_hash) for one in own if one.type_hash))
+    if not own or endpoint.role in ("SS", "AS"):
+        return replace(endpoint, hashes=hashes)
+    return replace(
+        endpoint,
+        hashes=hashes,
+        reliable=all(one.reliable for one in own),
+        transient_local=all(one.transient_local for one in own),
+    )
+
+
+def _is_part(entity: DdsEntity, role: Role | None, name: str) -> bool:
+    if role == "AS":
+        return entity.name.startswith(f"{name}{ACTION_PART}")
+    if role == "SS":
+        return entity.of_service and entity.name == name
+    return not entity.of_service and entity.name == name and entity.writer is (role == "MP")

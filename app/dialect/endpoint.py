@@ -16,8 +16,12 @@ DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its versi
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher, subscriber or server of a token. The role None means the peer that the robot is
-    reached by. `reliable` is None if it is not in the token."""
+    """A publisher, subscriber or server, of a token or of a node. The role None means the peer that the
+    robot is reached by. `reliable` is None if it is not known, `node` and `dds` are "".
+
+    `hashes` are (message type, type hash) of the messages that it exchanges, as far as they are known:
+    one of a topic, those of its requests and responses of a server.
+    """
 
     zid: str
     role: Role | None = None
@@ -25,6 +29,9 @@ class Endpoint:
     type: str = ""
     transient_local: bool = False
     reliable: bool | None = None
+    hashes: tuple[tuple[str, str], ...] = ()
+    node: str = ""
+    dds: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,7 +122,8 @@ class Topic:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Server:
     """A service or an action of a robot. `nodes` serve it; `dds` is their DDS, "" if unknown. Through
-    the bridge only servers on Cyclone DDS can be called."""
+    the bridge only servers on Cyclone DDS can be called. `hashes` are (message type, type hash) of its
+    requests and responses, as far as known."""
 
     name: str
     key: str
@@ -130,6 +131,7 @@ class Server:
     bridge: str
     nodes: tuple[str, ...] = ()
     dds: str = ""
+    hashes: tuple[tuple[str, str], ...] = ()
 
     @property
     def can_be_called(self) -> bool:

@@ -29,6 +29,7 @@ from app.interfaces.type_hash import type_hash
 from app.interfaces.validation import Check, field_check, message_check
 
 MAX_SUGGESTIONS: Final = 3
+FILE_PARTS: Final = 3  # of a definition's file that are shown: package, folder, name
 NO_DEFINITIONS: Final = Definitions()
 PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
 
@@ -140,6 +141,14 @@ class Interfaces:
         if type_name not in self._hashes:
             self._hashes[type_name] = type_hash(self._find(type_name), self._find)
         return self._hashes[type_name]
+
+    def source(self, type_name: str) -> str:
+        """Where a definition comes from: its file below the folder of packages ("pkg/msg/Name.msg"), or
+        the distribution."""
+        structure = self._definitions.find(type_name)
+        if structure is None or structure.source is None:
+            return f"ROS 2 {self._distro}"
+        return "/".join(structure.source.parts[-FILE_PARTS:])
 
     def definition(self, type_name: str) -> str:
         """The definition of a message and of all types in it, in the format "ros2msg"."""

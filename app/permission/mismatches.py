@@ -1,16 +1,22 @@
 """Why a topic can't be used, by what the graph shows of it. Pure."""
 
-from app.dialect.endpoint import TopicRole
+from collections.abc import Mapping
+from typing import Final
+
+from app.dialect.endpoint import Role, TopicRole
 from app.interfaces.names import Qos
 from app.panel.base import HasTopic
 from app.permission.verdict import Verdict, locked
 from app.robot.graph import LiveGraph, cached_until_change
 from app.robot.state import RobotState
 
+_COUNTERPART: Final[Mapping[TopicRole, TopicRole]] = {"MS": "MP", "MP": "MS"}
+
 
 def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
     """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
-    not route it. `role` is what the panel does with it: publish ("MP") or subscribe ("MS")."""
+    not route it, another definition. `role` is what the panel does with it: publish ("MP") or
+    subscribe ("MS")."""
     return _misfit(
         robot.graph,
         role,
@@ -18,7 +24,14 @@ def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict 
         of.topic,
         of.type,
         of.qos.wire_qos,
-    )
+    ) or definition_mismatch(_COUNTERPART[role], of.topic, robot)
+
+
+def definition_mismatch(role: Role, name: str, robot: RobotState) -> Verdict | None:
+    """Why what is sent and received would be misread: the robot's definition of its type is not the
+    panel's. `role` is the robot's."""
+    found = robot.difference(role, robot.key(name))
+    return locked("definition_differs", name=name, type=found.type) if found else None
 
 
 @cached_until_change

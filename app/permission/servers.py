@@ -3,11 +3,14 @@ awaited. Pure."""
 
 from typing import Final
 
+from app.dialect.endpoint import ServerRole
 from app.i18n import TextLike, joined, say
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
 from app.panel.widgets.service_action import ServerCommand
+from app.permission.mismatches import definition_mismatch
 from app.permission.verdict import Verdict, locked
 from app.robot.command_status import IDLE
+from app.robot.definitions import uncallable_dds
 from app.robot.parameter_state import (
     UNKNOWN,
     ParameterState,
@@ -32,13 +35,26 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
         return locked("no_service", name=name)
     if found != call.type:
         return locked("wrong_type", topic=name, found=found, wanted=call.type)
-    ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
+    if doubt := _unfit(role, name, robot):
+        return doubt
+    ready_at = robot.graph.since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
     known = robot.command_status.get(call.id, IDLE)
     if not known.busy:
         return None
     return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
+
+
+def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:
+    """Why a server of the right type can't be called: it is on a DDS that its bridge does not call, its
+    definition is another one, or neither is known yet."""
+    graph, key = robot.graph, robot.key(name)
+    if robot.nodes_are_read and graph.since(role, key) > graph.nodes_read_at:
+        return locked("getting_ready", name=name)
+    if vendor := uncallable_dds(graph, role, key):
+        return locked("wrong_rmw", name=name, vendor=vendor)
+    return definition_mismatch(role, name, robot)
 
 
 def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
@@ -59,6 +75,8 @@ def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
             return locked("no_parameters", node=node)
         if found != wanted:
             return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
+        if doubt := _unfit("SS", f"{node}/{name}", robot):
+            return doubt
     return None
 
 

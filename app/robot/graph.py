@@ -88,9 +88,10 @@ class LiveGraph:
         self._bridges: set[str] = set()
         self._namespace_matches: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
-        self._alive_since: dict[str, float] = {}  # of servers' tokens
+        self._alive_since: dict[str, float] = {}  # of tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
+        self.nodes_read_at = -math.inf  # monotonic seconds: when the last query of the nodes began
         self._bridge_versions: Mapping[str, str] | None = None
 
     def is_relevant(self, token_key: str) -> bool:
@@ -116,8 +117,7 @@ class LiveGraph:
             return self._apply_bridge(endpoint.zid, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
-            if endpoint.role in ("SS", "AS"):
-                self._alive_since[token_key] = now
+            self._alive_since[token_key] = now
         else:
             self._remove_token(endpoint.key, token_key)
         return None
@@ -139,10 +139,13 @@ class LiveGraph:
             self._namespace_matches.pop(zid, None)
         return zid
 
-    def update_routes(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
-        """Replaces the bridges' routes, and the publishers and subscribers of the nodes behind them,
-        whose types may differ from the route's."""
+    def update_routes(
+        self, routes: Iterable[Route], nodes: Iterable[Endpoint] = (), read_at: float = -math.inf
+    ) -> None:
+        """Replaces the bridges' routes, and the endpoints of the nodes behind them, whose types may
+        differ from the route's. `read_at` (monotonic seconds) is when the query of the nodes began."""
         self.cache.clear()
+        self.nodes_read_at = read_at
         self._routes.clear()
         self._nodes.clear()
         for route in routes:
@@ -196,13 +199,28 @@ class LiveGraph:
         """Whether a node behind a bridge publishes, subscribes or serves."""
         return bool(self._endpoints(role, key))
 
+    @cached_until_change
+    def node_endpoints(self, role: Role, key: str) -> list[Endpoint]:
+        """Those of the robot's nodes, as the bridges knew them when they were queried last."""
+        return [e for e in self._nodes.get(key, ()) if e.role == role and e.zid in self._bridges]
+
+    @cached_until_change
+    def described_endpoints(self, role: Role, key: str) -> list[Endpoint]:
+        """The endpoints of the robot whose QoS and hashes may be known. A bridge's token is of the
+        first publisher or subscriber; it stays if that one ends and another is there. So it counts
+        only until the nodes have been read."""
+        nodes = [e for e in self.node_endpoints(role, key) if e.hashes or e.reliable is not None]
+        is_read = self.since(role, key) <= self.nodes_read_at
+        read = {e.zid for e in nodes} if is_read else set()
+        return [*(e for e in self._endpoints(role, key) if e.zid not in read), *nodes]
+
     def server_type(self, role: ServerRole, key: str) -> str | None:
         """The type of the robot's service or action; None if there is no server now."""
         return next((e.type for e in self._endpoints(role, key)), None)
 
     @cached_until_change
-    def served_since(self, role: ServerRole, key: str) -> float:
-        """When the newest server of this name appeared (monotonic seconds); -inf without one."""
+    def since(self, role: Role, key: str) -> float:
+        """When the newest endpoint of this name appeared (monotonic seconds); -inf without one."""
         tokens = self._tokens.get(key, {}).items()
         times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
         return max(times, default=-math.inf)
@@ -246,7 +264,7 @@ class LiveGraph:
         All publishers must match: one that is not received may publish something else. One matching
         subscriber is enough.
         """
-        theirs = self._endpoints(_COUNTERPARTS[role][0], key)
+        theirs = self.described_endpoints(_COUNTERPARTS[role][0], key)
         mismatches = [
             _reader_mismatch(e, qos) if role == "MS" else _writer_mismatch(e, qos) for e in theirs
         ]

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 from app.dialect.dialect import Dialect
+from app.dialect.endpoint import Role
 from app.errors import DecodeError
 from app.i18n import Text, TextLike
 from app.interfaces import Interfaces, has_key
@@ -21,6 +22,7 @@ from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatus
+from app.robot.definitions import Difference, difference
 from app.robot.graph import LiveGraph
 from app.robot.history import History
 from app.robot.keyed_entries import KeyedEntries
@@ -67,8 +69,9 @@ class RobotState:
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
         named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
-        self._required_keys = frozenset(map(self.key, named))
-        self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self._required_keys)
+        self.required_keys = frozenset(map(self.key, named))
+        self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
+        self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.replayed = ReplayedMessages()
@@ -125,8 +128,23 @@ class RobotState:
             key = self._keys[topic] = key_of(topic, self.namespace)
         return key
 
+    def difference(self, role: Role, key: str) -> Difference | None:
+        """How the definition of an endpoint of the robot differs from the panel's; None if it is not
+        known to differ."""
+        return difference(self.graph, role, key, self._interfaces)
+
+    def definition_source(self, type_name: str) -> str:
+        """Where the panel's definition of a type comes from."""
+        return self._interfaces.source(type_name)
+
+    def is_misread(self, key: str) -> bool:
+        """Whether a message of a topic would be decoded by a definition that is not its own."""
+        return self.difference("MP", key) is not None
+
     def update(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
+        if self.is_misread(key):
+            return
         if key in self._interlock_keys:
             self.silent_publishers.record_message(key, sample.source, sample.seq, sample.at)
             self.replayed.record_message(key, sample.at, self.settled_at, sample.cached)
@@ -147,6 +165,7 @@ class RobotState:
         """Call after every change of the graph. If a required publisher has ended, its samples (before
         the sequence number `before`) become invalid, and a new publisher must republish the value."""
         self.presence.update(self.graph)
+        self.drop_misread()
         for key in self._publisher_required:
             if self.graph.has_endpoint("MP", key):
                 self._published.add(key)
@@ -157,6 +176,12 @@ class RobotState:
                     topic.invalidate()
                     self.replayed.begin(key)
 
+    def drop_misread(self) -> None:
+        """Drops values that were decoded by a definition which turned out not to be the publisher's."""
+        for key, topic in self._topics.items():
+            if self.is_misread(key):
+                topic.drop()
+
     def invalidate(self, key: str) -> None:
         """The last value of a topic is unknown."""
         self._topics[key].invalidate()
@@ -165,7 +190,7 @@ class RobotState:
         """The link was lost: the graph is empty, and no sample is valid."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = LiveGraph(self.dialect, "", self._own_namespace, self._required_keys)
+        self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.replayed.begin_all()
         self.presence.clear()

@@ -134,6 +134,14 @@ class Topic:
             self._values = without_source(self._values, source)
             self._last_reading = replace(self._last_reading, keyed=self._values)
 
+    def drop(self) -> None:
+        """No message counts that was received so far."""
+        if self.sample is not None:
+            self.cuts += 1
+            self.sample, self._walk, self._last_reading = None, None, WAITING
+            self._unread.clear()
+            self._values = NO_VALUES
+
     def _read(self) -> bool:
         """Decodes as much as this turn allows; returns whether that was all."""
         while (walked := self._next_read()) is not None:

@@ -114,6 +114,8 @@ class Feed:
     async def picture(self, frame: Frame, widget: Camera) -> Picture:
         """The picture of a frame, encoded once for all viewers; NoPicture says why there is none."""
         try:
+            if found := self._robot.difference("MP", self._key):
+                raise NoPicture(say("definition_differs", name=self.topic, type=found.type))
             if len(frame.payload) > widget.max_bytes:
                 size, most = len(frame.payload), widget.max_bytes
                 raise NoPicture(say("camera_large", size=size, most=most))

@@ -154,6 +154,8 @@ class Ingest:
 
     def _notify(self, changes: Changes) -> None:
         for key, sample in changes.kept:
+            if self._robot.is_misread(key):
+                continue
             for listener in self._by_key[key]:
                 self._guarded(key, sample, listener.record_sample)
 
@@ -165,7 +167,8 @@ class Ingest:
 
     def _apply(self, key: str, sample: Sample, updates: Updates) -> None:
         if key in self._feedback:
-            self._actions.on_feedback(self._feedback[key], sample)
+            if not self._robot.difference("AS", self._robot.key(self._feedback[key])):
+                self._actions.on_feedback(self._feedback[key], sample)
         elif key in self._status:
             self._actions.on_status(self._status[key], sample)
         else:

@@ -89,7 +89,14 @@ class RobotSession:
         self._log = RobotLog(log, self.robot.name)
         self._renewal = Renewal(self.link, self.robot)
         context = RobotContext(
-            panel, self.interfaces, self.robot, self.link, self.show, self.renew, self.reopen
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self.show,
+            lambda: self._turn.on_graph_read(),
+            self.renew,
+            self.reopen,
         )
         self.control = ControlAuthority(
             panel.control,

@@ -96,6 +96,12 @@ class Turn:
         self._commands.on_graph_change()
         self._peer.on_graph_change(peer_appeared)
 
+    def on_graph_read(self) -> None:
+        """Updates everything after the nodes of the graph were read: what they are may be known now."""
+        self._robot.drop_misread()
+        self._commands.on_graph_change()
+        self.changed()
+
     def _run_steps(self, steps: Iterable[Updates]) -> None:
         """Runs the steps of a turn. Changes during it are shown at its end, or in one more turn."""
         running, self._running = self._running, True

@@ -1,6 +1,8 @@
 """The protocols of a link by which the admin space and the ROS graph are queried."""
 
-from typing import Protocol
+import json
+from contextlib import suppress
+from typing import Any, Protocol
 
 
 class AdminSpace(Protocol):
@@ -15,3 +17,12 @@ class GraphLink(AdminSpace, Protocol):
 
     async def tokens(self, timeout_s: float = ...) -> list[str]:
         """The liveliness tokens. LinkError without a link, or if not all arrive in time."""
+
+
+async def ask_json(link: AdminSpace, selector: str) -> list[tuple[str, Any]]:
+    """(key, answer) of each answer that is JSON; others are ignored. LinkError without a link."""
+    found = []
+    for key, answer in await link.ask(selector):
+        with suppress(ValueError, RecursionError):
+            found.append((key, json.loads(answer)))
+    return found

@@ -1,16 +1,15 @@
 """Queries the admin space of a robot's bridges: their versions, routes, nodes and namespaces."""
 
 import asyncio
-import json
-from contextlib import suppress
+import time
 from typing import Any, Final
 
 from app.dialect import bridge_dialect
-from app.dialect.endpoint import Endpoint
 from app.interfaces.names import valid_type
 from app.robot.graph import Route
 from app.robot.state import RobotState
-from app.transport.admin_space import AdminSpace
+from app.transport.admin_space import AdminSpace, ask_json
+from app.transport.bridge_participants import BridgeParticipants
 
 MISSES_ALLOWED: Final = 1
 
@@ -21,6 +20,8 @@ class BridgeAdmin:
     def __init__(self, robot: RobotState, link: AdminSpace) -> None:
         self._robot = robot
         self._link = link
+        self._participants = BridgeParticipants(link)
+        robot.nodes_are_read = True
         self.missed = 0  # queries in a row that a bridge did not answer
 
     async def answered(self, within_s: float) -> bool:
@@ -45,31 +46,22 @@ class BridgeAdmin:
             return  # it would answer nothing else either, and each query would wait for its timeout
         routes = [
             r
-            for key, answer in await self._ask_json(bridge_dialect.ROUTES)
+            for key, answer in await ask_json(self._link, bridge_dialect.ROUTES)
             if (r := _route(key, answer))
         ]
-        nodes: set[Endpoint] = set()
-        for key, answer in await self._ask_json(bridge_dialect.NODES):
-            with suppress(KeyError, TypeError):  # an answer that is no node's
-                namespace = namespaces.get(bridge_dialect.zid_of(key), self._robot.namespace)
-                nodes.update(bridge_dialect.endpoints_of(key, answer, namespace))
-        graph.update_routes(routes, nodes)
+        began = time.monotonic()
+        nodes = await ask_json(self._link, bridge_dialect.NODES)
+        own = {zid: namespaces.get(zid, self._robot.namespace) for zid in graph.bridges}
+        endpoints = await self._participants.endpoints(nodes, own, self._robot.required_keys)
+        graph.update_routes(routes, endpoints, began)
 
     async def _namespaces(self) -> dict[str, str]:
         """The namespace in each bridge's configuration, by zid; "" for none."""
         return {
             bridge_dialect.zid_of(key): answer["namespace"].rstrip("/")
-            for key, answer in await self._ask_json(bridge_dialect.CONFIG)
+            for key, answer in await ask_json(self._link, bridge_dialect.CONFIG)
             if isinstance(answer, dict) and isinstance(answer.get("namespace"), str)
         }
-
-    async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
-        """(key, answer) of each answer that is JSON; others are ignored."""
-        found = []
-        for key, answer in await self._link.ask(selector):
-            with suppress(ValueError):
-                found.append((key, json.loads(answer)))
-        return found
 
 
 def _route(key: str, answer: Any) -> Route | None:

@@ -26,7 +26,6 @@ from app.graph.model import (
 )
 
 Answers = list[tuple[str, Any]]  # (admin key, JSON)
-HIDDEN = "/_action/"  # the topics and services that an action is made of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +100,9 @@ class _Robot:
                 self._nodes[zid, participant].append(node)
         found = (entities.entity_of(key, answer) for key, answer in answers.entities)
         self._entities = [one for one in found if one is not None and one.zid in zids]
+        self._parts: defaultdict[tuple[str, str], list[DdsEntity]] = defaultdict(list)  # of servers
+        for one in self._entities:
+            self._parts[one.zid, one.name.partition(entities.ACTION_PART)[0]].append(one)
         self._routes = [one for one in _routes(answers.routes, namespace) if one.bridge in zids]
 
     def graph(self) -> RobotGraph:
@@ -123,7 +125,7 @@ class _Robot:
         publishers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
         subscribers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
         for one in self._entities:
-            if HIDDEN not in one.name:
+            if entities.ACTION_PART not in one.name and not one.of_service:
                 (publishers if one.writer else subscribers)[one.name].append(self._endpoint(one))
         announced = {self._name(e.key) for _, e in self._tokens if e.role in ("MP", "MS")}
         for token, endpoint in self._tokens:  # a bridge that knows no DDS, as the simulated robot's
@@ -171,13 +173,13 @@ class _Robot:
                 name=self._name(e.key), key=e.key, type=e.type, bridge=e.zid, **self._serving(role, e)
             )
             for _, e in self._tokens
-            if e.role == role and HIDDEN not in e.key
+            if e.role == role and entities.ACTION_PART not in e.key
         }
         yield from (found[key] for key in sorted(found))
 
     def _serving(self, role: str, endpoint: Endpoint) -> dict[str, Any]:
-        """The nodes that serve an endpoint, and their DDS. If there are several, one that can't be
-        called through the bridge counts, as each of them gets the request."""
+        """The nodes that serve an endpoint, their DDS and type hashes. If there are several, one that
+        can't be called through the bridge counts, as each of them gets the request."""
         name = self._name(endpoint.key)
         nodes = [
             node
@@ -189,6 +191,7 @@ class _Robot:
         return {
             "nodes": tuple(sorted(node.name for node in nodes)),
             "dds": vendors[0] if vendors else "",
+            "hashes": entities.with_entities(endpoint, name, self._parts[endpoint.zid, name]).hashes,
         }
 
 

@@ -1,18 +1,16 @@
 """Reads the whole ROS graph behind all bridges of a link."""
 
 import asyncio
-import json
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Final
 
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.errors import LinkError
 from app.graph.model import GraphSnapshot
-from app.transport.admin_space import GraphLink
-from app.transport.bridge_graph import Answers, GraphAnswers, ros_graph
+from app.transport.admin_space import GraphLink, ask_json
+from app.transport.bridge_graph import GraphAnswers, ros_graph
 
 ANNOUNCED_WITHIN_S: Final = 1.5
 ANSWERED_WITHIN_S: Final = 5.0
@@ -81,10 +79,10 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
     tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
         link.tokens(),
         link.ask(dialect.VERSION),
-        _ask_json(link, dialect.CONFIG),
-        _ask_json(link, dialect.NODES),
-        _ask_json(link, entities.DDS),
-        _ask_json(link, entities.EVERY_ROUTE),
+        ask_json(link, dialect.CONFIG),
+        ask_json(link, dialect.NODES),
+        ask_json(link, entities.DDS),
+        ask_json(link, entities.EVERY_ROUTE),
     )
     return ros_graph(
         GraphAnswers(
@@ -100,11 +98,3 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
             routes=routes,
         )
     )
-
-
-async def _ask_json(link: GraphLink, selector: str) -> Answers:
-    found: Answers = []
-    for key, answer in await link.ask(selector):
-        with suppress(ValueError):
-            found.append((key, json.loads(answer)))
-    return found

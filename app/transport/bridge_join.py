@@ -109,7 +109,7 @@ class GraphMembership:
         await self._ask_until_answered()
         self._robot.settled_at = time.monotonic()
         self._log.info("joined the robot's topics")
-        self._context.changed()
+        self._context.graph_read()
 
     async def _settle(self) -> None:
         """Waits until every subscriber in the graph is matched: then the routes carry the first
@@ -157,7 +157,7 @@ class GraphMembership:
                         self._reopen_session()
                 except LinkError as error:
                     self._log.warning("%s", error)
-                self._context.changed()
+                self._context.graph_read()
 
     def _reopen_session(self) -> None:
         """Opens a new session if a bridge does not read a subscribed topic: for a new session it

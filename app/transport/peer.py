@@ -46,13 +46,15 @@ class Peer(Protocol):
 @dataclass(frozen=True, slots=True)
 class RobotContext:
     """One robot of a panel and the link to it. Call `changed` after a change of what permission or the
-    view depends on. `renew` opens a new session after the link was lost, `reopen` while it is up."""
+    view depends on, `graph_read` after the nodes of its graph were read. `renew` opens a new session
+    after the link was lost, `reopen` while it is up."""
 
     panel: Panel
     interfaces: Interfaces
     robot: RobotState
     link: ZenohSession
     changed: Callable[[], None]
+    graph_read: Callable[[], None]
     renew: Callable[[], None]
     reopen: Callable[[], None]
 

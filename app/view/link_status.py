@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Final, Literal, TypedDict
 
 from app.clock import format_datetime
-from app.i18n import Text, TextLike, number, say
+from app.i18n import Text, TextLike, joined, number, say
 from app.i18n.values import longest
 from app.interfaces import has_key
 from app.panel.model import Panel
@@ -19,6 +19,7 @@ from app.permission.interlocks import NO_WAY
 from app.permission.mismatches import topic_mismatch
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
+from app.view.definition_notes import definition_notes
 
 State = Literal["ok", "wait", "bad"]
 
@@ -36,6 +37,8 @@ NODE: Final = GONE | {
     "not_a_number",
     "several",
     "wrong_type",
+    "wrong_rmw",
+    "definition_differs",
     "publishes_best_effort",
     "publishes_volatile",
     "asks_for_reliable",
@@ -86,6 +89,7 @@ def link_statuses(
     silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
     bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""
     node_state, node_text, node_reason = _node(robot, passable, verdicts, silence)
+    node_reason = joined([node_reason, definition_notes(robot)], "between_lines")
     links = {
         "server": _link("server", "ok", "ok", ""),
         "bridge": _link("bridge", state, text, bridge_reason, *labels(panel, verdicts, BRIDGE)),

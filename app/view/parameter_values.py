@@ -31,6 +31,7 @@ LOOKS: Final = {
     "unreadable": "unreadable",
 }
 LONGEST_HINT: Final = 200
+NEVER_ASKED: Final = frozenset({"wrong_rmw", "definition_differs"})  # why a node is never queried
 ANY_STEP: Final = {False: "any", True: "1"}
 
 
@@ -87,8 +88,11 @@ def never_received(known: ParameterState) -> bool:
     return known.state in ("waiting", "silent") and known.value is None
 
 
-def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Text:
+def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> TextLike:
     time = format_time(known.wall)
+    doubt = parameters_offered(parameter.node, robot)
+    if doubt is not None and doubt.code in NEVER_ASKED:
+        return doubt.reason or ""
     if never_received(known):
         silent = known.state == "silent" and parameter.id not in robot.querying
         return say("parameter_unanswered" if silent else "parameter_asking", node=parameter.node)

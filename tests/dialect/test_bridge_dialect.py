@@ -4,6 +4,7 @@ import pytest
 
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import parsed, token
+from app.dialect.bridge_entities import node_endpoints
 from app.dialect.endpoint import Endpoint, ServerRole, TopicRole
 from app.interfaces.names import (
     MESSAGE_TYPE,
@@ -207,9 +208,7 @@ def test_a_type_that_can_not_be_one_is_no_type(type_name: str) -> None:
         endpoint = parsed(f"@/b1/@ros2_lv/MP/enabled/{type_name.replace('/', '§')}/:1:0:0,1:")
         assert endpoint is None or endpoint.type == NO_TYPE
     node = {"publishers": [{"name": "/enabled", "type": type_name}], "subscribers": []}
-    assert [one.type for one in bridge_dialect.endpoints_of("@/b1/ros2/node/g/n", node, "")] == [
-        NO_TYPE
-    ]
+    assert [one.type for one in node_endpoints("@/b1/ros2/node/g/n", node, "")] == [NO_TYPE]
 
 
 @pytest.mark.parametrize("key", ["a" * 600, "1st", "a\u202eb", "a b"])

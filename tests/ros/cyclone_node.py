@@ -4,6 +4,8 @@ Topics are `rt/<name>`, a service's requests `rq/<name>Request` and its replies 
 each with rmw_cyclonedds' header. `ros_discovery_info` says which of them are this node's.
 """
 
+import json
+import os
 import sys
 import threading
 import time
@@ -11,7 +13,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from cyclone_types import Gid, NodeEntitiesInfo, ParticipantEntitiesInfo, framed, values
+from cyclone_types import Gid, NodeEntitiesInfo, ParticipantEntitiesInfo, framed, ros_type, values
 from cyclonedds.core import Entity, InstanceState, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -127,11 +129,10 @@ class Node:
 
     def serve(self, name: str, request: type, response: type, handler: Handler) -> None:
         identity = [*_gid(self._participant).data[:15], len(self.services)]
-        server = ".".join(f"{byte:x}" for byte in identity)
-        qos = qos_of(user_data=f"serviceid= {server};")
+        server = f"serviceid= {'.'.join(f'{byte:x}' for byte in identity)};"
         service = Service(
-            self._reader(f"rq{name}Request", framed(request), qos),
-            self._writer(f"rr{name}Reply", framed(response), qos),
+            self._reader(f"rq{name}Request", framed(request), _qos_of_part(request, server)),
+            self._writer(f"rr{name}Reply", framed(response), _qos_of_part(response, server)),
             handler,
         )
         self.services[name] = service
@@ -183,6 +184,12 @@ class Node:
                             handler(sample)
                 except Exception:  # one bad request must not end the robot
                     traceback.print_exc(file=sys.stderr)
+
+
+def _qos_of_part(type_: type, server: str) -> Qos:
+    """As rmw_cyclonedds has it since iron: with the type hash of the request or the response."""
+    type_hash = json.loads(os.environ.get("TYPE_HASHES", "{}")).get(ros_type(type_), "")
+    return qos_of(user_data=server + (f"typehash={type_hash};" if type_hash else ""))
 
 
 def _gid(entity: Entity) -> Gid:

@@ -114,8 +114,10 @@ class Commands:
     def parameter_requests(self, service: str) -> int:
         return self._parameters.requests(service)
 
-    def advertise(self, topic: str, type: str, **qos: Any) -> None:
-        idl, hash_ = TOPIC_TYPES[type]
+    def advertise(self, topic: str, type: str, hash: str = "", **qos: Any) -> None:
+        """`hash` is that of another definition of the type."""
+        idl, own_hash = TOPIC_TYPES[type]
+        hash_ = hash or own_hash
         profile = qos_of(**qos, user_data=f"typehash={hash_};")
         self._node.advertise(topic, idl, profile)
         self._node.tell()

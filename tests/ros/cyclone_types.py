@@ -28,6 +28,12 @@ def dds_name(ros_name: str) -> str:
     return f"{package}.{kind}.dds_.{name}_"
 
 
+def ros_type(type_: type) -> str:
+    """The ROS type's name, "std_srvs/srv/SetBool_Request"."""
+    package, kind, _, name = str(vars(type_)["__idl_typename__"]).split(".")
+    return f"{package}/{kind}/{name.removesuffix('_')}"
+
+
 def framed(type_: type[IdlStruct]) -> type[IdlStruct]:
     """The type on a service's topics: rmw_cyclonedds' request header, then the body, as one struct.
 

@@ -32,7 +32,7 @@ FIRST_CALLS, FIRST_UNANSWERED = several(1_200, 4_000), several(100, 200)
 LAST_CALLS = -(-RECEIPTS_KEPT // len(ANSWERED))  # of each service that answers
 GROWTH_KB = 4_000  # of what the process has: half of it is what SQLite keeps of its file
 PAST_ID_BYTES = 200  # an id of 32 characters, in an ordered dictionary; `PAST_IDS_KEPT` of them at most
-MOST_KNOWN = 100  # questions that this panel has to the graph
+MOST_KNOWN = 400  # answers of the graph: a few for each name that the panel uses
 STRAY_OBJECTS = 300  # caches of the interpreter and of libraries
 PASSING_TASKS = 3  # of a question or a connection that is just about to end; a leak has thousands
 

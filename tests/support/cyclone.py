@@ -13,6 +13,7 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from app.interfaces import load_interfaces
 from tests.support import domains
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
 from tests.support.processes.commanded import Commanded
@@ -97,6 +98,13 @@ def type_store() -> Any:
 TYPES = type_store()
 
 
+def type_hashes() -> dict[str, str]:
+    """The type hash of each request and response."""
+    interfaces = load_interfaces("jazzy")
+    parts = (f"{name}_{part}" for name in DEFINITIONS for part in ("Request", "Response"))
+    return {name: interfaces.type_hash(name) for name in parts}
+
+
 def encoded(type_name: str, *fields: Any) -> bytes:
     """A message in CDR, from its fields in their order."""
     return bytes(TYPES.serialize_cdr(TYPES.types[type_name](*fields), type_name))
@@ -112,10 +120,15 @@ class CycloneRobot(Commanded):
     If it ends regularly, it announces that, and the bridge removes it at once.
     """
 
-    def __init__(self, domain: int, lease_s: float = 10) -> None:
+    def __init__(self, domain: int, lease_s: float = 10, *, hashed: bool = True) -> None:
+        """With `hashed` its services have type hashes, as since iron."""
         super().__init__(
             [ROS_PYTHON, TESTS / "ros/cyclone_robot.py", NODE],
-            {"ROS_DOMAIN_ID": str(domain), "CYCLONEDDS_URI": CYCLONE.format(lease_s=lease_s)},
+            {
+                "ROS_DOMAIN_ID": str(domain),
+                "CYCLONEDDS_URI": CYCLONE.format(lease_s=lease_s),
+                "TYPE_HASHES": json.dumps(type_hashes() if hashed else {}),
+            },
         )
 
     def __getattr__(self, name: str) -> Callable[..., Any]:

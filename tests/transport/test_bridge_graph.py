@@ -46,7 +46,7 @@ def read(**more: Any) -> RobotGraph:
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/on", None),
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/on", {"topic_name": 1}),
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/on", {"topic_name": "rt/on", "type_name": "Bool"}),
-        (f"@/a/ros2/dds/{FAST}/writer/x/rr/on", {"topic_name": "rr/onReply", "type_name": BOOL}),
+        (f"@/a/ros2/dds/{FAST}/writer/x/rr/on", {"topic_name": "rr/on", "type_name": BOOL}),
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/o n", {"topic_name": "rt/o n", "type_name": BOOL}),
     ],
 )

@@ -93,7 +93,7 @@ class ResultWaiter:
         key = self._robot.key(goal.widget.action)
         while not (
             self._services.is_offered(goal.widget)
-            and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
+            and time.monotonic() >= self._robot.graph.since("AS", key) + SERVER_SETTLE_S
         ):
             await asyncio.sleep(ASK_AGAIN_S)
 

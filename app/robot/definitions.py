@@ -1,0 +1,72 @@
+"""Whether the robot's definitions are those of the panel, by their type hashes (REP 2016). Pure.
+
+The definition of a type may differ though its name is the same: a field more, two fields swapped, in
+the type or in one that it contains. Then bytes mean something else to the robot than to the panel.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from app.dialect.endpoint import Endpoint, Role
+from app.errors import InterfaceError
+from app.graph.model import CALLABLE
+from app.interfaces import Interfaces
+from app.robot.graph import LiveGraph, cached_until_change
+
+HASH: Final = "RIHS01_"  # other versions of hashes can't be compared
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A message whose definition differs: its type, the robot's hash and the panel's, and the robot's
+    node, "" if unknown."""
+
+    type: str
+    theirs: str
+    ours: str
+    node: str = ""
+
+
+@cached_until_change
+def difference(graph: LiveGraph, role: Role, key: str, interfaces: Interfaces) -> Difference | None:
+    """The first difference of an endpoint of the robot; None if none is known. `role` is the
+    robot's."""
+    found = (_difference(one, interfaces) for one in graph.described_endpoints(role, key))
+    return next((one for one in found if one is not None), None)
+
+
+def _difference(endpoint: Endpoint, interfaces: Interfaces) -> Difference | None:
+    for name, theirs in endpoint.hashes:
+        ours = own_hash(name, interfaces)
+        if ours and differs(theirs, ours):
+            return Difference(name, theirs, ours, endpoint.node)
+    return None
+
+
+def differs(theirs: str, ours: str) -> bool:
+    """Whether two hashes are known to be of different definitions."""
+    return theirs.startswith(HASH) and ours.startswith(HASH) and theirs != ours
+
+
+def own_hash(type_name: str, interfaces: Interfaces) -> str:
+    """The hash of the panel's own definition; "" if it has none."""
+    try:
+        return interfaces.type_hash(type_name)
+    except InterfaceError:
+        return ""
+
+
+@cached_until_change
+def is_unhashed(graph: LiveGraph, role: Role, key: str) -> bool:
+    """Whether an endpoint is there and no hash of it is known: then it can't be compared."""
+    known = graph.described_endpoints(role, key)
+    present = graph.has_endpoint(role, key)
+    return present and not any(one.hashes for one in known)
+
+
+@cached_until_change
+def uncallable_dds(graph: LiveGraph, role: Role, key: str) -> str:
+    """The DDS of a server that can't be called through its bridge; "" if there is none. Of several
+    servers one is enough: each of them gets the request."""
+    vendors = (one.dds for one in graph.node_endpoints(role, key))
+    return next((dds for dds in vendors if dds not in CALLABLE), "")
