@@ -23,7 +23,8 @@ export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
-	.venv/bin/python -m app.cli run
+	@echo "starting the panel server"
+	@.venv/bin/python -m app.cli run
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
 WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
@@ -106,11 +107,13 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 .venv/bin/python:
 	@$(NEW_ENOUGH)
 	@$(PYTHON) -c "import ensurepip" 2>/dev/null || PYTHON=$(PYTHON) sh tests/system.sh python3-venv
-	$(PYTHON) -m venv .venv
+	@echo "making a Python environment in .venv: once, some seconds"
+	@$(PYTHON) -m venv .venv
 
 .venv/run: deploy/requirements.lock | .venv/bin/python
-	.venv/bin/python $(PIP_INSTALL) $<
-	touch $@
+	@echo "installing the server's packages into .venv: once, up to a minute"
+	@.venv/bin/python $(PIP_INSTALL) $<
+	@touch $@
 
 .venv/build: deploy/build.lock | .venv/bin/python
 	.venv/bin/python $(PIP_INSTALL) $<
@@ -135,16 +138,18 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	touch $@
 
 .venv/test: tests/requirements.lock | .venv/bin/python
-	.venv/bin/python $(PIP_INSTALL) $<
-	touch $@ .venv/run .venv/build
+	@echo "installing the packages of the tests into .venv: once, up to two minutes"
+	@.venv/bin/python $(PIP_INSTALL) $<
+	@touch $@ .venv/run .venv/build
 
 FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
 
 .venv-ros/ready: tests/ros/requirements.lock | system
 	@$(FOR_ROS)
-	$(PYTHON) -m venv .venv-ros
-	.venv-ros/bin/python $(PIP_INSTALL) $<
-	touch $@
+	@echo "installing ROS 2 for the tests into .venv-ros: once, up to two minutes"
+	@$(PYTHON) -m venv .venv-ros
+	@.venv-ros/bin/python $(PIP_INSTALL) $<
+	@touch $@
 
 # ARGS: phases and peers, such as `ARGS="down up --peers plain"`. A quick run does not overwrite the
 # results of the last full run.

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
-from tests.support import domains, holds
+from tests.support import checkout, domains, holds
 from tests.support.browser.browsers import BROWSERS, FAILED, Browsers, ReusedPage
 from tests.support.operator_log import wait_for_the_disk
 from tests.support.parts import (
@@ -112,6 +112,17 @@ def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setattr(tempfile, "tempdir", str(folder))
         yield
     shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def unchanged_checkout() -> Iterator[None]:
+    """An error of the last test if one has written into the checkout, where a reader's own files may
+    lie."""
+    before = checkout.state()
+    yield
+    after = checkout.state()
+    changed = sorted(line for line, _ in before.items() ^ after.items())
+    assert not changed, f"written in the checkout during the tests: {changed}"
 
 
 @pytest.fixture(scope="session", autouse=True)

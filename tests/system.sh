@@ -56,6 +56,12 @@ if [ -z "$only" ]; then
             "run them as root (in a container: with CAP_SYS_ADMIN), or by \`unshare -rmn make test\`" >&2
         exit 1
     }
+    unshare --user --map-user=1000 --map-group=1000 true 2>/dev/null || {
+        echo "the kiosk's tests run its compositor in a user namespace, which is not allowed here:" \
+            "allow them (sysctl user.max_user_namespaces, kernel.unprivileged_userns_clone or" \
+            "kernel.apparmor_restrict_unprivileged_userns)" >&2
+        exit 1
+    }
 fi
 
 [ -n "$missing" ] || exit 0

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,20 @@ DEBCONF = "debconf: delaying package configuration, since apt-utils is not insta
 def installed(folder: Path, apt_get: str, user: int = 0) -> subprocess.CompletedProcess[str]:
     """`tests/system.sh python3-venv` where Python has no ensurepip."""
     commands = {"apt-get": apt_get, "id": f"echo {user}", "no-python": "exit 1"}
+    return system(folder, commands, "python3-venv", PYTHON="no-python", TMPDIR=str(folder))
+
+
+def system(
+    folder: Path, commands: Mapping[str, str], *arguments: str, **env: str
+) -> subprocess.CompletedProcess[str]:
+    """`tests/system.sh` with these scripts in place of the system's commands."""
     for name, script in commands.items():
         (folder / name).write_text(f"#!/bin/sh\n{script}\n")
         (folder / name).chmod(0o755)
-    env = {"PATH": f"{folder}:{os.environ['PATH']}", "PYTHON": "no-python", "TMPDIR": str(folder)}
     return subprocess.run(
-        ["sh", "tests/system.sh", "python3-venv"],
+        ["sh", "tests/system.sh", *arguments],
         cwd=ROOT,
-        env=env,
+        env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", **env},
         capture_output=True,
         text=True,
         check=False,
@@ -55,3 +62,15 @@ def test_without_the_right_to_install_it_names_what_is_missing(tmp_path: Path) -
         "missing, by Debian's names: python3-venv. Install that, then run this again:",
         "sudo apt-get install --no-install-recommends python3-venv",
     ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("--net", "mount and network namespaces"), ("--user", "in a user namespace")]
+)
+def test_a_kind_of_namespace_that_is_not_allowed_is_named_before_the_tests(
+    tmp_path: Path, kind: str, words: str
+) -> None:
+    done = system(tmp_path, {"unshare": f'case "$*" in *{kind}*) exit 1;; esac', "apt-get": "exit 9"})
+    assert done.returncode == 1
+    assert words in done.stderr
+    assert "not allowed here" in done.stderr

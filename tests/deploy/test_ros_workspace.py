@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.support import locked
+from tests.support.checkout import copy_project
 from tests.support.panel_text import MAIN, START
 from tests.support.parts import (
     BRIDGE,
@@ -29,7 +29,6 @@ from tests.support.parts import (
     until,
     zenoh_file,
 )
-from tests.support.processes.shell import NOT_LINKED
 
 PACKAGE: Final = "operator_panel"
 PANEL: Final = f'title = "Robot cell 1"\n{MAIN}{START}'
@@ -83,11 +82,7 @@ WITHOUT_PYTHONPATH: Final = {name: v for name, v in os.environ.items() if name !
 
 def make_checkout(folder: Path) -> None:
     """The files of the checkout, but of the locked dependencies only one: pip takes 20 s for all."""
-    folder.mkdir(parents=True)
-    for path in ROOT.iterdir():
-        if path.name not in NOT_LINKED | {"deploy"}:
-            (folder / path.name).symlink_to(path)
-    shutil.copytree(ROOT / "deploy", folder / "deploy")
+    copy_project(folder)
     (folder / "deploy/requirements.lock").write_text(locked.entries(locked.LOCK)["annotated-types"])
 
 

@@ -59,3 +59,13 @@ def test_a_wheel_is_built_with_the_locked_packages_of_a_build_alone(tmp_path: Pa
     done = subprocess.run(told, cwd=ROOT, capture_output=True, text=True, check=True)
     assert "--require-hashes --no-deps -r deploy/build.lock" in done.stdout
     assert "tests/requirements.lock" not in done.stdout
+
+
+def test_the_first_run_says_what_takes_its_time() -> None:
+    """Each step that takes seconds is named before it begins."""
+    command = ["make", "--dry-run", "--assume-new=deploy/requirements.lock", "run"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    steps = [line for line in done.stdout.splitlines() if not line.startswith("touch")]
+    for slow in ("pip install", "app.cli run"):
+        (number,) = (i for i, line in enumerate(steps) if slow in line)
+        assert steps[number - 1].startswith("echo "), steps

@@ -7,10 +7,13 @@ from collections.abc import Callable
 from tests.support.parts import ROOT, Server, sends, until
 
 READ_ONLY = ["unshare", "--mount", "sh", "-c"]
-# The data folder is a file system of its own, in which the server writes; nothing else is written.
+# The data folder is a separate file system, in which the server writes; nothing else is written, also
+# where the folder for temporary files is a file system too.
 MOUNT = (
-    'mount -t tmpfs {options}tmpfs "$KIOSK_DATA" && mount -o remount,bind,ro /'
-    ' && ! touch /tmp/x 2>/dev/null && exec "$@"'
+    'around=$(findmnt -n -o TARGET -T "$KIOSK_DATA") && mount -t tmpfs {options}tmpfs "$KIOSK_DATA"'
+    ' && for place in "$around" /; do mount -o remount,bind,ro "$place" || exit; done'
+    ' && if touch "$KIOSK_DATA/../written"; then echo "/ is not read-only" >&2; exit 1; fi'
+    ' && exec "$@"'
 )
 SMALL = "2m"
 FULL = "no space left on device"

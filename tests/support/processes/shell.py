@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from tests.support.parts import BRIDGE, CYCLONE_ON_LOOPBACK, ROOT, Process, until
+from tests.support.checkout import copy_project
+from tests.support.parts import BRIDGE, CYCLONE_ON_LOOPBACK, Process, until
 
-NOT_LINKED: Final = {".git", ".venv", ".venv-ros", ".venv-docs", "build", "dist", "install", "log"}
 # Programs that a reader has: the installed command, and the bridge, whose options the tests' own lacks.
 PROGRAMS: Final = {
     "operator-panel": 'exec .venv/bin/python -m app.cli "$@"',
@@ -24,7 +24,7 @@ class Shell:
     def __init__(self, folder: Path) -> None:
         """Makes the checkout in `folder`."""
         self.checkout = folder / "operator-panel"
-        self._link_checkout()
+        self._make_checkout()
         programs = folder / "bin"
         programs.mkdir()
         for name, script in PROGRAMS.items():
@@ -50,13 +50,11 @@ class Shell:
         assert self._holder.stdout.readline() == b"up\n"
         self._running: list[Process] = []
 
-    def _link_checkout(self) -> None:
-        """Links the checkout's files, and a `.venv` with the tests' packages, as after `make run`."""
+    def _make_checkout(self) -> None:
+        """Copies the project, with a `.venv` of the tests' packages, as after `make run`."""
+        copy_project(self.checkout)
         environment = self.checkout / ".venv"
-        environment.mkdir(parents=True)
-        for path in ROOT.iterdir():
-            if path.name not in NOT_LINKED:
-                (self.checkout / path.name).symlink_to(path)
+        environment.mkdir()
         for name in ("lib", "include", "pyvenv.cfg"):
             (environment / name).symlink_to(Path(sys.prefix) / name)
         (environment / "bin").mkdir()  # `make run` adds a command to it
