@@ -202,7 +202,6 @@ def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
     assert judged(free(), [interlock], robot, NOW).code == "forbidden"
 
 
-@pytest.mark.parametrize("permitted", [True, False])
 @pytest.mark.parametrize(
     ("value", "text"), [(math.nan, "not a number (NaN)"), (-math.inf, "infinite"), (0.5, "0.5")]
 )
@@ -215,6 +214,7 @@ def test_a_number_that_is_none_is_named_so(value: float, text: str) -> None:
     assert str(reason) == f"Air is {text}: it must be at least 1."
 
 
+@pytest.mark.parametrize("permitted", [True, False])
 def test_a_bool_of_a_larger_message_can_permit(permitted: bool) -> None:
     interlock = {"type": "sensor_msgs/msg/RegionOfInterest", "field": "do_rectify"}
     robot = robot_there(small_panel(interlock))
