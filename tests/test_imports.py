@@ -51,6 +51,7 @@ COMMON = {
     "app.i18n.catalogue",
     "app.i18n.locales",
     "app.i18n.text",
+    "app.i18n.typed_numbers",
     "app.i18n.values",
     "app.icons",
     "app.pictures",

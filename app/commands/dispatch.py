@@ -12,7 +12,6 @@ from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.errors import InputError, NotFound
 from app.i18n import ENGLISH, TextLike, number, say
-from app.i18n.locales import number_from
 from app.interfaces import Interfaces
 from app.panel.constants import resolve_at
 from app.panel.model import Panel
@@ -120,15 +119,13 @@ class Dispatcher:
         return widget
 
     def parse_form(self, form: Mapping[str, str], language: str = ENGLISH) -> dict[str, Any]:
-        """The texts of a form as input values, by input id. A number may have the decimal sign of the
-        reader's language."""
+        """The texts of a form as input values, by input id. Numbers are in the notation of the
+        page's language."""
         return {name: self._parse_field(name, text, language) for name, text in form.items()}
 
     def _parse_field(self, name: str, text: str, language: str) -> Any:
         field = self._widgets.get(name)
-        if not isinstance(field, EntryWidget):
-            return text
-        return field.parse_text(number_from(text, language) if field.is_number_entry else text)
+        return field.parse_text(text, language) if isinstance(field, EntryWidget) else text
 
     def needed_inputs(self, widget: PressCommand, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of a press that its widget uses."""

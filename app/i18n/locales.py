@@ -20,18 +20,19 @@ ISO_DATE: Final = "y-MM-dd"
 
 class Symbols(NamedTuple):
     """`numbers` maps the signs that Python writes in a number to those of the language, where they
-    differ; `decimal` is the decimal separator, `time` the separator of hours, minutes and seconds,
-    `date` a CLDR date pattern."""
+    differ; `decimal` is the decimal separator, `group` that of thousands, `time` the separator of
+    hours, minutes and seconds, `date` a CLDR date pattern."""
 
     numbers: Mapping[int, str]
     decimal: str
+    group: str
     time: str
     date: str
 
 
 # The minus sign of every language: a hyphen is too short to be seen from afar, and not read aloud.
 MINUS: Final = "\N{MINUS SIGN}"
-PLAIN: Final = Symbols({ord("-"): MINUS}, ".", ":", ISO_DATE)
+PLAIN: Final = Symbols({ord("-"): MINUS}, ".", ",", ":", ISO_DATE)
 # What Babel says of the panel's languages. Each page names them: an English panel need not hold what
 # Babel knows of all, 5 MB.
 OWN_NAMES: Final = {"de": "Deutsch", "en": "English", "ja": "日本語"}
@@ -60,22 +61,12 @@ def symbols(language: str) -> Symbols:
     numbers = {ord(plain): sign for plain, sign in own.items() if plain != sign}
     time = "." if "H.mm" in locale.time_formats["medium"].pattern else ":"
     day = locale.date_formats["short"].pattern
-    return Symbols(numbers, signs["decimal"], time, day if "yyy" in day else day.replace("yy", "y"))
+    return Symbols(numbers, own["."], own[","], time, day if "yyy" in day else day.replace("yy", "y"))
 
 
 def number_in(text: str, language: str) -> str:
     """A number as Python writes it ("-1,234.5", "1e-07"), in the notation of this language."""
     return text.translate(symbols(language).numbers)
-
-
-def number_from(text: str, language: str) -> str:
-    """A number that was typed in this language, in Python's notation: a decimal point, a hyphen for
-    minus. A text with both decimal signs, or with several, is returned with them: one may separate
-    thousands."""
-    decimal, text = symbols(language).decimal, text.replace(MINUS, "-")
-    if decimal == "." or "." in text or text.count(decimal) != 1:
-        return text
-    return text.replace(decimal, ".")
 
 
 def time_in(text: str, language: str) -> str:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Any, Final, NoReturn, Union
 
 from app.i18n.catalogue import ENGLISH, sentences, when_changed
-from app.i18n.locales import date_time_in, number_in, time_in
+from app.i18n.locales import date_time_in, number_in, symbols, time_in
 from app.printable import readable
 
 # Stands in a sentence: a name or a number, which are in no language; another sentence; or several,
@@ -23,7 +23,8 @@ Param = Union[str, int, float, "Text", tuple["TextLike", ...]]
 # gettext takes an empty sentence for a missing one.
 BETWEEN: Final = frozenset({"between_sentences", "between_lines", "between_names"})
 # Codes of what is no sentence; none of a catalogue begins so.
-PANEL, PARTS, NUMBER, TIME, DATE_TIME = "=panel", "=parts", "=number", "=time", "=date_time"
+PANEL, PARTS, TIME, DATE_TIME = "=panel", "=parts", "=time", "=date_time"
+NUMBER, NUMBERS = "=number", "=numbers"
 
 
 class Text:
@@ -149,10 +150,17 @@ def _number(params: Mapping[str, Any], language: str) -> str:
     return f"{text} {_written(unit, language)}" if (unit := params["unit"]) else text
 
 
+def _numbers(params: Mapping[str, Any], language: str) -> str:
+    between = "; " if symbols(language).decimal == "," else ", "
+    text = between.join(number_in(one, language) for one in params["texts"])
+    return f"{text} {_written(unit, language)}" if (unit := params["unit"]) else text
+
+
 _WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
     PANEL: _panel_text,
     PARTS: _parts,
     NUMBER: _number,
+    NUMBERS: _numbers,
     TIME: lambda params, language: time_in(params["at"], language),
     DATE_TIME: lambda params, language: date_time_in(params["at"], language),
 }

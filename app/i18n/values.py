@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from app.i18n.catalogue import ENGLISH
-from app.i18n.text import DATE_TIME, NUMBER, PANEL, PARTS, TIME, Text, TextLike, render
+from app.i18n.text import DATE_TIME, NUMBER, NUMBERS, PANEL, PARTS, TIME, Text, TextLike, render
 
 
 class PanelText(Text):
@@ -67,6 +67,16 @@ def number(text: str, unit: TextLike = "") -> TextLike:
     if isinstance(unit, str) and not ("." in text or "," in text or "-" in text):
         return f"{text} {unit}" if unit else text
     return Text(NUMBER, (("text", text), ("unit", unit)))
+
+
+def number_like(*, whole: bool) -> TextLike:
+    """An example of how a number is written."""
+    return number("1,234" if whole else "1,234.5")
+
+
+def numbers(texts: Iterable[str], unit: TextLike = "") -> Text:
+    """A list of numbers as Python writes them, and their unit."""
+    return Text(NUMBERS, (("texts", tuple(texts)), ("unit", unit)))
 
 
 def after_space(unit: str | PanelText) -> str | PanelText:

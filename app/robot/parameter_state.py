@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 from app.graph.node_services import PARAMETER_TYPES
 from app.i18n import TextLike, joined, say
+from app.i18n.values import numbers
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import Parameter, Value
 
@@ -30,6 +31,7 @@ MAX_LIST_LENGTH: Final = 1000  # values that can be set; of a longer list one va
 
 State = Literal["waiting", "live", "cut", "silent", "missing", "undeclared", "mistyped", "unreadable"]
 UNLIMITED: Final = Range()
+EXAMPLE: Final = {False: ("1.5", "2.5"), True: ("1", "2")}  # of a list
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,10 @@ def limits_text(parameter: Parameter, limits: Range) -> TextLike:
     if parameter.options:
         return ""
     if parameter.is_list:
-        return say("limits_list", each=each_text(parameter, limits))
+        each = each_text(parameter, limits)
+        if parameter.has_numbers:
+            return say("limits_numbers", each=each, example=numbers(EXAMPLE[parameter.is_whole]))
+        return say("limits_list", each=each)
     return each_text(parameter, limits) if parameter.has_numbers else ""
 
 

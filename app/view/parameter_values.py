@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.i18n import Text, TextLike, say
+from app.i18n.values import numbers
 from app.panel.number_range import decimal_text
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, MAX_TEXT, Parameter, Scalar, Value
 from app.permission.servers import parameters_offered
@@ -17,7 +18,7 @@ from app.robot.parameter_state import (
     limits_text,
 )
 from app.robot.state import RobotState
-from app.view.display_values import NOTHING, written
+from app.view.display_values import LONGEST_TEXT, NOTHING, written
 
 # How each state looks: as those of a readout.
 LOOKS: Final = {
@@ -63,8 +64,22 @@ def parameter(parameter: Parameter, robot: RobotState) -> dict[str, Any]:
 
 def _text(parameter: Parameter, value: Value) -> TextLike:
     option = parameter.find_option(value)
+    if option is None and value and isinstance(value, tuple) and parameter.has_numbers:
+        return _numbers_text(parameter, value)
     text = parameter.unlisted_text(_beginning(value)) if option is None else option.label
     return text if isinstance(text, Text) else written(text)
+
+
+def _numbers_text(parameter: Parameter, value: tuple[Scalar, ...]) -> Text:
+    """As many numbers of a list as a readout can show."""
+    texts: list[str] = []
+    length = 0
+    for text in map(parameter.element_text, value):
+        length += len(text) + len(", ")
+        if length > LONGEST_TEXT:
+            return numbers([*texts, "…"], parameter.unit)
+        texts.append(text)
+    return numbers(texts, parameter.unit)
 
 
 def _beginning(value: Value) -> Value:
@@ -123,7 +138,7 @@ def reports_changes(robot: RobotState) -> bool:
     return heard and graph.mismatched_type("MS", key, EVENT_TYPE) is None
 
 
-def _entry(parameter: Parameter, value: Value | None) -> bool | str:
+def _entry(parameter: Parameter, value: Value | None) -> bool | TextLike:
     """What the input starts from, exactly; "" where it can't hold the value as it is."""
     if parameter.options and value is not None:
         return "" if (option := parameter.find_option(value)) is None else option.key
@@ -131,7 +146,10 @@ def _entry(parameter: Parameter, value: Value | None) -> bool | str:
     unusual = any(isinstance(one, float) and not math.isfinite(one) for one in several)
     if value is None or unusual or len(several) > MAX_LIST_LENGTH:
         return ""
+    if isinstance(value, bool):
+        return value
+    text = parameter.entry_text(_beginning(value))
     if isinstance(value, str | tuple):
-        text = parameter.entry_text(_beginning(value))
-        return text if len(text) <= MAX_TEXT and text.isprintable() else ""
-    return value if isinstance(value, bool) else decimal_text(value)
+        shown = str(text)
+        return text if len(shown) <= MAX_TEXT and shown.isprintable() else ""
+    return text

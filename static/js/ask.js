@@ -1,5 +1,5 @@
 // The dialog that confirms a press: the action and its values. Its "yes" is the press.
-import { numberText } from "./number-text.js";
+import { entryText } from "./number-inputs.js";
 import { TAP_AGAIN_MS } from "./press.js";
 
 let closing = 0;
@@ -39,6 +39,5 @@ function shownText(input) {
   }
   if (entry.value === "") return "";
   if (entry.selectedOptions) return entry.selectedOptions[0].textContent;
-  const isNumber = entry.type === "number" || entry.type === "range";
-  return isNumber ? numberText(entry.value) : entry.value;
+  return entryText(entry);
 }

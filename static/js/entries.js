@@ -1,13 +1,12 @@
 // The values entered on the page, and the inputs of parameters.
+import { mark, sentNumber, setLimits } from "./number-inputs.js";
+import { readNumbers } from "./number-text.js";
 
-// The value with its type. An empty number field, or an integer that is not exact here, is sent as text:
-// the server says what is wrong.
+// The value with its type. What is not a number is sent as text: the server says what is wrong.
 function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
-  const isNumber = input.type === "number" || input.type === "range";
-  if (!isNumber || input.value === "") return input.value;
-  const value = Number(input.value);
-  return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
+  if (input.matches("[data-number]")) return sentNumber(input);
+  return input.matches("[data-list]") ? readNumbers(input.value, input.matches("[data-whole]")) : input.value;
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
@@ -37,12 +36,15 @@ export function showEntry(root, value) {
   robotValues.set(input, value);
   if (touched.has(input)) return;
   if (input.type === "checkbox") input.checked = value === true;
-  else if (input.value !== value) input.value = value;
+  else if (input.value !== value) {
+    input.value = value;
+    if (input.matches("[data-number]")) mark(input);
+  }
 }
 
 export function showBounds(root, bounds) {
   const input = entryOf(root);
-  if (input.type === "number") Object.assign(input, bounds);
+  if (input.matches("[data-number]")) setLimits(input, bounds);
 }
 
 // The value was set: the input shows the robot's value again.

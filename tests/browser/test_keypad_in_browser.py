@@ -122,7 +122,7 @@ def test_its_keys(screen: Page) -> None:
     sheet.get_by_role("button", name="Change the sign").tap()
     expect(entered).to_have_text("−2.25")
     screen.locator(".set-entry").tap()
-    expect(screen.locator("#input-offset")).to_have_value("-2.25")
+    expect(screen.locator("#input-offset")).to_have_value("−2.25")
     settled(screen)
     open_for(screen, "#input-offset")
     screen.locator(".sheet [data-key=max]").tap()

@@ -54,7 +54,7 @@ def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -
     entry = page.locator('[data-widget="limit"] input')
     entry.fill("")
     entry.press_sequentially("0,5")
-    expect(entry).to_have_value("0.5")
+    expect(entry).to_have_value("0,5")
     page.locator('[data-widget="asked"] button[type=submit]').click()
     expect(page.locator('dialog [data-value-of="limit"]')).to_have_text("0,5")
 

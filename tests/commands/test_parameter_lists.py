@@ -12,6 +12,7 @@ from playwright.sync_api import Page, expect
 
 from app.commands.parameters.values import check_value
 from app.errors import InputError
+from app.i18n import ENGLISH
 from app.panel.list_text import join_list, quote_element, split_list
 from app.panel.number_range import Range
 from app.panel.widgets.parameter import Parameter
@@ -36,6 +37,7 @@ GAINS: Final[dict[str, Any]] = {
 }  # fmt: skip
 OPTIONS: Final = [{"value": 1, "label": "Slow"}, {"value": 2, "label": "Fast"}]
 SEVERAL: Final = "separate several values with commas"
+NUMBERS: Final = "separate several values like 1.5, 2.5"
 TEXTS: Final = f"a text; {SEVERAL}"
 VALUE: Final = "Gains, value"
 FORM: Final = {"content-type": "application/x-www-form-urlencoded"}
@@ -84,7 +86,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "given", "value"),
     [
-        ("double[]", "1, 2.5,-3e2", (1.0, 2.5, -300.0)),
+        ("double[]", "1, 2.5,-300", (1.0, 2.5, -300.0)),
         ("double[]", [1, 2.5], (1.0, 2.5)),
         ("double[]", " ", ()),
         ("integer[]", "1, 9007199254740993", (1, 2**53 + 1)),
@@ -98,7 +100,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
     of = widget(type=kind)
     found = check_value(
-        of, ParameterState("live"), of.parse_text(given) if isinstance(given, str) else given
+        of, ParameterState("live"), of.parse_text(given, ENGLISH) if isinstance(given, str) else given
     )
     assert found == value
     assert isinstance(found, tuple)
@@ -118,7 +120,7 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
             {"given": "0.5 N", "limits": "1 to 5 N"},
         ),
         ({}, [1, None], f"{VALUE} 2", "number_empty", {"limits": "0 to 5"}),
-        ({}, 5, "Gains", "no_list", {"limits": f"0 to 5; {SEVERAL}", "given": "5"}),
+        ({}, 5, "Gains", "no_list", {"limits": f"0 to 5; {NUMBERS}", "given": "5"}),
         ({}, [1.0] * 1001, "Gains", "list_long", {"count": 1001, "most": 1000}),
         (
             {"type": "bool[]"},
@@ -172,10 +174,10 @@ def test_an_option_that_the_node_does_not_take_is_refused() -> None:
 @pytest.mark.parametrize(
     ("more", "value", "text", "entry", "limits"),
     [
-        ({"unit": "N"}, (1.0, 2.5), "1, 2.5 N", "1, 2.5", f"a number; {SEVERAL}"),
-        ({}, (), "(empty)", "", f"a number; {SEVERAL}"),
-        ({}, (1.0, float("nan")), "1, NaN", "", f"a number; {SEVERAL}"),
-        ({}, (0.0,) * 1001, None, "", f"a number; {SEVERAL}"),
+        ({"unit": "N"}, (1.0, 2.5), "1, 2.5 N", "1, 2.5", f"a number; {NUMBERS}"),
+        ({}, (), "(empty)", "", f"a number; {NUMBERS}"),
+        ({}, (1.0, float("nan")), "1, NaN", "", f"a number; {NUMBERS}"),
+        ({}, (0.0,) * 1001, None, "", f"a number; {NUMBERS}"),
         ({"type": "string[]"}, ("a, b", "c"), '"a, b", c', '"a, b", c', TEXTS),
         ({"type": "bool[]"}, (True, False), "On, Off", "On, Off", f"On or Off; {SEVERAL}"),
         ({"type": "integer", "options": OPTIONS}, 2, "Fast", "2", ""),
@@ -297,7 +299,7 @@ def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) 
         "slots": "1, 9007199254740993",
         "mode": "Slow",
     }
-    assert shown["gains"]["limits"] == "0 to 5 N; separate several values with commas"
+    assert shown["gains"]["limits"] == "0 to 5 N; separate several values like 1.5, 2.5"
     values = {
         "gains": ("0.5, 5", [0.5, 5.0]),
         "axes": ("free, free, used", [False, False, True]),
@@ -345,6 +347,33 @@ def test_lists_and_options_are_set_with_a_browser(
     robot.set_parameter(name="mode", value=7)
     expect(mode.locator(".value")).to_have_text("7")
     expect(select).to_have_value("")  # it is none of the options
+
+
+def test_a_list_with_decimal_commas_is_set_as_it_is_shown(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    """1,5 is one number, or the press is refused; it was taken for 1 and 5."""
+    page.context.add_cookies([{"name": "kiosk_language", "value": "de", "url": kiosk.url}])
+    page.goto(kiosk.url)
+    gains = page.locator('[data-widget="gains"]')
+    entry, button = gains.get_by_role("textbox"), gains.locator(".set")
+    expect(entry).to_have_value("1; 2,5")
+    expect(gains.locator(".limits")).to_contain_text("0 bis 5 N; mehrere Werte so trennen: 1,5; 2,5")
+    entry.fill("1,5, 2,5")
+    button.click()
+    expect(gains.locator(".receipt")).to_contain_text("1.234,5")
+    assert robot.parameters()["gains"] == [1.0, 2.5]
+    entry.fill("1,5; 3")
+    expect(button).not_to_have_attribute("aria-busy", "true")
+    button.click()
+    expect(gains.locator(".value")).to_have_text("1,5; 3 N")
+    assert robot.parameters()["gains"] == [1.5, 3.0]
+    for language, text, value in (("de", "0,5; 1", [0.5, 1.0]), ("en", "0.25, 2", [0.25, 2.0])):
+        form = {"gains": text, "_language": language}
+        assert kiosk.http.post("/widgets/gains", data=form).status_code == 303
+        assert robot.parameters()["gains"] == value
+    kiosk.http.post("/widgets/gains", data={"gains": "1,5, 2,5", "_language": "de"})
+    assert robot.parameters()["gains"] == [0.25, 2.0]
 
 
 # A node on Fast DDS never answers, and prints an error at each question: it is not asked.

@@ -13,7 +13,7 @@ from app.commands.parameters.values import check_value
 from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
-from app.i18n import TextLike, joined, say
+from app.i18n import ENGLISH, TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
@@ -577,14 +577,14 @@ def test_integers_are_exact_to_the_last_step() -> None:
         ("double", "1.5", 1.5),
         ("double", "nan", "nan"),
         ("double", "1_0", "1_0"),
-        ("integer", "7", "7"),
+        ("integer", "7", 7),
         ("bool", "true", True),
         ("bool", "maybe", "maybe"),
         ("string", "true", "true"),
     ],
 )
 def test_a_forms_text_is_typed(kind: str, text: str, value: Any) -> None:
-    assert widget(type=kind).parse_text(text) == value
+    assert widget(type=kind).parse_text(text, ENGLISH) == value
 
 
 def test_a_range_that_is_open_has_no_words() -> None:

@@ -10,7 +10,7 @@ from app.clock import format_datetime, format_time
 from app.i18n import date_and_time, number, render, say, sentences, text_in, time_of_day
 from app.i18n.__main__ import faults
 from app.i18n.catalogue import ENGLISH, catalogues_in, files
-from app.i18n.locales import OWN_NAMES, babel_name, number_from, own_name
+from app.i18n.locales import OWN_NAMES, babel_name, own_name
 from tests.support.catalogues import write_catalogue
 
 
@@ -67,22 +67,6 @@ def test_times_and_dates_are_written_as_their_reader_does() -> None:
 def test_the_clock_gives_values_that_are_rendered_later() -> None:
     assert render(format_time(61.9), "de") == "00:01:01"
     assert render(format_datetime(61.0), "de") == "01.01.1970 00:01:01"
-
-
-@pytest.mark.parametrize(
-    ("typed", "language", "read"),
-    [
-        ("1,5", "de", "1.5"),
-        ("1.5", "de", "1.5"),
-        ("1.500,5", "de", "1.500,5"),
-        ("1,5,5", "de", "1,5,5"),
-        ("1,500", "en", "1,500"),
-        ("1,5", "ja", "1,5"),
-        ("−1.5", "en", "-1.5"),
-    ],
-)
-def test_a_typed_number_may_have_the_sign_of_its_language(typed: str, language: str, read: str) -> None:
-    assert number_from(typed, language) == read
 
 
 def test_a_language_is_named_in_itself() -> None:

@@ -70,14 +70,14 @@ def test_a_value_of_a_parameter_is_shown_with_the_sign_and_unit_of_its_reader() 
     unit = {"en": "pcs", "de": "Stück"}
     gain = Parameter.model_validate({**ENTRY, "type": "double", "unit": unit, "min": 0.0, "max": 1.5})
     assert render(gain.value_text(1.25), "de") == "1,25 Stück"
-    assert gain.entry_text(1.25) == "1.25"
+    assert render(gain.entry_text(1.25), "de") == "1,25"
     known = ParameterState("live", 1.0)
     with pytest.raises(InputError) as found:
         check_value(gain, known, 7.5)
     assert render(found.value.text, "de").startswith("Verstärkung")
     assert "0 bis 1,5 Stück" in render(found.value.text, "de")
     several = Parameter.model_validate({**ENTRY, "type": "double[]"})
-    assert render(several.value_text((1.5, 2.5)), "de") == "1.5, 2.5"  # as it is entered
+    assert render(several.value_text((1.5, 2.5)), "de") == "1,5; 2,5"  # as it is entered
 
 
 def test_the_words_of_a_list_of_bools_are_those_of_any_language() -> None:

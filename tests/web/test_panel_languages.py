@@ -105,13 +105,32 @@ def test_a_form_takes_the_decimal_comma_of_its_language_and_of_no_other(kiosk: S
         return found[1]
 
     assert sent("de", "0,5").startswith("Gesendet auf /limit")
-    assert sent("de", "0.5").startswith("Gesendet auf /limit")
+    assert sent("de", "－０，５").endswith("Grenze ist −0,5: erlaubt ist 0 bis 2,5 m/s.")
+    for typed in ("0.5", "1.5", "0,5 m/s", "1,2,3"):
+        assert sent("de", typed).endswith(f"wie 1.234,5, nicht &#34;{typed}&#34;.")
     assert sent("de", "7,5").endswith("Grenze ist 7,5: erlaubt ist 0 bis 2,5 m/s.")
-    assert "must be a number" in sent("en", "0,5")
+    assert "must be a number, 0 to 2.5 m/s, written like 1,234.5, not" in sent("en", "0,5")
+    assert sent("en", "1,000").endswith("Limit is 1000: it must be 0 to 2.5 m/s.")
+
+
+def test_a_form_is_read_in_the_language_of_its_page(kiosk: Server) -> None:
+    """Another page of the browser may have changed its language since."""
+    page = kiosk.http.get("/", headers=read_by("de")).text
+    assert '<input type="hidden" name="_language" value="de">' in page
+    answer = kiosk.http.post(
+        "/widgets/set_limit",
+        data={"limit": "1,500", "_language": "de"},
+        headers=read_by("en"),
+        follow_redirects=True,
+    )
+    assert "Sent on /limit" in answer.text
+    assert 'value="1.5"' in answer.text  # as this page writes it
+    refused = kiosk.http.post("/widgets/set_limit", data={"limit": "1", "_language": "xx"})
+    assert refused.status_code == 422
 
 
 def test_what_is_asked_without_scripts_has_the_readers_sign(kiosk: Server) -> None:
-    html = kiosk.http.post("/widgets/asked", data={"limit": "0.5"}, headers=read_by("de")).text
+    html = kiosk.http.post("/widgets/asked", data={"limit": "0,5"}, headers=read_by("de")).text
     assert "<dt>Grenze</dt><dd>0,5</dd>" in html
     assert '<button class="yes">Erst fragen</button>' in html
 

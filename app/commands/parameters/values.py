@@ -5,12 +5,13 @@ import re
 from typing import Any, Final
 
 from app.errors import InputError
-from app.i18n import TextLike, say
+from app.i18n import ENGLISH, TextLike, say
+from app.i18n.typed_numbers import read_numbers
 from app.i18n.values import each_language
 from app.interfaces import INTEGER_RANGES
 from app.interfaces.validation import format_value
 from app.panel.list_text import split_list
-from app.panel.widgets.numbers import DECIMAL
+from app.panel.widgets.numbers import no_number
 from app.panel.widgets.parameter import MAX_TEXT, Parameter, Scalar, Value
 from app.robot.parameter_state import (
     MAX_LIST_LENGTH,
@@ -20,7 +21,8 @@ from app.robot.parameter_state import (
     limits_text,
 )
 
-WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
+# As browsers send it. A typed text that is read as another number is none of these.
+WHOLE: Final = re.compile(r"-?(0|[1-9][0-9]{0,18})", re.ASCII)
 
 
 def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Value:
@@ -58,6 +60,8 @@ def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[An
     try:
         if not isinstance(given, str) or len(given) > MAX_TEXT:
             raise ValueError
+        if parameter.is_number_list:  # of a program: pages send JSON's own lists
+            return list(read_numbers(given, ENGLISH, whole=parameter.is_whole))
         return [_entered(parameter, text) for text in split_list(given)]
     except ValueError:
         text = limits_text(parameter, allowed_range(parameter, known))
@@ -67,15 +71,12 @@ def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[An
 
 
 def _entered(parameter: Parameter, text: str) -> Any:
-    match parameter.element_type:
-        case "bool":
-            words = {"true": True, "false": False}
-            words |= dict.fromkeys(_words(parameter.on), True)
-            words |= dict.fromkeys(_words(parameter.off), False)
-            return words.get(text.lower(), text)
-        case "double":
-            return float(text) if DECIMAL.fullmatch(text) else text
-    return text
+    if parameter.element_type != "bool":
+        return text
+    words = {"true": True, "false": False}
+    words |= dict.fromkeys(_words(parameter.on), True)
+    words |= dict.fromkeys(_words(parameter.off), False)
+    return words.get(text.lower(), text)
 
 
 def _words(text: TextLike) -> list[str]:
@@ -111,7 +112,7 @@ def _number(parameter: Parameter, known: ParameterState, label: TextLike, given:
         raise InputError(say("number_empty", label=label, limits=text))
     value = _whole(given) if parameter.element_type == "integer" else _double(given)
     if value is None:
-        raise InputError(say("no_number", label=label, limits=text, given=format_value(given)))
+        raise InputError(no_number(label, text, given, whole=parameter.is_whole))
     for one in (limits, known.range):
         if not one.contains(value):
             text = each_text(parameter, one)

@@ -99,8 +99,8 @@ class EntryWidget(BaseWidget):
     """A widget in which a value is entered; a press has it under the widget's id."""
 
     @property
-    def is_number_entry(self) -> bool:
-        """Whether it is entered as a number."""
+    def is_whole(self) -> bool:
+        """Whether only whole numbers are entered."""
         return False
 
     @property
@@ -108,8 +108,8 @@ class EntryWidget(BaseWidget):
         """The default of the panel file, as in a press; None without one."""
         return None
 
-    def parse_text(self, text: str) -> Any:
-        """A form's text as a value of this widget's type; the text itself if it is no such value."""
+    def parse_text(self, text: str, language: str) -> Any:
+        """A form's text, in the page's language, as a value of this type; else the text itself."""
         return text
 
 

@@ -154,7 +154,7 @@ class ToggleInput(Input):
     def examples(self) -> list[Any]:
         return [False, True]
 
-    def parse_text(self, text: str) -> bool | str:
+    def parse_text(self, text: str, language: str) -> bool | str:
         return BOOL_TEXTS.get(text, text)
 
     def check_value(self, given: Any) -> bool:

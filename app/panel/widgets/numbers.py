@@ -1,6 +1,5 @@
 """The descriptions of number inputs: limits, steps, and checks of a value."""
 
-import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -8,22 +7,27 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import Field, model_validator
 
 from app.errors import Fault, InputError
-from app.i18n import PanelText, Text, number, say
-from app.i18n.values import after_space
+from app.i18n import PanelText, Text, TextLike, number, say
+from app.i18n.typed_numbers import read_number
+from app.i18n.values import after_space, number_like
 from app.interfaces.validation import format_value
 from app.panel.base import Span, panel_text
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 
 MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this, numbers of a browser are not exact
-# No two parts match the same text: a long text causes no backtracking.
-DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 Number = Annotated[float, Field(ge=-MAX_EXACT_NUMBER, le=MAX_EXACT_NUMBER)]
 if TYPE_CHECKING:
     Unit = str | PanelText
 else:
     Unit = panel_text(20, least=0)
+
+
+def no_number(label: TextLike, limits: TextLike, given: Any, *, whole: bool) -> Text:
+    """Why a value is refused that is not a number, or not written like one."""
+    shown, example = format_value(given), number_like(whole=whole)
+    return say("no_number", label=label, limits=limits, given=shown, example=example)
 
 
 class SteppedWidget(BaseWidget):
@@ -59,10 +63,6 @@ class Numeric(SteppedWidget, Input):
         limits = [given.get(key) for key in ("min", "max")] if isinstance(given, Mapping) else []
         whole = limits and all(type(limit) is int for limit in limits)
         return {"step": 1, **given} if whole else given
-
-    @property
-    def is_number_entry(self) -> bool:
-        return True
 
     @property
     def initial_text(self) -> str:
@@ -116,18 +116,16 @@ class Numeric(SteppedWidget, Input):
     def examples(self) -> list[Any]:
         return [self.to_type(self.min), self.to_type(self.max)]
 
-    def parse_text(self, text: str) -> int | float | str:
-        if not DECIMAL.fullmatch(text):
-            return text
-        value = float(text)
-        return int(value) if abs(value) <= MAX_EXACT_NUMBER and value.is_integer() else value
+    def parse_text(self, text: str, language: str) -> int | float | str:
+        value = read_number(text, language, whole=self.is_whole)
+        return text.strip() if value is None else value
 
     def check_value(self, given: Any) -> int | float:
         label, allowed = self.label, self.limits_text
         if given == "" or given is None:
             raise InputError(say("number_empty", label=label, limits=allowed))
         if isinstance(given, bool) or not isinstance(given, int | float):
-            raise InputError(say("no_number", label=label, limits=allowed, given=format_value(given)))
+            raise InputError(no_number(label, allowed, given, whole=self.is_whole))
         # Limits first: a value beyond them may be no float, or take long to divide.
         if not self.min <= given <= self.max or not self.is_on_step(float(given)):
             small = isinstance(given, float) and abs(given) <= MAX_EXACT_NUMBER

@@ -8,8 +8,9 @@ from pydantic import AfterValidator, Field
 
 from app.dialect.endpoint import Role
 from app.errors import Fault
-from app.i18n import Text, TextLike, number, say
-from app.i18n.values import with_unit
+from app.i18n import PanelText, Text, TextLike, number, say
+from app.i18n.typed_numbers import read_number, read_numbers
+from app.i18n.values import numbers, with_unit
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import TOPIC
 from app.interfaces.validation import format_value
@@ -19,7 +20,7 @@ from app.panel.number_range import Range, decimal_text
 from app.panel.values import number_text, same_value
 from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand, SentMessage
 from app.panel.widgets.inputs import BOOL_TEXTS, Option, option_faults
-from app.panel.widgets.numbers import DECIMAL, Number, SteppedWidget, Unit
+from app.panel.widgets.numbers import Number, SteppedWidget, Unit
 
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]
@@ -92,7 +93,17 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     @property
     def is_number_entry(self) -> bool:
+        """Whether it is entered as a number."""
         return self.has_numbers and not self.is_list and not self.options
+
+    @property
+    def is_number_list(self) -> bool:
+        """Whether it is entered as a list of numbers."""
+        return self.has_numbers and self.is_list and not self.options
+
+    @property
+    def is_whole(self) -> bool:
+        return self.element_type == "integer"
 
     @property
     def template(self) -> dict[str, Any]:
@@ -105,15 +116,13 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
         for name, _ in (GET, DESCRIBE, SET):
             yield "SS", f"{self.node}/{name}"
 
-    def parse_text(self, text: str) -> Any:
-        if self.options or self.is_list:
-            return text
-        match self.type:
-            case "bool":
-                return BOOL_TEXTS.get(text, text)
-            case "double":
-                return float(text) if DECIMAL.fullmatch(text) else text
-        return text
+    def parse_text(self, text: str, language: str) -> Any:
+        if self.is_number_list:
+            return read_numbers(text, language, whole=self.is_whole)
+        if self.is_number_entry:
+            value = read_number(text, language, whole=self.is_whole)
+            return text.strip() if value is None else value
+        return BOOL_TEXTS.get(text, text) if self.type == "bool" else text
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
@@ -157,20 +166,26 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
             return say("empty")
         if isinstance(value, bool):
             return self.on if value else self.off
-        text = self.entry_text(value)
-        several = isinstance(value, tuple | str)  # a list is shown as it is entered
-        return with_unit(text, self.unit) if several else number(text, self.unit)
+        return self.entry_text(value, self.unit)  # a list is shown as it is entered
 
-    def entry_text(self, value: Value) -> str:
-        """A value as the text of its entry. True and false are entered in lists only:
+    def entry_text(self, value: Value, unit: str | PanelText = "") -> TextLike:
+        """A value as the text of its entry, and its unit. True and false are entered in lists only:
         as the panel file calls them, in the panel's language, or in English."""
+        if not self.has_numbers:
+            return with_unit(self._plain_text(value), unit)
         if isinstance(value, tuple):
-            return join_list(
-                quote_element(one) if isinstance(one, str) else self._element_text(one) for one in value
-            )
-        return self._element_text(value)
+            return numbers(map(self.element_text, value), unit)
+        return number(self.element_text(value), unit)
 
-    def _element_text(self, value: bool | float | str) -> str:
+    def _plain_text(self, value: Value) -> str:
+        if not isinstance(value, tuple):
+            return self.element_text(value)
+        return join_list(
+            quote_element(one) if isinstance(one, str) else self.element_text(one) for one in value
+        )
+
+    def element_text(self, value: bool | float | str) -> str:
+        """One value, or one of a list, in Python's notation."""
         if isinstance(value, bool):
             return str(self.on if value else self.off)
         return decimal_text(value) if isinstance(value, float) else f"{value}"

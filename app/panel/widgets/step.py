@@ -8,13 +8,14 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from app.errors import Fault
-from app.i18n import Text
+from app.i18n import ENGLISH, Text
+from app.i18n.typed_numbers import read_number
 from app.panel.base import Seconds, Span
 from app.panel.number_range import to_float32
 from app.panel.values import number_text
 from app.panel.widgets.displays import FORMAT
 from app.panel.widgets.families import CheckContext, EntryWidget, TopicField, TopicSource
-from app.panel.widgets.numbers import DECIMAL, Number, NumberInput, SteppedWidget, Unit
+from app.panel.widgets.numbers import Number, NumberInput, SteppedWidget, Unit
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.topic_fields import number_field_faults
 
@@ -87,8 +88,10 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
             return None
         return int(wanted) if self.is_whole and float(wanted).is_integer() else wanted
 
-    def parse_text(self, text: str) -> Any:
-        return float(text) if DECIMAL.fullmatch(text) else text
+    def parse_text(self, text: str, language: str) -> Any:
+        """The value of a key, as the page has it: nobody types it."""
+        number = read_number(text, ENGLISH)
+        return text if number is None else number
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.max <= self.min:

@@ -1,6 +1,9 @@
 """The words of the keypad and the keyboard on the screen, by their codes."""
 
-from typing import Final
+from typing import Any, Final
+
+from app.i18n import say
+from app.i18n.values import number_like
 
 ENTRY_WORDS: Final = (
     "keypad_now",
@@ -16,7 +19,6 @@ ENTRY_WORDS: Final = (
     "keypad_too_low",
     "keypad_too_high",
     "keypad_off_step",
-    "keypad_no_number",
     "keypad_outside",
     "keypad_empty",
     "keypad_locks",
@@ -28,3 +30,9 @@ ENTRY_WORDS: Final = (
     "keyboard_left",
     "keyboard_right",
 )
+
+# Why a typed text is not a number, at its input and in the keypad.
+UNREADABLE: Final[dict[str, Any]] = {
+    "keypad_no_number": say("keypad_no_number", example=number_like(whole=False)),
+    "keypad_no_whole": say("keypad_no_whole", example=number_like(whole=True)),
+}

@@ -15,8 +15,10 @@ from markupsafe import Markup
 
 from app.i18n import Text, render, say
 from app.i18n.locales import number_in, symbols
+from app.i18n.typed_numbers import list_separator
 from app.icons import icon
 from app.panel.layout import Page
+from app.panel.number_range import decimal_text
 from app.panel.screen import CLEANING_S
 from app.panel.widgets.families import BaseWidget
 
@@ -62,6 +64,8 @@ class PageTemplates:
                 "number": lambda text: number_in(f"{text}", language),
                 "decimal": symbols(language).decimal,
                 "tile": partial(self._tile, language),
+                "group": symbols(language).group,
+                "typed": lambda entry: typed_in(entry, language),
             }
             made.globals = {**self._base.globals, **own}
         return self._environments[language]
@@ -108,3 +112,13 @@ class PageTemplates:
 
         folder = context["words"]["pictures"]
         return render_page(self._own[page.template], page, pictures, show, folder, language)
+
+
+def typed_in(entry: Any, language: str) -> Any:
+    """An entry of a form as it is shown again: numbers in the reader's notation, others as they are."""
+    if isinstance(entry, list | tuple):
+        between = f"{list_separator(language)} "
+        return between.join(str(typed_in(element, language)) for element in entry)
+    if isinstance(entry, bool) or not isinstance(entry, int | float):
+        return entry
+    return number_in(decimal_text(entry), language)

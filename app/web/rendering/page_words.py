@@ -11,7 +11,7 @@ from app.panel.widgets.families import EntryWidget, PressCommand
 from app.panel.widgets.trend import Trend
 from app.runtime.robot_session import RobotSession
 from app.view.trend_plot import Plot, plot
-from app.web.rendering.entry_words import ENTRY_WORDS
+from app.web.rendering.entry_words import ENTRY_WORDS, UNREADABLE
 from app.web.rendering.log_lines import LEVEL_WORDS, newest_lines
 
 WORDS: Final = (
@@ -65,7 +65,7 @@ def page_words(session: RobotSession, page: Page, pictures: str, language: str) 
     own |= {"asks": asks_of(session, page)}
     own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
-    return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
+    return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 
 def _plot_now(session: RobotSession, widget: Trend) -> Plot:

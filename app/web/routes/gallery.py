@@ -17,6 +17,7 @@ from app.web.gallery.examples import Example
 from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
 from app.web.rendering.display_choice import CHOICES, Choice, Display, choices, display_of
+from app.web.rendering.entry_words import UNREADABLE
 from app.web.rendering.page_words import TREND_WORDS, WORDS
 
 router = APIRouter(include_in_schema=False)
@@ -66,6 +67,7 @@ async def box() -> Response:
 def _words() -> dict[str, Any]:
     """The words of a page that its widgets use."""
     return {word: say(word) for word in (*WORDS, *TREND_WORDS)} | {
+        **UNREADABLE,
         "base": "",
         "pictures": "/gallery",
         "asks": {},

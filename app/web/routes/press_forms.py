@@ -54,7 +54,7 @@ async def pressed_by_form(
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
     press_id = f"{page_id}.{widget}"
     seen, until = inputs.pop("_seen", ""), _until(inputs)
-    typed = session.dispatcher.parse_form(inputs, reader.language)
+    typed = session.dispatcher.parse_form(inputs, _language(state, inputs, reader))
     if not state.limits.admit(who):
         receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
         return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)
@@ -95,7 +95,7 @@ def _ask(
             "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
-        typed=printable_texts(inputs),
+        entries=printable_texts(inputs),
         no=say("back"),
         empty=say("empty"),
         label=pressed.label,
@@ -118,6 +118,16 @@ def _until(inputs: dict[str, str]) -> float | None:
     """
     until = _moment(inputs, "_until")
     return until if until is None else min(until, clock.server_now())
+
+
+def _language(state: AppState, inputs: dict[str, str], reader: Reader) -> str:
+    """The language of the page whose form this is: another page of the browser may have changed its
+    language since. A program's form has the language of its request."""
+    language = inputs.pop("_language", reader.language)
+    panel = state.fleet.panel
+    if language not in (*panel.readers_languages, panel.language):
+        raise InputError(f'_language: "{language:.40}" is not a language of this panel')
+    return language
 
 
 def _is_second_tap(inputs: dict[str, str]) -> bool:

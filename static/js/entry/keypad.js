@@ -1,34 +1,54 @@
 // The keypad: a number is entered beside its field and goes there with Set, if the limits permit.
-import { Draft, isWhole, judged } from "./draft.js";
+import { isTouched, releaseEntry } from "../entries.js";
+import { Draft } from "./draft.js";
+import { markScale } from "./scale.js";
 import { Sheet } from "./sheet.js";
 import { numberText } from "../number-text.js";
+import { enter, entryText, judged, limitsOf } from "../number-inputs.js";
 import { setText } from "../show.js";
 
 const SHAPES = ["tall", "wide", "narrow"];
 const SCANNED_MS = 50; // a bar code reader types faster: its Enter confirms nothing
-const KEYS = { ",": ".", "-": "sign", Backspace: "delete", Delete: "clear" };
+const SHORT = 9; // characters that fit in large digits
+const OF_INPUT_METHOD = 229;
+const KEYS = { Backspace: "delete", Delete: "clear" };
 
 export class Entry {
   input;
   #sheet = new Sheet("keypad", SHAPES, () => this.cancel());
   #draft;
   #closed;
+  #before;
+  #wasTouched;
+  #isPasted = false;
   #lastKeyAt = -Infinity;
+  #changed = () => this.#pasted();
   #typed = (event) => this.#key(event);
 
   constructor(input, closed) {
     this.input = input;
     this.#closed = closed;
-    this.#draft = new Draft(input.value);
+    this.#before = input.value;
+    this.#wasTouched = isTouched(input);
+    this.#draft = new Draft(entryText(input));
     this.#label();
     this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(target.closest("button")));
     addEventListener("keydown", this.#typed, true);
+    // What is pasted, and what an input method writes, is in the field itself.
+    if (input.type !== "range") input.addEventListener("input", this.#changed);
     this.#sheet.open(input, this.#find("h2").textContent);
     this.#show();
   }
 
   cancel() {
+    if (this.#isPasted) this.#put(this.#before);
+    if (this.#isPasted && !this.#wasTouched) releaseEntry(this.input.closest("[data-widget]"));
+    this.#close();
+  }
+
+  #close() {
     removeEventListener("keydown", this.#typed, true);
+    this.input.removeEventListener("input", this.#changed);
     this.#sheet.close();
     this.#closed();
   }
@@ -38,42 +58,49 @@ export class Entry {
   }
 
   #label() {
-    const { min, max, value, dataset } = this.input;
+    const { min, max, isWhole } = limitsOf(this.input);
     const named = this.input.labels[0] ?? document.getElementById(this.input.getAttribute("aria-labelledby"));
     setText(this.#find("h2"), named.textContent);
-    setText(this.#find(".sheet-head b"), numberText(value));
-    setText(this.#find("small"), dataset.unit ?? "");
-    for (const [name, limit] of [["min", min], ["max", max]]) {
+    setText(this.#find(".sheet-head b"), entryText(this.input));
+    setText(this.#find("small"), this.input.dataset.unit ?? "");
+    for (const [name, limit, end] of [["min", min, ".low"], ["max", max, ".high"]]) {
       const key = this.#find(`[data-key=${name}]`);
       key.disabled = limit === "";
-      setText(key.querySelector("b"), numberText(limit));
+      for (const place of [key.querySelector("b"), this.#find(end)]) setText(place, numberText(limit));
     }
     // A parameter is set by the page's own key of that name.
     if (this.input.matches("[data-entry]")) for (const label of [".name", ".label"]) setText(this.#find(`.finish ${label}`), this.#sheet.root.dataset.enter);
     this.#find("[data-key=sign]").disabled = min !== "" && min >= 0;
-    this.#find('[data-key="."]').disabled = isWhole(this.input);
-    const isRange = min !== "" && max !== "";
-    this.#find(".scale").hidden = !isRange;
-    setText(this.#find(".low"), numberText(min));
-    setText(this.#find(".high"), numberText(max));
+    this.#find('[data-key="."]').disabled = isWhole;
+    this.#find(".scale").hidden = min === "" || max === "";
   }
 
   #clicked(button) {
     if (!button || button.disabled) return;
     if (button.matches(".cancel-entry")) this.cancel();
     else if (button.matches(".set-entry")) this.#set();
-    else this.#type(button.dataset.key);
+    else this.#press(button.dataset.key);
   }
 
-  #type(key) {
-    if (key === "min" || key === "max") this.#draft.replace(this.input[key]);
-    else this.#draft.type(key);
+  #press(key) {
+    const limit = limitsOf(this.input)[key];
+    this.#type(() => (limit === undefined ? this.#draft.press(key) : this.#draft.replace(numberText(limit))));
+  }
+
+  #type(change) {
+    change();
     this.#show();
+  }
+
+  #pasted() {
+    this.#isPasted = true;
+    this.#type(() => this.#draft.replace(this.input.value));
   }
 
   // A real keyboard enters here too, except where a key of the page has the focus.
   #key(event) {
-    const { target, key } = event;
+    const { target, key, isComposing, keyCode } = event;
+    if (isComposing || keyCode === OF_INPUT_METHOD) return;
     const isOurs = target === this.input || target === document.body;
     const scanned = event.timeStamp - this.#lastKeyAt < SCANNED_MS;
     if (key !== "Shift") this.#lastKeyAt = event.timeStamp;
@@ -81,26 +108,23 @@ export class Entry {
     event.preventDefault();
     if (key === "Escape") this.cancel();
     else if (key === "Enter") scanned || this.#set();
-    else this.#typeReal(KEYS[key] ?? key);
-  }
-
-  #typeReal(key) {
-    const button = /^(\d|\.|sign|delete|clear)$/.test(key) && this.#find(`[data-key="${key}"]`);
-    if (button && !button.disabled) this.#type(key);
+    else if (KEYS[key]) this.#press(KEYS[key]);
+    else if (key.length === 1) this.#type(() => this.#draft.write(key));
   }
 
   #show() {
     const { dataset } = this.#sheet.root;
-    const { value, problem } = judged(this.#draft.text, this.input);
+    const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
     const isOut = problem !== null && problem !== "empty";
-    setText(this.#find("output"), numberText(this.#draft.text));
+    setText(this.#find("output"), this.#draft.text);
+    this.#find("output").toggleAttribute("data-long", this.#draft.text.length > SHORT);
     this.#find(".entered p").hidden = !isOut;
     setText(this.#find(".entered p b"), isOut ? dataset[problem] : "");
     setText(this.#find(".entered p span"), isOut ? this.#limits() : "");
     this.#find(".set-entry").disabled = problem !== null;
     const isOff = problem === "tooLow" || problem === "tooHigh";
     setText(this.#find("[data-text=reason]"), problem ? dataset[isOff ? "outside" : problem] : "");
-    this.#mark(Number(value), value !== "");
+    markScale(this.#find(".scale"), plain, limitsOf(this.input));
   }
 
   // As the page says them: a node may change those of its parameter.
@@ -108,22 +132,18 @@ export class Entry {
     return this.input.closest("[data-widget]").querySelector("[data-text=limits]").textContent;
   }
 
-  // Where the number is on the scale: the limits are at 12.5 and 87.5 %.
-  #mark(value, isNumber) {
-    const { min, max } = this.input;
-    const at = 12.5 + (75 * (value - min)) / (max - min);
-    const scale = this.#find(".scale");
-    scale.style.setProperty("--at", `${Math.min(Math.max(at, 0), 100)}%`);
-    scale.classList.toggle("none", !isNumber);
-    setText(scale.querySelector("b"), at > 26 && at < 74 ? numberText(String(value)) : ""); // else it would lie on a limit
+  #set() {
+    const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
+    if (problem) return;
+    enter(this.input, plain);
+    this.#put(this.input.value);
+    this.#close();
   }
 
-  #set() {
-    const { value, problem } = judged(this.#draft.text, this.input);
-    if (problem) return;
-    this.input.value = value;
+  #put(text) {
+    this.input.removeEventListener("input", this.#changed);
+    this.input.value = text;
     this.input.dispatchEvent(new InputEvent("input", { bubbles: true, inputType: "insertReplacementText" }));
     this.input.dispatchEvent(new Event("change", { bubbles: true }));
-    this.cancel();
   }
 }

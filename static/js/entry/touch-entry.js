@@ -2,7 +2,7 @@
 // where a finger is the main pointer.
 const coarse = matchMedia("(pointer: coarse)");
 const always = document.body.dataset.keyboard === "on";
-const TOUCHED = ":is(input[type=number], input[type=text], output)";
+const TOUCHED = ":is(input[type=text], output)";
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
 let open = null; // what is open now
@@ -11,7 +11,7 @@ let touches = 0; // counts them: a module that arrives after the next touch open
 // Without a system keyboard, where there is one of the page's own.
 function prepare() {
   const active = always || coarse.matches;
-  for (const input of document.querySelectorAll("[data-widget] :is(input[type=number], input[type=text])")) {
+  for (const input of document.querySelectorAll("[data-widget] input[type=text]")) {
     input.dataset.inputmode ??= input.inputMode;
     input.inputMode = active ? "none" : input.dataset.inputmode;
   }
@@ -24,7 +24,7 @@ async function openFor(place) {
   open?.cancel();
   const touch = ++touches;
   try {
-    const module = await KINDS[input.type === "text" ? "keyboard" : "keypad"]();
+    const module = await KINDS[input.matches("[data-number]") ? "keypad" : "keyboard"]();
     if (touch !== touches) return;
     open = new module.Entry(input, () => (open = null));
   } catch {

@@ -9,7 +9,7 @@ GERMAN = {
     "sent_to_nobody": "Gesendet auf {topic} um {time}, aber kein Node empfängt es.",
     "refused": "Nicht gesendet um {time}: {why}",
     "off_limits": "{label} ist {given}: erlaubt ist {limits}",
-    "no_number": "{label} muss eine Zahl sein, {limits}, nicht {given}",
+    "no_number": "{label} muss eine Zahl sein, {limits}, wie {example}, nicht {given}",
     "limits_both": "{low} bis {high}{unit}",
     "limits": "{low} bis {high}{unit}, in Schritten von {step}",
     "forbidden": "Der Roboter erlaubt {name} nicht.",

@@ -1,0 +1,51 @@
+// Decimal numbers as plain text, calculated exactly: 0.1 + 0.2 is 0.3. The server judges steps in the same way, in
+// app/panel/number_range.py.
+const NEAR = 1_000_000_000n; // within a billionth of a step
+
+// The numbers as integers of one scale. The last value is the scale's exponent.
+export function scaled(...plains) {
+  const parts = plains.map((plain) => {
+    const [digits, exponent = "0"] = plain.split("e");
+    const [whole, fraction = ""] = digits.split(".");
+    return { digits: BigInt(whole + fraction), exponent: Number(exponent) - fraction.length };
+  });
+  const least = Math.min(...parts.map(({ exponent }) => exponent));
+  return [...parts.map(({ digits, exponent }) => digits * 10n ** BigInt(exponent - least)), least];
+}
+
+export function isLess(one, other) {
+  const [first, second] = scaled(one, other);
+  return first < second;
+}
+
+// A number is on a step if it is a whole number of steps from the lowest value, within a billionth of a step.
+export function isOnStep(plain, low, step) {
+  const [value, from, size] = scaled(plain, low, step);
+  const rest = modulo(value - from, size);
+  return least(rest, size - rest) * NEAR <= size;
+}
+
+// The step that is `times` steps from a number; between two steps, the next one counts as the first.
+export function stepped(plain, times, low, step) {
+  const [value, from, size, exponent] = scaled(plain, low, step);
+  const rest = modulo(value - from, size);
+  let below = value - rest;
+  if (!isOnStep(plain, low, step)) below += times < 0 ? size : 0n;
+  else if (rest * 2n > size) below += size;
+  return written(below + BigInt(times) * size, exponent);
+}
+
+function written(digits, exponent) {
+  if (exponent >= 0) return String(digits * 10n ** BigInt(exponent));
+  const sign = digits < 0n ? "-" : "";
+  const text = String(digits < 0n ? -digits : digits).padStart(1 - exponent, "0");
+  return `${sign}${text.slice(0, exponent)}.${text.slice(exponent)}`.replace(/\.?0+$/, "");
+}
+
+function modulo(value, size) {
+  return ((value % size) + size) % size;
+}
+
+function least(one, other) {
+  return one < other ? one : other;
+}

@@ -1,0 +1,55 @@
+// The inputs of numbers: text fields in the notation of the page's language, and sliders.
+import { isLess, isOnStep, stepped } from "./decimals.js";
+import { numberText, readNumber, readPlain } from "./number-text.js";
+
+// Its limits as plain text, "" without one.
+export function limitsOf({ dataset: { min, max, stepSize, whole } }) {
+  return { min, max, step: stepSize === "any" ? "" : stepSize, isWhole: whole !== undefined };
+}
+
+export function setLimits(input, { min, max, step }) {
+  Object.assign(input.dataset, { min, max, stepSize: step });
+  mark(input);
+}
+
+// The entered number as the page shows it, or what was typed in its place.
+export function entryText(input) {
+  return input.type === "range" ? numberText(input.value) : input.value;
+}
+
+export function enter(input, plain) {
+  input.value = input.type === "range" ? plain : numberText(plain);
+}
+
+// What a press sends: a number, or the text as it is, which the server refuses.
+export function sentNumber(input) {
+  return input.type === "range" ? Number(input.value) : (readNumber(input.value, limitsOf(input).isWhole) ?? input.value.trim());
+}
+
+// A typed number as plain text, null if it is none, and what is wrong with it.
+export function judged(text, { min, max, step, isWhole }) {
+  if (/^\s*[−-]?\s*$/.test(text)) return { plain: null, problem: "empty" };
+  const plain = readPlain(text, isWhole);
+  if (plain === null) return { plain, problem: isWhole ? "noWhole" : "noNumber" };
+  if (min && isLess(plain, min)) return { plain, problem: "tooLow" };
+  if (max && isLess(max, plain)) return { plain, problem: "tooHigh" };
+  const isOff = step && plain !== max && !isOnStep(plain, min || "0", step);
+  return { plain, problem: isOff ? "offStep" : null };
+}
+
+// Marks what can't be sent as it is; nothing yet is no mistake.
+export function mark(input) {
+  const { problem } = judged(input.value, limitsOf(input));
+  const isWrong = problem !== null && input.value.trim() !== "";
+  input.setCustomValidity(isWrong ? problem : "");
+  input.toggleAttribute("data-unread", isWrong && problem.startsWith("no"));
+}
+
+// One step up or down, and never beyond a limit.
+export function step(input, times, size) {
+  const { min, max, isWhole } = limitsOf(input);
+  const plain = input.type === "range" ? input.value : readPlain(input.value, isWhole);
+  if (plain === null) return input.value.trim() ? undefined : enter(input, min || "0");
+  const next = stepped(plain, times, min || "0", size);
+  enter(input, min && isLess(next, min) ? min : max && isLess(max, next) ? max : next);
+}
