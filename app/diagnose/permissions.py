@@ -1,5 +1,6 @@
 """The panel's interlocks: whether their publishers stay, repeat themselves and permit now. Pure."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -7,6 +8,7 @@ from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
 from app.diagnose.observation import Observation
 from app.errors import DecodeError
+from app.graph.model import TopicEndpoint
 from app.i18n import TextLike, render, say
 from app.interfaces import Interfaces, has_key
 from app.panel.interlock import Interlock
@@ -39,6 +41,7 @@ def _check_topic(report: Report, behind: NamesBehindBridge, observed: Observatio
             hint = behind.hint(topic, "topics")
             report.find("permission_no_publisher", topic, robot=robot, ids=ids, hint=hint)
         return
+    _check_publishers(report, publishers, using, robot)
     limits = [one.max_age_s for one in using if one.max_age_s is not None]
     if limits and observed.longest_gap(key) > min(limits):
         report.find(
@@ -54,6 +57,19 @@ def _check_topic(report: Report, behind: NamesBehindBridge, observed: Observatio
         report.find("permission_not_latched", topic, robot=robot, ids=ids, count=count, window=window)
     else:
         report.fact(f"permission {topic} came {len(observed.samples[key])} times in {window} s")
+
+
+def _check_publishers(
+    report: Report, publishers: Sequence[TopicEndpoint], using: Sequence[Interlock], robot: str
+) -> None:
+    """Whether several nodes publish a value of which the last one counts. Two bridges of one domain
+    know the same publishers."""
+    number = max(Counter(one.bridge for one in publishers).values())
+    whole = [one.id for one in using if not has_key(one.field)]
+    if number > 1 and whole:
+        nodes = ", ".join(sorted({node for one in publishers for node in one.nodes})) or "?"
+        ids, topic = ", ".join(whole), using[0].topic
+        report.find("permission_publishers", topic, robot=robot, ids=ids, count=number, nodes=nodes)
 
 
 def _check_value(

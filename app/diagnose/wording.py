@@ -227,6 +227,11 @@ WARNINGS: Final[Rows] = {
         "No node subscribes to {about}: a press has no effect.{hint}",
         "Start the node; compare the topic's name and namespace (`ros2 topic info -v`).",
     ),
+    "permission_publishers": (
+        "{count} publishers of the permission {about} (interlock {ids}) are running: {nodes}.",
+        "Let one node publish it: the panel cannot tell their values apart, and the last one counts. "
+        'With publishers = "one" its controls are locked while there are several.',
+    ),
     "permission_not_latched": (
         "The permission {about} (interlock {ids}) is volatile, and came {count} times in {window} s.",
         "Publish it latched (QoS transient local) or regularly: after a restart of the panel or the "

@@ -7,7 +7,7 @@ on Cyclone DDS.
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from app.dialect.endpoint import Endpoint, Role
 from app.interfaces.names import is_valid_name, valid_type
@@ -37,6 +37,33 @@ _HASH = re.compile(r"typehash=(RIHS\d\d_[0-9a-f]+)")
 _TOKEN_QOS = re.compile(
     r"K?:(?P<reliable>[01]?):(?P<durability>[^:]*):(?:(?P<all>[01]?),?(?P<depth>\d*))(?::(?P<data>.*))?"
 )
+
+
+_WRITER = re.compile(r"@/([^/]+)/ros2/dds/([^/]+)/writer/([^/]+)/.+")
+
+
+class Writer(NamedTuple):
+    """A DDS writer of a robot's node: its bridge, its participant and its own GUID."""
+
+    zid: str
+    participant: str
+    guid: str
+
+
+def writers(zid: str, name: str) -> str:
+    """The key expression of a topic's DDS writers, by its name behind a bridge ("/speed")."""
+    return f"@/{zid}/ros2/dds/*/writer/*/rt{name}"
+
+
+def nodes_of(writer: Writer) -> str:
+    """The key expression of the nodes in a writer's participant."""
+    return f"@/{writer.zid}/ros2/node/{writer.participant}/**"
+
+
+def writer_place(admin_key: str) -> Writer | None:
+    """The writer of an answer to `writers`."""
+    found = _WRITER.fullmatch(admin_key)
+    return None if found is None else Writer(*found.groups())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
@@ -51,6 +51,7 @@ class Interlock(Description):
     unit: Unit = ""
     max_age_s: Seconds | None = None
     require_publisher: bool = False
+    publishers: Literal["any", "one"] = "any"
     qos: TopicQos = TopicQos()
     _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
 

@@ -66,7 +66,7 @@ def _now(interlock: Interlock, value: Any, must: TextLike) -> TextLike:
     """The value that was received, in as few digits as distinguish it from the one that is needed."""
     if not isinstance(value, float):
         return _value_text(interlock, value, interlock.unit)
-    if not math.isfinite(value):
+    if math.isnan(value):
         return not_finite(value)
     rounded = (float(f"{value:.{digits}g}") for digits in DIGITS)
     candidates = [_value_text(interlock, one, interlock.unit) for one in (*rounded, value)]

@@ -7,10 +7,11 @@ an operator reads.
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
 
-from app.i18n import number, say
+from app.i18n import joined, number, say
 from app.interfaces import has_key
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
@@ -33,6 +34,9 @@ NO_WAY: Final = frozenset(
 )
 
 MAX_ENDPOINTS: Final = 3
+SEVERAL: Final = 2  # publishers
+# The codes of locks that the robot's value decides.
+BY_VALUE: Final = frozenset({"forbidden", "unmet", "missing", "several"})
 
 # What comes so soon after joining may be a value of any age, sent again.
 HISTORY_S: Final = 1.0
@@ -74,12 +78,24 @@ def interlock_verdict(
     link = link or link_verdict(robot, now)
     if not link.permitted:
         return link
+    verdict = _verdict(interlock, robot, now)
+    if verdict.code in BY_VALUE and not has_key(interlock.field):
+        return _with_publishers(verdict, interlock, robot)
+    return verdict
+
+
+def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
+    """The verdict of an interlock of a robot that can be reached."""
     topic, key = interlock.topic, robot.key(interlock.topic)
     if doubt := topic_mismatch("MS", interlock, robot):
         return doubt
     if interlock.require_publisher and not robot.graph.has_endpoint("MP", key):
         return locked("no_publisher", topic=topic)
-    reading = robot.reading(topic).of_field(interlock.field, kept_s(interlock.max_age_s))
+    is_single = interlock.publishers == "one"
+    if is_single and (doubt := several_publishers(interlock, robot)):
+        return doubt
+    lacking_s = kept_s(interlock.max_age_s, single_publisher=is_single)
+    reading = robot.reading(topic).of_field(interlock.field, lacking_s)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
     if robot.silent_publishers.has_silent(key, robot.graph.bridges):
@@ -94,6 +110,26 @@ def interlock_verdict(
     if now >= stale_at:
         return stale(topic, interlock.field, interlock.max_age_s)
     return Verdict(True, until=stale_at)
+
+
+def several_publishers(interlock: Interlock, robot: RobotState) -> Verdict | None:
+    """The lock for a topic that only one publisher may have; None while there is one at most. Messages
+    of several can't be told apart."""
+    topic = interlock.topic
+    publishers = robot.topic_publishers.of_topic(robot.key(topic), robot.graph)
+    if publishers.number < SEVERAL:
+        return None
+    reason = say("several_publishers", topic=topic, number=publishers.number)
+    text = joined([reason, publishers.sentence(topic)])
+    return Verdict(False, "several_publishers", text)
+
+
+def _with_publishers(verdict: Verdict, interlock: Interlock, robot: RobotState) -> Verdict:
+    """The same lock with the nodes that publish the topic, where there are several: it may flap."""
+    publishers = robot.topic_publishers.of_topic(robot.key(interlock.topic), robot.graph)
+    if publishers.number < SEVERAL or verdict.reason is None:
+        return verdict
+    return replace(verdict, reason=joined([verdict.reason, publishers.sentence(interlock.topic)]))
 
 
 def stale(topic: str, field: str, max_age_s: float) -> Verdict:

@@ -35,6 +35,7 @@ from app.robot.sample import Sample as Sample
 from app.robot.sample import SkippedPayload as SkippedPayload
 from app.robot.silent_publishers import SilentPublishers
 from app.robot.slices import Slices
+from app.robot.topic_publishers import TopicPublishers
 from app.robot.topics import Reading as Reading
 from app.robot.topics import Topic
 from app.ros_logging import RobotLog
@@ -74,6 +75,7 @@ class RobotState:
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
+        self.topic_publishers = TopicPublishers()
         self.replayed = ReplayedMessages()
         self.command_status: dict[str, CommandStatus] = {}  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
@@ -192,6 +194,7 @@ class RobotState:
         self.settled_at = math.inf
         self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
+        self.topic_publishers = TopicPublishers()
         self.replayed.begin_all()
         self.presence.clear()
         for topic in self._topics.values():

@@ -136,7 +136,16 @@ def _interlocks(topics: Iterable[Topic]) -> Iterator[InterlockCandidate]:
     for topic in by_name:
         own_id = id_of(topic.name, taken)
         taken.add(own_id)
-        yield InterlockCandidate(id=own_id, topic=topic.name, type=topic.type, kept=topic.latched)
+        yield InterlockCandidate(
+            id=own_id, topic=topic.name, type=topic.type, kept=topic.latched, nodes=_several(topic)
+        )
+
+
+def _several(topic: Topic) -> str:
+    """The names of the nodes if a topic has several publishers; "" if it has one."""
+    if max(Counter(one.bridge for one in topic.publishers).values()) == 1:
+        return ""
+    return ", ".join(sorted({node for one in topic.publishers for node in one.nodes})) or "?"
 
 
 def _may_permit(topic: Topic) -> bool:

@@ -26,6 +26,7 @@ class InterlockCandidate:
     topic: str
     type: str
     kept: bool  # its publisher keeps the last value for those that come late
+    nodes: str = ""  # the names of its publishers' nodes, where there are several
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -82,6 +82,10 @@ def _interlocks(draft: Draft) -> Iterator[str]:
         yield f"label = {_value(label_of(one.topic).lower())}"
         yield f"topic = {_value(one.topic)}"
         yield f"type = {_value(one.type)}"
+        if one.nodes:
+            yield from _comment(f"It has several publishers, of which the last counts: {one.nodes}")
+        else:
+            yield 'publishers = "one"  # locks while another node publishes it too'
         if one.kept:
             yield "require_publisher = true  # locks when its publisher is gone"
         else:

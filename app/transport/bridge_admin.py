@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Mapping
 from typing import Any, Final
 
 from app.dialect import bridge_dialect
@@ -22,6 +23,7 @@ class BridgeAdmin:
         self._link = link
         self._participants = BridgeParticipants(link)
         robot.nodes_are_read = True
+        self.namespaces: Mapping[str, str] = {}  # of the bridges, by zid
         self.missed = 0  # queries in a row that a bridge did not answer
 
     async def answered(self, within_s: float) -> bool:
@@ -39,6 +41,7 @@ class BridgeAdmin:
             bridge_dialect.zid_of(key): answer.decode(errors="replace") for key, answer in answers
         }
         graph.update_namespaces(namespaces)
+        self.namespaces = namespaces or self.namespaces
         self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
             graph.update_versions(versions)

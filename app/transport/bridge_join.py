@@ -17,6 +17,7 @@ from app.concurrency import spawn_logged
 from app.errors import LinkError
 from app.ros_logging import RobotLog
 from app.transport.bridge_admin import BridgeAdmin
+from app.transport.bridge_publishers import PublisherWatch
 from app.transport.liveliness_tokens import LivelinessTokens
 from app.transport.peer import RobotContext
 
@@ -42,6 +43,7 @@ class GraphMembership:
         self._log = RobotLog(log, self._robot.name)
         self._link = context.link
         self._bridges = BridgeAdmin(self._robot, self._link)
+        self._publishers = PublisherWatch(context, self._bridges, self._log)
         self._tokens = LivelinessTokens(self._panel, context.interfaces, self._robot)
         self._unrouted = 0
         self._started_at = time.monotonic()
@@ -51,9 +53,11 @@ class GraphMembership:
 
     def start(self) -> None:
         self._asking = spawn_logged(self._ask_regularly(), self._log, FAILED)
+        self._publishers.start()
 
     async def stop(self) -> None:
         """Ends its tasks. The tokens end with the session."""
+        await self._publishers.stop()
         tasks = [task for task in (self._joining, self._asking) if task is not None]
         for task in tasks:
             task.cancel()
@@ -107,6 +111,8 @@ class GraphMembership:
         self._hold()
         await self._settle()
         await self._ask_until_answered()
+        with suppress(LinkError):
+            await self._publishers.update()
         self._robot.settled_at = time.monotonic()
         self._log.info("joined the robot's topics")
         self._context.graph_read()

@@ -32,6 +32,7 @@ NODE: Final = GONE | {
     "stale_entry",
     "unreadable",
     "new_publisher",
+    "several_publishers",
     "reading",
     "missing",
     "not_a_number",

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import pytest
 
+from tests.diagnose.setups import Setup
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 
@@ -96,6 +97,78 @@ def test_joints_of_two_nodes_do_not_disturb_each_other(
         )
         arm = kiosk.widget("arm")
         assert (arm["state"], arm["joint_levels"]) == ("live", ["missing", "normal"])
+
+
+PERMIT: Final = """
+title = "Cell"
+mode = "live"
+
+[[interlock]]
+id = "loose"
+label = "Door"
+topic = "/permit"
+type = "std_msgs/msg/Bool"
+
+[[interlock]]
+id = "strict"
+topic = "/permit"
+type = "std_msgs/msg/Bool"
+publishers = "one"
+
+[[page]]
+id = "one"
+title = "One"
+""" + "".join(
+    f"""
+[[page.widget]]
+id = "{lock}_go"
+kind = "publish"
+label = "Go"
+topic = "/go"
+type = "std_msgs/msg/Bool"
+message = {{ data = true }}
+interlock = "{lock}"
+"""
+    for lock in ("loose", "strict")
+)
+
+
+def test_a_second_publisher_locks_where_only_one_may_be_and_is_named(
+    own_bridge: Bridge, nodes: Callable[[str], RosNode], tmp_path: Path
+) -> None:
+    door, robot = nodes("door"), nodes("robot")
+    door.advertise("/permit", "std_msgs/msg/Bool")
+    door.every("/permit", {"data": True}, 0.05)
+    with live_server(own_bridge, tmp_path, PERMIT) as kiosk:
+        until(lambda: kiosk.widget("strict_go")["enabled"], "one publisher permits")
+        robot.advertise("/permit", "std_msgs/msg/Bool")
+        robot.every("/permit", {"data": False}, 0.05)
+        until(lambda: not kiosk.widget("strict_go")["enabled"], "there are two")
+        named = "/permit is published by /door, /robot."
+        strict = "Locked: /permit has 2 publishers, and only one may give this permission."
+        until(lambda: kiosk.widget("strict_go")["reason"] == f"{strict} {named}", "both are named")
+        assert {one[0] for one in permissions(kiosk)} == {False}
+        until(
+            lambda: named in (kiosk.widget("loose_go")["reason"] or ""), "the flapping one names both"
+        )
+        assert findings(own_bridge, tmp_path) == ["/door, /robot"]
+        robot.end()
+        until(lambda: kiosk.widget("strict_go")["enabled"], "one is left")
+
+
+def permissions(kiosk: Server) -> set[Any]:
+    """(strict, loose) permissions, looked at so often."""
+    found = set()
+    for _ in range(LOOKS):
+        widgets = kiosk.snapshot()["widgets"]
+        found.add((widgets["strict_go"]["enabled"], widgets["loose_go"]["enabled"]))
+    return found
+
+
+def findings(bridge: Bridge, folder: Path) -> list[str]:
+    """The nodes that `doctor` names as publishers of a permission."""
+    found = Setup(folder).findings(PERMIT, bridge.endpoint)
+    return [str(one.details["nodes"]) for one in found if one.code == "permission_publishers"]
 
 
 def looks(kiosk: Server) -> set[Any]:

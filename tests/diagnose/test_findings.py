@@ -54,8 +54,8 @@ def test_the_same_is_found_once_and_notes_do_not_count() -> None:
 
 def test_what_a_robot_says_is_made_printable() -> None:
     report = Report()
-    report.find("topic_type", "/a", found="\x1b[2J", wanted="{about}")
-    assert report.findings[0].what == "/a is \\u001b[2J on the robot and {about} in the panel file."
+    report.find("topic_type", "/a", found="\x1b[31mBool\x1b[0m\u202e", wanted="{about}")
+    assert report.findings[0].what == "/a is Bool\\u202e on the robot and {about} in the panel file."
 
 
 @pytest.mark.parametrize("code", KINDS)

@@ -230,3 +230,29 @@ def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: 
             observed.samples["joints"].append(Sample(payload, 1, 0.0, 0.0, "b1"))
         check_permissions(report, behind, observed, INTERFACES)
         assert report.codes() == codes
+
+
+@pytest.mark.parametrize(
+    ("field", "publishers", "nodes"),
+    [
+        ("", [("b1", "/door"), ("b1", "/robot")], "/door, /robot"),
+        ("", [("b1", "/door"), ("b1", "")], "/door"),
+        ("", [("b1", "/door"), ("b2", "/door")], None),
+        ("position[name=lift]", [("b1", "/door"), ("b1", "/robot")], None),
+    ],
+)
+def test_the_publishers_of_a_permission_are_named_if_there_are_several(
+    field: str, publishers: list[tuple[str, str]], nodes: str | None, tmp_path: Path
+) -> None:
+    more = {"type": "sensor_msgs/msg/JointState", "field": field, "max": 1} if field else {}
+    here = robot(tmp_path, panel_of(interlock("/permit", **more), button("/go")))
+    ends = tuple(
+        TopicEndpoint(type=BOOL, qos=QOS, bridge=bridge, nodes=(node,) if node else ())
+        for bridge, node in publishers
+    )
+    known = (Topic(name="/permit", key="permit", publishers=ends),)
+    graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
+    report = Report()
+    check_permissions(report, NamesBehindBridge.of(here, graph), Observation(), INTERFACES)
+    found = [one.details["nodes"] for one in report.findings if one.code == "permission_publishers"]
+    assert found == ([] if nodes is None else [nodes])

@@ -55,7 +55,7 @@ def test_every_fault_is_printed_with_its_place(
     assert first == f"{faulty} can't be used:"
     assert [line.split(": ")[0] for line in lines] == [
         "  title",
-        '  page[0].group[0].widget[1].topic "last_heard", line 44',
+        '  page[0].group[0].widget[1].topic "last_heard", line 45',
     ]
 
 
@@ -129,7 +129,7 @@ def test_a_note_is_no_fault_and_has_its_place(
     assert said.err == ""
     assert said.out.splitlines()[1:] == [
         '  note: interlock[0] "operation", line 11: is worth a look',
-        '  note: page[0].group[0].widget[1].span "last_heard", line 47: is large',
+        '  note: page[0].group[0].widget[1].span "last_heard", line 48: is large',
     ]
     load_panel(SHIPPED)
 

@@ -203,7 +203,7 @@ def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(math.nan, "not a number (NaN)"), (-math.inf, "infinite"), (0.5, "0.5")]
+    ("value", "text"), [(math.nan, "not a number (NaN)"), (-math.inf, "−Infinity"), (0.5, "0.5")]
 )
 def test_a_number_that_is_none_is_named_so(value: float, text: str) -> None:
     float64 = "std_msgs/msg/Float64"
@@ -211,7 +211,7 @@ def test_a_number_that_is_none_is_named_so(value: float, text: str) -> None:
     cell = robot_there(panel)
     says(cell, ENABLED, value, float64)
     reason = interlock_verdict(panel.interlocks[0], cell, NOW).reason
-    assert str(reason) == f"Air is {text}: it must be at least 1."
+    assert str(reason) == f"Air is {text}: it must be 1 or more."
 
 
 @pytest.mark.parametrize("permitted", [True, False])

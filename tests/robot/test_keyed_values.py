@@ -146,3 +146,11 @@ def test_entries_by_their_place_are_those_of_the_newest_message() -> None:
     assert cell.shown(NOW)["text"] == "0.5"
     cell.says(NOW, finger=0.1)
     assert cell.shown(NOW)["state"] == "missing"
+
+
+def test_with_one_publisher_each_message_is_the_whole_list() -> None:
+    cell = Cell(publishers="one")
+    cell.says(NOW, lift=0.25)
+    assert cell.code(NOW) == "permitted"
+    cell.says(NOW + 0.1, finger=0.1)
+    assert cell.code(NOW + 0.1) == "missing"

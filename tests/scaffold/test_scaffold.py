@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -161,6 +162,21 @@ def test_interlock_candidates_are_bools_that_permit() -> None:
         ("/operation_enabled", True, None),  # latched: it is published once
         ("/arm/guard_closed", None, 2.0),
     ]
+
+
+def test_an_interlock_has_one_publisher_where_the_robot_has_one() -> None:
+    found = tomllib.loads(text_of(**CELL))["interlock"]
+    assert {one["publishers"] for one in found} == {"one"}
+    twice = replace(
+        published("/guard_closed", BOOL),
+        publishers=(
+            endpoint(BOOL, "/left"),
+            endpoint(BOOL, "/right"),
+        ),
+    )
+    text = text_of(topics=[twice])
+    assert "several publishers, of which the last counts: /left, /right" in text
+    assert "publishers" not in tomllib.loads(text)["interlock"][0]
 
 
 def test_a_bool_of_a_fault_is_a_red_lamp() -> None:
