@@ -5,7 +5,6 @@ A value in a descriptor's range is a whole number of steps from its lowest value
 """
 
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,8 +16,8 @@ from app.i18n.values import after_space
 from app.interfaces import to_plain
 from app.panel.values import number_text
 
-# rclcpp accepts a double that is this near to a step, in units of the last place.
-NEAR_ULP: Final = 100
+# A double that is this near to a step, in parts of the step, is on it: 0.1 + 0.2 is not quite 0.3.
+NEAR: Final = Fraction(1, 1_000_000_000)
 MIN_WITH_EXPONENT: Final = 1e16  # larger doubles are written with an exponent
 
 
@@ -39,17 +38,9 @@ class Range:
         return value == self.high or self.is_on_step(value)
 
     def is_on_step(self, value: float) -> bool:
-        """Whether a value is on a step: exactly for integers, within `NEAR_ULP` for doubles."""
-        if self.step is None:
-            return True
-        low, step = _exact(self.low or 0), _exact(self.step)
-        steps = round((_exact(value) - low) / step)
-        nearest = low + steps * step
-        if isinstance(value, int) and isinstance(self.step, int):
-            return nearest == value
-        return abs(nearest - _exact(value)) <= abs(_exact(value)) * NEAR_ULP * Fraction(
-            sys.float_info.epsilon
-        )
+        """Whether a value is on a step: exactly for integers, else `is_on_step`."""
+        whole = isinstance(value, int) and isinstance(self.step, int)
+        return self.step is None or is_on_step(value, self.low or 0, self.step, whole=whole)
 
     def narrowed_by(self, other: "Range") -> "Range":
         """This range narrowed by another. If the other has no step, the limits are on this range's
@@ -72,6 +63,14 @@ class Range:
         low, step = _exact(self.low), _exact(self.step)
         found = low + rounded((_exact(value) - low) / step) * step
         return int(found) if isinstance(self.low, int) else float(found)
+
+
+def is_on_step(value: float, low: float, step: float, *, whole: bool = False) -> bool:
+    """Whether a value is a whole number of steps from `low`, within `NEAR` of a step, in exact decimal
+    arithmetic; `whole`: within `NEAR` of 1, so that no whole number counts as its neighbour.
+    `static/js/decimals.js` has the same rule."""
+    rest = (_exact(value) - _exact(low)) % _exact(step)
+    return min(rest, _exact(step) - rest) <= NEAR * (1 if whole else _exact(step))
 
 
 def range_text(limits: Range, given: str | PanelText) -> TextLike:

@@ -18,19 +18,20 @@ export function isLess(one, other) {
   return first < second;
 }
 
-// A number is on a step if it is a whole number of steps from the lowest value, within a billionth of a step.
-export function isOnStep(plain, low, step) {
+// A number is on a step if it is a whole number of steps from the lowest value, within a billionth of a step; a whole
+// number, if it is exactly.
+export function isOnStep(plain, low, step, isWhole) {
   const [value, from, size] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
-  return least(rest, size - rest) * NEAR <= size;
+  return isWhole ? rest === 0n : least(rest, size - rest) * NEAR <= size;
 }
 
 // The step that is `times` steps from a number; between two steps, the next one counts as the first.
-export function stepped(plain, times, low, step) {
+export function stepped(plain, times, low, step, isWhole) {
   const [value, from, size, exponent] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
   let below = value - rest;
-  if (!isOnStep(plain, low, step)) below += times < 0 ? size : 0n;
+  if (!isOnStep(plain, low, step, isWhole)) below += times < 0 ? size : 0n;
   else if (rest * 2n > size) below += size;
   return written(below + BigInt(times) * size, exponent);
 }

@@ -33,7 +33,7 @@ export function judged(text, { min, max, step, isWhole }) {
   if (plain === null) return { plain, problem: isWhole ? "noWhole" : "noNumber" };
   if (min && isLess(plain, min)) return { plain, problem: "tooLow" };
   if (max && isLess(max, plain)) return { plain, problem: "tooHigh" };
-  const isOff = step && plain !== max && !isOnStep(plain, min || "0", step);
+  const isOff = step && plain !== max && !isOnStep(plain, min || "0", step, isWhole);
   return { plain, problem: isOff ? "offStep" : null };
 }
 
@@ -50,6 +50,6 @@ export function step(input, times, size) {
   const { min, max, isWhole } = limitsOf(input);
   const plain = input.type === "range" ? input.value : readPlain(input.value, isWhole);
   if (plain === null) return input.value.trim() ? undefined : enter(input, min || "0");
-  const next = stepped(plain, times, min || "0", size);
+  const next = stepped(plain, times, min || "0", size, isWhole);
   enter(input, min && isLess(next, min) ? min : max && isLess(max, next) ? max : next);
 }

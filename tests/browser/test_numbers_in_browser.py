@@ -1,5 +1,6 @@
 """Numbers as an operator enters them, in Chromium: the screen shows what a ROS 2 node receives."""
 
+import random
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
@@ -8,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
 from app.i18n.typed_numbers import read_number, read_numbers
+from app.panel.number_range import Range, decimal_text
 from tests.support.browser.browsers import opened
 from tests.support.browser.pages import asked
 from tests.support.browser.touch import HUMAN_S
@@ -42,6 +44,14 @@ max = 2.0
 step = 0.1
 
 [[page.widget]]
+id = "fine"
+kind = "number"
+label = "Fine"
+min = 0.0
+max = 2.0
+step = 0.1
+
+[[page.widget]]
 id = "send"
 kind = "publish"
 label = "Send"
@@ -65,9 +75,22 @@ label = "Send height"
 topic = "/test_typed"
 type = "std_msgs/msg/Float64"
 message = { data = "{height}" }
+
+[[page.widget]]
+id = "send_fine"
+kind = "publish"
+label = "Send fine"
+topic = "/test_typed"
+type = "std_msgs/msg/Float64"
+message = { data = "{fine}" }
 """
 # The panel's language and the browser's: neither of the others decides.
 READERS: Final = [("de", "en-US"), ("en", "de-DE"), ("ja", "de-DE")]
+JUDGED: Final = """async ([path, rows]) => {
+  const { judged } = await import(path);
+  const limits = ([min, max, step, isWhole]) => ({ min, max, step, isWhole });
+  return rows.map(([text, ...row]) => judged(text, limits(row)).problem);
+}"""
 READ: Final = """async ([path, rows]) => {
   const { readNumber, readNumbers } = await import(path);
   return rows.map(([text, isWhole, isList]) => (isList ? readNumbers : readNumber)(text, isWhole));
@@ -282,3 +305,52 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
                 own = as_sent(read_number(text, language, whole=whole))
                 found = exact(numbers)
             assert own == found, (text, language, whole)
+
+
+def test_scripts_and_server_judge_limits_and_steps_the_same(opens: Opens) -> None:
+    page = opens("en", "de-DE")
+    path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
+        "main", "number-inputs"
+    )
+    chance = random.Random(2)
+    rows: list[tuple[float, Range, bool]] = []
+    for _ in range(5_000):
+        whole = chance.random() < 0.3
+        step = (
+            chance.choice([1, 2, 5, 10**10]) if whole else chance.choice([0.1, 0.01, 0.25, 1e-3, 2.5])
+        )
+        low = step * chance.randint(-9, 9) if whole else round(step * chance.randint(-9, 9), 3)
+        limits = Range(low, low + step * 100 if whole else round(low + step * 100, 3), step)
+        value = low + step * chance.randint(-1, 101)
+        value += chance.choice([0, 0, 1e-16, -1e-11, 0.9e-9, -0.9e-9, 1.1e-9, 1e-3, 0.5]) * step
+        rows.append((round(value) if whole else value, limits, whole))
+    sent = [
+        (
+            decimal_text(value),
+            *(decimal_text(one or 0) for one in (limits.low, limits.high, limits.step)),
+            whole,
+        )
+        for value, limits, whole in rows
+    ]
+    problems = page.evaluate(JUDGED, [path, sent])
+    for (value, limits, _), problem in zip(rows, problems, strict=True):
+        assert limits.contains(value) == (problem is None), (value, limits, problem)
+    assert 500 < problems.count(None) < 4_500
+
+
+def test_a_sum_of_steps_is_on_a_step(node: RosNode, opens: Opens, cell: Server) -> None:
+    page = opens("de", "en-US")
+    before = len(node.heard(TOPIC))
+    sums = (0.1 + 0.2, 0.7999999999999999)
+    for number in sums:
+        answer = cell.http.post("/widgets/send_height", json={"inputs": {"height": number}})
+        assert answer.status_code == 200
+    form = {"height": "0,30000000000000004", "_language": "de"}
+    assert cell.http.post("/widgets/send_height", data=form).status_code == 303
+    page.locator("#input-fine").fill("0,30000000000000004")
+    expect(page.locator("#input-fine:invalid")).to_have_count(0)
+    press(page, "send_fine")
+    until(partial(has_heard, node, TOPIC, before + 4), "all are received")
+    assert node.heard_data(TOPIC)[before:] == [*sums, 0.1 + 0.2, 0.1 + 0.2]
+    page.locator('[data-widget="fine"] .step').last.click()
+    expect(page.locator("#input-fine")).to_have_value("0,4")

@@ -5,10 +5,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from hypothesis import given as varied
+from hypothesis import strategies as st
 
 from app.errors import InputError
 from app.i18n import ENGLISH
 from app.panel import Input
+from app.panel.number_range import Range
 from tests.support.builders import panel_of
 from tests.support.words import coded, english
 
@@ -181,6 +184,36 @@ def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
 ) -> None:
     widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
     assert (widget.html_attributes["step"], widget.is_whole) == (step, whole)
+
+
+def test_a_value_within_a_billionth_of_a_step_is_on_it_and_is_sent_as_it_is() -> None:
+    speed, count = one(SPEED), one(COUNT)
+    for given in (0.1 + 0.2, 0.1 * 3 + 0.4, 1.1 - 0.2, 0.3 + 1e-10, 0.3 - 1e-10, -0.1 - 0.2):
+        assert speed.check_value(given) == given
+    for given in (0.3 + 2e-10, 0.3 - 2e-10, 0.25, 1.5 + 1e-12, -0.5 - 1e-12):  # limits are exact
+        with pytest.raises(InputError):
+            speed.check_value(given)
+    for given in (0.1 * 3 * 10, 2.9999999999999996, 3.0000000005):
+        assert exactly(count.check_value(given), 3)
+    for given in (3.00000001, 2.5):
+        with pytest.raises(InputError):
+            count.check_value(given)
+
+
+def test_of_whole_numbers_none_counts_as_its_neighbour() -> None:
+    large = one({"id": "n", "kind": "number", "label": "N", "min": 0, "max": 10**13, "step": 10**10})
+    assert large.check_value(2 * 10**10) == 2 * 10**10
+    with pytest.raises(InputError):
+        large.check_value(2 * 10**10 + 1)
+
+
+@varied(st.integers(-10_000, 10_000), st.sampled_from([0.1, 0.01, 0.25, 0.3, 1e-3, 2.5, 7.0]))
+def test_every_sum_of_steps_is_taken(steps: int, step: float) -> None:
+    low, high = round(-20_000 * step, 6), round(20_000 * step, 6)
+    table = {"id": "n", "kind": "number", "label": "N", "min": low, "max": high, "step": step}
+    added = step * steps
+    assert one(table).check_value(added) == added
+    assert Range(low, high, step).contains(added)
 
 
 def test_every_value_on_a_step_is_taken() -> None:

@@ -1,7 +1,6 @@
 """The descriptions of number inputs: limits, steps, and checks of a value."""
 
 from collections.abc import Iterator, Mapping
-from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
@@ -12,6 +11,7 @@ from app.i18n.typed_numbers import read_number
 from app.i18n.values import after_space, number_like
 from app.interfaces.validation import format_value
 from app.panel.base import Span, panel_text
+from app.panel.number_range import is_on_step
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 
@@ -104,14 +104,11 @@ class Numeric(SteppedWidget, Input):
 
     def to_type(self, value: float) -> int | float:
         """A value of this input as an int or a float, as a message needs it."""
-        return int(value) if self.is_whole else value
+        return round(value) if self.is_whole else value
 
     def is_on_step(self, value: float) -> bool:
-        """Whether a value is a whole number of steps from `min`, in exact decimal arithmetic."""
-        if self.step is None:
-            return True
-        low, step = Fraction(repr(self.min)), Fraction(repr(self.step))
-        return (Fraction(repr(value)) - low) % step == 0
+        """Whether a value is a whole number of steps from `min`, as `is_on_step` has it."""
+        return self.step is None or is_on_step(value, self.min, self.step, whole=self.is_whole)
 
     def examples(self) -> list[Any]:
         return [self.to_type(self.min), self.to_type(self.max)]
