@@ -65,6 +65,7 @@ WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these
 SPEAK_ZENOH = {
     "app.transport.zenoh_answers",
     "app.transport.zenoh_config",
+    "app.transport.zenoh_publishers",
     "app.transport.zenoh_session",
     "app.simulator.zenoh_action",
     "app.simulator.zenoh_peer",

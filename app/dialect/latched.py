@@ -12,6 +12,11 @@ def caches(expression: str) -> str:
     return f"{expression}{_CACHES}**"
 
 
+def is_cache_of(token: str, zid: str) -> bool:
+    """Whether a token is that of a cache of the session `zid`."""
+    return f"{_CACHES}{zid}/" in token
+
+
 def newest(token: str) -> str:
     """The query for the last message of a cache."""
     return f"{token}?_max=1"

@@ -7,6 +7,7 @@ from typing import Final
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC, feedback, of_action, status
 from app.panel.model import Panel
+from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.panel.widgets.service_action import Call
 from app.robot.state import RobotState
@@ -19,11 +20,13 @@ Named = Iterator[tuple[str, str]]  # (key, type)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Declarations:
     """Key → key expression of each topic that is subscribed to or published, and of each service that
-    is queried. `immediate`, `lossless` and `recorded` are the keys of topics for `Inbox.expect`."""
+    is queried. `latched` are the published ones that keep their last message. `immediate`, `lossless`
+    and `recorded` are the keys of topics for `Inbox.expect`."""
 
     subscribe: Mapping[str, str] = field(default_factory=dict)
     publish: Mapping[str, str] = field(default_factory=dict)
     query: Mapping[str, str] = field(default_factory=dict)
+    latched: Collection[str] = NO_KEYS
     immediate: Collection[str] = NO_KEYS
     lossless: Collection[str] = NO_KEYS
     recorded: Collection[str] = NO_KEYS
@@ -39,6 +42,7 @@ def declarations(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Dec
         subscribe={key: topic(key, name) for key, name in _subscribed(panel, interfaces, robot)},
         publish={key: topic(key, name) for key, name in _published(panel, robot)},
         query={key: service(key, name) for key, name in _queried(panel, interfaces, robot)},
+        latched=frozenset(_latched(panel, robot)),
     )
 
 
@@ -54,6 +58,14 @@ def _subscribed(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Name
 def _published(panel: Panel, robot: RobotState) -> Named:
     for topic, name in {**panel.publications(), ROSOUT_TOPIC: LOG_TYPE}.items():
         yield robot.key(topic), name
+
+
+def _latched(panel: Panel, robot: RobotState) -> Iterator[str]:
+    """Not of holds: a subscriber that comes late must not begin to move."""
+    held = {w.topic for w in panel.widgets() if isinstance(w, HoldCommand)}
+    for topic in panel.publications():
+        if topic not in held and panel.qos(topic).wire_qos.transient_local:
+            yield robot.key(topic)
 
 
 def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:

@@ -13,13 +13,14 @@ import zenoh
 from zenoh.handlers import Callback
 
 from app.dialect.dialect import Dialect
-from app.dialect.latched import caches, newest
+from app.dialect.latched import caches, is_cache_of, newest
 from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
 from app.transport.zenoh_answers import collected, first_answer
 from app.transport.zenoh_config import endpoints_of, translated
+from app.transport.zenoh_publishers import declare_publisher
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
@@ -94,7 +95,8 @@ class ZenohSession:
                 ),
             )
             self._publishers = {
-                key: self._publisher(expression) for key, expression in self._declared.publish.items()
+                key: declare_publisher(self._session, one, latched=key in self._declared.latched)
+                for key, one in self._declared.publish.items()
             }
             self._subscribers = [
                 declared
@@ -102,15 +104,6 @@ class ZenohSession:
                 for declared in self._subscriptions(key, expression)
             ]
             self._demanded = {key: self._subscriber(*of) for key, of in dict(self._on_demand).items()}
-
-    def _publisher(self, expression: str) -> zenoh.Publisher:
-        return self._session.declare_publisher(
-            expression,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            express=True,
-            reliability=zenoh.Reliability.RELIABLE,
-            allowed_destination=zenoh.Locality.REMOTE,
-        )
 
     def _subscriptions(self, key: str, expression: str) -> Iterator[zenoh.Subscriber[None]]:
         """A subscriber to the topic, and one to the tokens of its publishers' caches. Zenoh's own
@@ -197,8 +190,7 @@ class ZenohSession:
     def has_reader(self, key: str) -> bool:
         """Whether the publisher has a matching subscriber."""
         with translated(f"can't ask who listens on {key}"):
-            status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
-            return bool(status.matching)
+            return bool(self._publishers[key].matching_status.matching)
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         """Queries a declared service once. The future gets the first answer, None if there is none."""
@@ -292,8 +284,9 @@ class ZenohSession:
         self._inbox.token(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
     def _on_cache(self, key: str, sample: zenoh.Sample) -> None:
-        if sample.kind == zenoh.SampleKind.PUT:
-            self._inbox.cache(key, str(sample.key_expr))
+        token = str(sample.key_expr)
+        if sample.kind == zenoh.SampleKind.PUT and not is_cache_of(token, self.zid):
+            self._inbox.cache(key, token)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)
