@@ -39,6 +39,12 @@ def printable(text: str) -> str:
     return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
+def one_line(text: str, most: int | None = None) -> str:
+    """`readable` without line breaks and tabs, of `most` characters: for text within a line."""
+    shown = readable(text).replace("\n", "\\u000a").replace("\t", "\\u0009")
+    return shown if most is None or len(shown) <= most else f"{shown[:most]}…"
+
+
 def printable_texts(values: Mapping[str, Any]) -> dict[str, str]:
     """The values that are texts, made printable."""
     return {name: printable(text) for name, text in values.items() if isinstance(text, str)}

@@ -63,6 +63,7 @@ COMMON = {
 }
 WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room
 SPEAK_ZENOH = {
+    "app.transport.token_query",
     "app.transport.zenoh_answers",
     "app.transport.zenoh_config",
     "app.transport.zenoh_publishers",

@@ -14,7 +14,7 @@ import pytest
 from app.errors import InputError
 from app.i18n import say
 from app.interfaces import plain_text
-from app.printable import printable, readable, without_terminal_codes
+from app.printable import one_line, printable, readable, without_terminal_codes
 from tests.support.builders import INTERFACES
 from tests.support.parts import ROOT, Server, until
 
@@ -85,6 +85,11 @@ def test_values_in_a_value_have_no_codes_of_terminals() -> None:
     )
     assert plain_text(status, 100, without_terminal_codes) == "{'key': 'hot', 'value': 'hot'}"
     assert plain_text(RED, 100, without_terminal_codes) == "hot"
+
+
+def test_within_a_line_there_is_no_line_break_and_no_more_than_a_limit() -> None:
+    assert one_line("a\nb\tc\u202e \x1b[31mred") == "a\\u000ab\\u0009c\\u202e red"
+    assert one_line("x" * 10, most=4) == "xxxx…"
 
 
 def test_sentences_and_errors_are_printable() -> None:

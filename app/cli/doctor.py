@@ -56,6 +56,7 @@ def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
         "panel": str(settings.panel),
         "well": found.report.is_well,
         "findings": [one.as_json() for one in found.report.findings],
+        "more": dict(found.report.more),
         "facts": found.report.facts,
     }
 
@@ -64,17 +65,18 @@ def as_text(report: Report, verbose: bool = False) -> str:
     """A line for each finding, errors first; after those of one kind what to do about them."""
     lines = [f"ok       {fact}" for fact in report.facts] if verbose else []
     ordered = [one for severity in SEVERITIES for one in report.findings if one.severity == severity]
+    last = {one.code: one for one in ordered}
     for advice, found in groupby(ordered, lambda one: one.do):
-        lines += map(_line, found)
+        for one in found:
+            lines.append(_line(one))
+            if one is last[one.code] and report.more[one.code]:
+                lines.append(f"         … and {report.more[one.code]} more")
         lines.append(f"         → {advice}")
-    counts = [
-        (number, severity)
-        for severity in SEVERITIES
-        if (number := sum(one.severity == severity for one in ordered))
-    ]
+    counts = [(n, severity) for severity in SEVERITIES if (n := report.count(severity))]
     listed = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
     what = "All is well" if report.is_well else "Something is wrong"
-    lines.append(f"{what}: {listed or 'nothing was found'}, {len(report.facts)} checks were passed.")
+    passed = len(report.facts) + report.more_facts
+    lines.append(f"{what}: {listed or 'nothing was found'}, {passed} checks were passed.")
     return "\n".join(lines)
 
 

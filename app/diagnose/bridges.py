@@ -1,16 +1,14 @@
 """The bridges of a robot: there, responding, of the right namespace, domain and version. Pure."""
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
-from app.diagnose.findings import Report
+from app.diagnose.findings import Report, few
 from app.diagnose.names import NamesBehindBridge
 from app.dialect.endpoint import DEMO_VERSION
 from app.graph.model import Bridge, GraphSnapshot
 
 TESTED: Final = "1.10.2"  # zenoh-plugin-ros2dds; see docs/compatibility.md
-MOST_NAMED: Final = 3
 
 
 def check_bridges(
@@ -57,17 +55,15 @@ def _check_several(report: Report, behind: NamesBehindBridge, robot: str) -> Non
         if len(zids) > 1:
             found[name] = zids
     if found:
-        zids = set().union(*found.values())
-        about, more = ", ".join([*found][:MOST_NAMED]), len(found) - MOST_NAMED
-        about += f" and {more} more" if more > 0 else ""
-        report.find("bridges_two", about, robot=robot, number=len(zids), zids=", ".join(sorted(zids)))
+        bridges = sorted(set[str]().union(*found.values()))
+        report.find("bridges_two", few([*found]), robot=robot, number=len(bridges), zids=few(bridges))
 
 
 def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Bridge]) -> bool:
     """Whether the bridges see nodes, and any of what the panel needs."""
     topics = sum(len(one.topics) for one in behind.graphs)
     nodes = behind.nodes()
-    domain = ", ".join(sorted({str(bridge.domain) for bridge in bridges}))
+    domain = few(sorted({str(bridge.domain) for bridge in bridges}))
     if not topics and not nodes:
         report.find("bridge_domain", robot=behind.robot.id, domain=domain)
         return False
@@ -77,31 +73,3 @@ def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Br
     if not there and (found := next(behind.elsewhere(needed), None)) is not None:
         report.find("robot_elsewhere", robot=behind.robot.id, found=found[0], namespace=found[1])
     return True
-
-
-def denies(bridges: Sequence[Bridge], kind: str, name: str) -> bool:
-    """Whether a bridge's file holds a name back: `kind` is "publishers", "service_servers" or another
-    of its lists. The bridge gives each list as one regular expression."""
-    return any(_denied(bridge.config, kind, name) for bridge in bridges)
-
-
-def _denied(config: Mapping[str, Any], kind: str, name: str) -> bool:
-    for key, is_denied in _lists(config):
-        if not isinstance(key, dict):
-            continue
-        pattern = key.get(kind)
-        listed = isinstance(pattern, str) and _matches(pattern, name)
-        return listed if is_denied else not listed
-    return False
-
-
-def _lists(config: Mapping[str, Any]) -> Iterator[tuple[Any, bool]]:
-    yield config.get("allow"), False
-    yield config.get("deny"), True
-
-
-def _matches(pattern: str, name: str) -> bool:
-    try:
-        return re.search(pattern, name) is not None
-    except re.error:  # Rust knows some that Python does not: then it is not known
-        return True

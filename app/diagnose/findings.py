@@ -2,12 +2,18 @@
 to do about it. A new finding is a row of `wording.py`; docs/how-to/doctor.md is made from them.
 """
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, get_args
 
 from app.diagnose import wording
-from app.printable import readable
+from app.printable import one_line
+
+MOST_ALIKE: Final = 20  # findings of one code about one robot; others are counted
+MOST_FACTS: Final = 200
+MOST_TEXT: Final = 1000  # characters of a detail
+MOST_NAMED: Final = 3
 
 # An error keeps the panel, or a part of it, from working. A warning lets it work, but not always or not
 # as meant. A note is worth knowing, and is no reason for another exit status.
@@ -60,35 +66,58 @@ class Finding:
 
     def _filled(self, sentence: str) -> str:
         """The sentence with its details. Texts of robots and other programs are made printable."""
-        return readable(sentence.format(about=self.about, **self.details))
+        details = {name: one_line(str(text), MOST_TEXT) for name, text in self.details.items()}
+        return sentence.format(about=one_line(self.about, MOST_TEXT), **details)
 
     def as_json(self) -> dict[str, str]:
-        found = {"severity": self.severity, "code": self.code, "about": readable(self.about)}
+        found = {"severity": self.severity, "code": self.code, "about": one_line(self.about, MOST_TEXT)}
         return found | {"robot": self.robot, "what": self.what, "do": self.do}
+
+
+def few(names: Sequence[str]) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"{', '.join(names[:MOST_NAMED])}{more}"
 
 
 @dataclass(slots=True)
 class Report:
-    """The results in order: `findings` are faults, `facts` are what is as it should be."""
+    """The results in order: `findings` are faults, `facts` are what is as it should be. What is beyond
+    a limit is counted: `more` by code, `more_facts`."""
 
     findings: list[Finding] = field(default_factory=list)
     facts: list[str] = field(default_factory=list)
+    more: Counter[str] = field(default_factory=Counter)
+    more_facts: int = 0
+    _known: Counter[tuple[str, str]] = field(default_factory=Counter)  # by code and robot
 
     def find(self, code: str, about: str = "", *, robot: str = "", **details: Any) -> None:
         """Adds a finding; KeyError for a code that is no row of `KINDS`."""
         if code not in KINDS:
             raise KeyError(f'"{code}" is not a finding: add it to app/diagnose/wording.py')
+        if self._known[code, robot] >= MOST_ALIKE:
+            self.more[code] += 1
+            return
         found = Finding(code, about, robot, details)
         if found not in self.findings:
             self.findings.append(found)
+            self._known[code, robot] += 1
 
     def fact(self, text: str) -> None:
-        self.facts.append(readable(text))
+        if len(self.facts) < MOST_FACTS:
+            self.facts.append(one_line(text, MOST_TEXT))
+        else:
+            self.more_facts += 1
 
     @property
     def is_well(self) -> bool:
         """Whether there is neither an error nor a warning."""
         return all(found.severity == "note" for found in self.findings)
+
+    def count(self, severity: Severity) -> int:
+        """How many findings of a severity there are, with those that are only counted."""
+        more = sum(number for code, number in self.more.items() if KINDS[code].severity == severity)
+        return more + sum(found.severity == severity for found in self.findings)
 
     def codes(self) -> list[str]:
         return [found.code for found in self.findings]

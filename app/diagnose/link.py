@@ -39,7 +39,7 @@ def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) 
     try:
         found = endpoints_of(config_from(zenoh, connect))
     except SettingsError as error:
-        report.find("zenoh_config", str(zenoh), robot=robot, detail=str(error))
+        report.find("zenoh_config", str(zenoh), robot=robot, detail=" ".join(str(error).split()))
         return ()
     if not found:
         detail = f"{zenoh} names no endpoint to connect to: connect.endpoints is empty"
@@ -100,7 +100,9 @@ async def check_version(report: Report, session: AdminSession, endpoint: str, ro
     ours = version("eclipse-zenoh")
     answers = await asyncio.gather(*(session.ask(selector, ASK_S) for selector in ROUTERS))
     for _, answer in (one for several in answers for one in several):
-        with suppress(ValueError, TypeError, AttributeError):  # an answer that is none of Zenoh's
+        with suppress(
+            ValueError, TypeError, AttributeError, LookupError, RecursionError
+        ):  # an answer that is none of Zenoh's
             said = json.loads(answer)
             if all(session.zid != one.get("peer") for one in said["sessions"]):
                 continue  # further away

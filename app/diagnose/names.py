@@ -1,10 +1,17 @@
 """The names that a panel uses of one robot, found in the ROS graph behind its bridges. Pure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from app.dialect.endpoint import within
+from app.graph.forwarding import (
+    Forwarding,
+    ServerList,
+    TopicList,
+    server_forwarding,
+    topic_forwarding,
+)
 from app.graph.model import (
     BridgeRoute,
     GraphSnapshot,
@@ -71,9 +78,18 @@ class NamesBehindBridge:
     def subscribers(self, name: str) -> list[TopicEndpoint]:
         return [one for topic in self.topics(name) for one in topic.subscribers]
 
-    def is_announced(self, name: str) -> bool:
-        """Whether a bridge routes a topic."""
-        return any(topic.announced for topic in self.topics(name))
+    def topic_forwarding(self, name: str, of: TopicList) -> Forwarding | None:
+        """Of the publishers or subscribers of a topic; None without any."""
+        places = ((graph, graph.topic(own)) for graph, own in self._places(name))
+        return _best(
+            topic_forwarding(graph, topic, [of])
+            for graph, topic in places
+            if topic and getattr(topic, of)
+        )
+
+    def server_forwarding(self, name: str, kind: ServerList) -> Forwarding | None:
+        """Of a service or an action; None if no node offers it."""
+        return _best(server_forwarding(graph, kind, own) for graph, own in self._places(name))
 
     def services(self, name: str) -> list[Server]:
         return [one for graph, own in self._places(name) for one in graph.services if one.name == own]
@@ -115,6 +131,13 @@ class NamesBehindBridge:
                 for name in names:
                     if there.endswith(name) and there != f"{own}{name}":
                         yield there, there.removesuffix(name)
+
+
+def _best(known: Iterable[Forwarding | None]) -> Forwarding | None:
+    """That of the robot where it is forwarded, else lost, else denied."""
+    order: tuple[Forwarding, ...] = ("forwarded", "lost", "denied")
+    there = set(known)
+    return next((one for one in order if one in there), None)
 
 
 def _of(graph: RobotGraph, kind: str) -> tuple[Topic, ...] | tuple[Server, ...]:

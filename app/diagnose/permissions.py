@@ -42,6 +42,8 @@ def _check_topic(report: Report, behind: NamesBehindBridge, observed: Observatio
             report.find("permission_no_publisher", topic, robot=robot, ids=ids, hint=hint)
         return
     _check_publishers(report, publishers, using, robot)
+    if behind.topic_forwarding(topic, "publishers") != "forwarded":
+        return  # it is found as a topic
     limits = [one.max_age_s for one in using if one.max_age_s is not None]
     if limits and observed.longest_gap(key) > min(limits):
         report.find(

@@ -4,9 +4,9 @@ definition, QoS and DDS. Pure."""
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from app.diagnose.bridges import denies
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
+from app.graph.forwarding import Forwarding, ServerList, TopicList
 from app.graph.model import Server, TopicEndpoint
 from app.interfaces import Interfaces
 from app.interfaces.names import Qos
@@ -63,7 +63,7 @@ class TopicChecks:
                 hint = self._behind.hint(topic, "topics")
                 self._find("topic_no_publisher", topic, hint=hint)
             return
-        if self._is_held_back("publishers", topic):
+        if not self._is_let_through("publishers", topic):
             return
         self._check_types(topic, wanted, publishers)
         qos = self._panel.qos(topic).wire_qos
@@ -71,15 +71,9 @@ class TopicChecks:
             self._find("topic_qos", topic, detail=BEST_EFFORT)
         if qos.transient_local and not all(one.qos.transient_local for one in publishers):
             self._find("topic_qos", topic, detail=VOLATILE)
-        if self._is_unrouted(topic):
-            self._find("topic_unrouted", topic)
-
-    def _is_unrouted(self, topic: str) -> bool:
-        """Whether the bridge knows the publisher and does not pass it on, for whatever reason."""
-        known = (self._earlier, self._behind)
-        lost = all(one.publishers(topic) and not one.is_announced(topic) for one in known)
         routes = self._behind.routes(topic)
-        return lost or any(r.direction == "pub" and r.remote and not r.endpoint for r in routes)
+        if any(r.direction == "pub" and r.remote and not r.endpoint for r in routes):
+            self._find("topic_unrouted", topic)
 
     def _check_published(self, topic: str, wanted: str) -> None:
         subscribers = self._behind.subscribers(topic)
@@ -87,26 +81,31 @@ class TopicChecks:
             hint = self._behind.hint(topic, "topics")
             self._find("topic_no_subscriber", topic, hint=hint)
             return
-        if self._is_held_back("subscribers", topic):
+        if not self._is_let_through("subscribers", topic):
             return
         self._check_types(topic, wanted, subscribers)
         misfits = [_misfit(one, self._panel.qos(topic).wire_qos) for one in subscribers]
         if all(misfits):  # one that gets it is enough
             self._find("topic_qos", topic, detail=misfits[0])
 
-    def _is_held_back(self, kind: str, topic: str) -> bool:
-        """Whether a bridge knows a topic and does not announce it, by its file."""
-        if self._behind.is_announced(topic) or not self._is_denied(kind, topic):
-            return False
-        self._find("bridge_denies", topic)
-        return True
+    def _is_let_through(self, of: TopicList, topic: str) -> bool:
+        """Whether a bridge forwards a topic that is there. It finds why not, unless that is new."""
+        known = [one.topic_forwarding(topic, of) for one in (self._earlier, self._behind)]
+        return self._is_found("topic_unrouted", topic, known)
 
-    def _is_denied(self, kind: str, name: str) -> bool:
-        key = f"/{self._behind.robot.key(name)}"
-        return any(
-            denies(graph.bridges, kind, key.removeprefix(graph.namespace))
-            for graph in self._behind.graphs
-        )
+    def _is_served(self, name: str, kind: ServerList) -> bool:
+        """The same, of a service or an action; True as well if no node offers it."""
+        known = [one.server_forwarding(name, kind) for one in (self._earlier, self._behind)]
+        return self._is_found("server_unrouted", name, known)
+
+    def _is_found(self, lost: str, name: str, known: Sequence[Forwarding | None]) -> bool:
+        if known[-1] == "denied":
+            self._find("bridge_denies", name)
+        elif set(known) == {"lost"}:
+            self._find(lost, name)
+        else:
+            return True
+        return False
 
     def _check_types(self, topic: str, wanted: str, ends: Iterable[TopicEndpoint]) -> None:
         for end in ends:
@@ -122,11 +121,9 @@ class TopicChecks:
     def _check_server(self, what: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
         """`what` is "service" or "action"."""
         if not servers:
-            if self._behind.offers(name) and self._is_denied(f"{what}_servers", name):
-                self._find("bridge_denies", name)
-                return
-            hint = self._behind.hint(name, "services" if what == "service" else "actions")
-            self._find(f"{what}_absent", name, hint=hint)
+            if self._is_served(name, "service_servers" if what == "service" else "action_servers"):
+                hint = self._behind.hint(name, "services" if what == "service" else "actions")
+                self._find(f"{what}_absent", name, hint=hint)
             return
         for server in servers:
             if server.type != wanted:
@@ -141,10 +138,7 @@ class TopicChecks:
     def _check_parameters(self, node: str) -> None:
         names = [f"{node}/{service}" for service, _ in (GET, DESCRIBE, SET)]
         served = [server for name in names for server in self._behind.services(name)]
-        held = [n for n in names if self._behind.offers(n) and self._is_denied("service_servers", n)]
-        if held:
-            self._find("bridge_denies", held[0])
-        elif not served:
+        if all(self._is_served(name, "service_servers") for name in names) and not served:
             self._find("parameters_absent", node)
         for server in served:
             if not server.can_be_called:

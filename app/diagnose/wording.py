@@ -14,6 +14,11 @@ _UNREACHABLE: Final = (
     "the bridge's file, `connect` in the Zenoh configuration"
 )
 
+_LOST: Final = (
+    "Restart its node. If that does not help, restart the bridge. The bridge loses the topics and "
+    "services of a node that was killed and restarted at once, about 20 s later (its issue 702)."
+)
+
 ERRORS: Final[Rows] = {
     # The panel file
     "panel_fault": (
@@ -123,8 +128,8 @@ ERRORS: Final[Rows] = {
         "Set `qos` in the panel file to what the robot's node has, or change the node.",
     ),
     "topic_unrouted": (
-        "The robot publishes {about}, but the bridge does not forward it.",
-        "Restart the node that publishes it. If that does not help, restart the bridge.",
+        "The robot has {about}, and the bridge does not forward it.",
+        _LOST,
     ),
     # Permissions
     "permission_no_publisher": (
@@ -148,6 +153,10 @@ ERRORS: Final[Rows] = {
     "service_absent": (
         "No node offers the service {about}.{hint}",
         "Start its node; compare name and namespace (`ros2 service list`).",
+    ),
+    "server_unrouted": (
+        "A node offers {about}, and the bridge does not forward it.",
+        _LOST,
     ),
     "service_type": (
         "The service {about} is {found} on the robot and {wanted} in the panel file.",

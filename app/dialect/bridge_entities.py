@@ -35,7 +35,7 @@ _NODE = re.compile(r"@/(?P<zid>[^/]+)/ros2/node/(?P<participant>[^/]+)/(?P<name>
 _DDS_TYPE = re.compile(r"(?P<package>\w+)::(?P<kind>msg|srv|action)::dds_::(?P<name>\w+)_")
 _HASH = re.compile(r"typehash=(RIHS\d\d_[0-9a-f]+)")
 _TOKEN_QOS = re.compile(
-    r"K?:(?P<reliable>[01]?):(?P<durability>[^:]*):(?:(?P<all>[01]?),?(?P<depth>\d*))(?::(?P<data>.*))?"
+    r"K?:(?P<reliable>[01]?):(?P<durability>[^:]*):(?:(?P<all>[01]?),?(?P<depth>\d{0,9}))(?::(?P<data>.*))?"
 )
 
 

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, Final, Literal, Protocol, TypeVar
 
-from app.interfaces.names import key_of
+from app.interfaces.names import MAX_NAME, key_of
+from app.printable import one_line
 
 CYCLONE_DDS: Final = "Cyclone DDS"
 CALLABLE: Final = ("", CYCLONE_DDS)  # of a server; "": its DDS is not known
 NEAR_MOST: Final = 3
+COMPARED_MOST: Final = 1000  # names whose spelling is compared with one
 
 RouteKind = Literal["topic", "service", "action"]
 # pub and srv: from the robot's nodes to Zenoh; sub and cli: from Zenoh to the robot's nodes.
@@ -36,9 +38,9 @@ class Bridge:
 
     @property
     def namespace(self) -> str:
-        """Like "/robot1"; "" for none."""
+        """Like "/robot1"; "" for none. One that can't be a namespace is in escapes."""
         given = self.config.get("namespace")
-        return given.rstrip("/") if isinstance(given, str) else ""
+        return one_line(given.rstrip("/"), MAX_NAME) if isinstance(given, str) else ""
 
     @property
     def domain(self) -> int | None:
@@ -248,4 +250,6 @@ def near(name: str, known: Iterable[str]) -> list[str]:
     names = list(known)
     last = name.rpartition("/")[2].lower()
     same = [one for one in names if one.rpartition("/")[2].lower() == last]
-    return list(dict.fromkeys([*same, *get_close_matches(name, names, NEAR_MOST)]))[:NEAR_MOST]
+    return list(dict.fromkeys([*same, *get_close_matches(name, names[:COMPARED_MOST], NEAR_MOST)]))[
+        :NEAR_MOST
+    ]

@@ -1,7 +1,7 @@
 """A draft of a panel from a robot's graph: what is shown on which page, and what acts on it."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -18,6 +18,14 @@ BOOL: Final = "std_msgs/msg/Bool"
 LEFT_OUT: Final = frozenset(
     ("/parameter_events", "/clock", "/tf", "/tf_static", "/robot_description", "/diagnostics_agg")
 )
+# Services that each node has, by the last part of their names (rcl_interfaces and others).
+SERVICES_OF_EVERY_NODE: Final = frozenset(
+    (
+        *("describe_parameters", "get_parameters", "get_parameter_types", "list_parameters"),
+        *("set_parameters", "set_parameters_atomically", "get_type_description"),
+        *("get_logger_levels", "set_logger_levels"),
+    )
+)
 MOST_PENS: Final = 4
 MOST_PAGES: Final = 8
 TREND_GAP_S: Final = 5  # the max_age_s of a trend that has none
@@ -28,7 +36,8 @@ TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", 
 class Known:
     """What was read of a robot: names without the panel's namespace. `samples` is a message of a topic,
     by its name, where one arrived; `periods` are seconds between messages of one that is published
-    regularly. `unreadable` are nodes whose parameters can't be read."""
+    regularly. `unreadable` are nodes whose parameters can't be read. `denied` are the names of topics
+    that the bridge's file holds back, `lost` those of topics and services that the bridge has lost."""
 
     topics: Sequence[Topic] = ()
     services: Sequence[Server] = ()
@@ -37,6 +46,8 @@ class Known:
     samples: Mapping[str, Any] = field(default_factory=dict)
     periods: Mapping[str, float] = field(default_factory=dict)
     unreadable: Sequence[str] = ()
+    denied: Collection[str] = ()
+    lost: Collection[str] = ()
 
 
 def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
@@ -45,7 +56,20 @@ def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
 
 
 def _is_public(topic: Topic) -> bool:
-    return topic.name not in LEFT_OUT and "/_" not in topic.name
+    return _is_public_name(topic.name)
+
+
+def _is_public_name(name: str) -> bool:
+    return name not in LEFT_OUT and "/_" not in name
+
+
+def lost_names(known: Known) -> list[str]:
+    """What a panel may have and the bridge has lost."""
+    return [name for name in known.lost if _is_public_name(name) and not _is_of_every_node(name)]
+
+
+def _is_of_every_node(service: str) -> bool:
+    return service.rpartition("/")[2] in SERVICES_OF_EVERY_NODE
 
 
 def make_draft(
@@ -66,11 +90,8 @@ def make_draft(
         entries += found
         if not found:
             remarks.append(_why_not(topic))
-    remarks += [
-        f"{topic.name}: `allow` or `deny` in the bridge's configuration holds it back"
-        for topic in known.topics
-        if not topic.announced and _is_public(topic)
-    ]
+    remarks += [f"{name}: {DENIED}" for name in known.denied if _is_public_name(name)]
+    remarks += [f"{name}: {LOST}" for name in lost_names(known)]
     for server in (*known.services, *known.actions):
         entries += _of_server(server, interfaces, remarks)
     for one in known.parameters:
@@ -81,6 +102,8 @@ def make_draft(
     return replace(base, interlocks=interlocks, pages=_pages(entries), remarks=remarks)
 
 
+DENIED: Final = "`allow` or `deny` in the bridge's configuration holds it back"
+LOST: Final = "the bridge does not forward it: restart its node, or else the bridge"
 CYCLONE_ONLY: Final = "the bridge reaches services on Cyclone DDS only (RMW_IMPLEMENTATION)"
 
 

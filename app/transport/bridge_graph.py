@@ -52,6 +52,7 @@ def ros_graph(answers: GraphAnswers) -> GraphSnapshot:
     by_namespace: defaultdict[str, list[Bridge]] = defaultdict(list)
     for bridge in bridges:
         by_namespace[bridge.namespace].append(bridge)
+    parts = _parts(parsed, answers)
     peers = [
         PeerEndpoint(
             zid=one.zid,
@@ -64,7 +65,7 @@ def ros_graph(answers: GraphAnswers) -> GraphSnapshot:
         if one.zid not in zids and one.zid != answers.zid and one.role in ("MP", "MS")
     ]
     robots = [
-        _Robot(namespace, tuple(found), parsed, answers).graph()
+        _Robot(namespace, tuple(found), parts).graph()
         for namespace, found in sorted(by_namespace.items())
     ]
     return GraphSnapshot(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
@@ -79,31 +80,54 @@ def _qos(of: DdsEntity | TokenQos) -> EndpointQos:
     )
 
 
+@dataclass(slots=True)
+class _BridgeParts:
+    """The answers and tokens of one bridge."""
+
+    tokens: list[tuple[str, Endpoint]] = field(default_factory=list)
+    nodes: list[tuple[str, Node]] = field(default_factory=list)  # with their participants
+    entities: list[DdsEntity] = field(default_factory=list)
+    routes: Answers = field(default_factory=list)
+
+
+def _parts(
+    tokens: Iterable[tuple[str, Endpoint]], answers: GraphAnswers
+) -> defaultdict[str, _BridgeParts]:
+    """Those of each bridge, by its zid."""
+    parts: defaultdict[str, _BridgeParts] = defaultdict(_BridgeParts)
+    for token, endpoint in tokens:
+        if endpoint.role is not None:
+            parts[endpoint.zid].tokens.append((token, endpoint))
+    for zid, participant, node in _nodes(answers.nodes):
+        parts[zid].nodes.append((participant, node))
+    for entity in (entities.entity_of(key, answer) for key, answer in answers.entities):
+        if entity is not None:
+            parts[entity.zid].entities.append(entity)
+    for key, answer in answers.routes:
+        parts[dialect.zid_of(key)].routes.append((key, answer))
+    return parts
+
+
 class _Robot:
-    """Builds the graph of one robot from its bridges' answers."""
+    """Builds the graph of one robot from the parts of its bridges."""
 
     def __init__(
-        self,
-        namespace: str,
-        bridges: tuple[Bridge, ...],
-        tokens: Iterable[tuple[str, Endpoint]],
-        answers: GraphAnswers,
+        self, namespace: str, bridges: tuple[Bridge, ...], parts: Mapping[str, _BridgeParts]
     ) -> None:
         self._namespace = namespace
         self._bridges = bridges
-        zids = {bridge.zid for bridge in bridges}
-        self._tokens = [(t, e) for t, e in tokens if e.zid in zids and e.role is not None]
+        own = [(bridge.zid, parts[bridge.zid]) for bridge in bridges]
+        self._tokens = [token for _, part in own for token in part.tokens]
         # (bridge, participant) → its nodes: a process may have several.
         self._nodes: defaultdict[tuple[str, str], list[Node]] = defaultdict(list)
-        for zid, participant, node in _nodes(answers.nodes):
-            if zid in zids:
+        for zid, part in own:
+            for participant, node in part.nodes:
                 self._nodes[zid, participant].append(node)
-        found = (entities.entity_of(key, answer) for key, answer in answers.entities)
-        self._entities = [one for one in found if one is not None and one.zid in zids]
+        self._entities = [entity for _, part in own for entity in part.entities]
         self._parts: defaultdict[tuple[str, str], list[DdsEntity]] = defaultdict(list)  # of servers
         for one in self._entities:
             self._parts[one.zid, one.name.partition(entities.ACTION_PART)[0]].append(one)
-        self._routes = [one for one in _routes(answers.routes, namespace) if one.bridge in zids]
+        self._routes = [route for _, part in own for route in _routes(part.routes, namespace)]
 
     def graph(self) -> RobotGraph:
         nodes = [node for several in self._nodes.values() for node in several]

@@ -9,12 +9,14 @@ from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.errors import LinkError
 from app.graph.model import GraphSnapshot
+from app.printable import one_line
 from app.transport.admin_space import GraphLink, ask_json
 from app.transport.bridge_graph import GraphAnswers, ros_graph
 
 ANNOUNCED_WITHIN_S: Final = 1.5
 ANSWERED_WITHIN_S: Final = 5.0
 POLL_S: Final = 0.02
+MOST_VERSION: Final = 40  # characters
 
 
 async def first_graph(link: GraphLink, zid: str) -> GraphSnapshot:
@@ -89,7 +91,7 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
             zid=zid,
             tokens=tokens,
             versions={
-                dialect.zid_of(key): version.decode(errors="replace").strip('"')
+                dialect.zid_of(key): one_line(version.decode(errors="replace").strip('"'), MOST_VERSION)
                 for key, version in versions
             },
             configs={dialect.zid_of(key): one for key, one in configs if isinstance(one, dict)},

@@ -18,6 +18,7 @@ from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
+from app.transport.token_query import TokenQuery
 from app.transport.zenoh_answers import collected, first_answer
 from app.transport.zenoh_config import endpoints_of, translated
 from app.transport.zenoh_publishers import declare_publisher
@@ -59,6 +60,7 @@ class ZenohSession:
         with translated("the Zenoh session can't be opened"):
             self._session = zenoh.open(self._config)
         self.zid = str(self._session.zid())
+        self._tokens = TokenQuery(self._session, self._dialect.tokens)
         atexit.register(self._leave)
 
     def start(self, declared: Declarations) -> None:
@@ -222,14 +224,7 @@ class ZenohSession:
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
         """The liveliness tokens of the ROS graph; LinkError if not all of them arrive in time."""
         with translated("can't ask for the ROS graph"):
-            liveliness = self._session.liveliness()
-            found, whole = await collected(
-                lambda callback: liveliness.get(self._dialect.tokens, callback, timeout=timeout_s),
-                timeout_s,
-            )
-        if not whole:
-            raise LinkError(f"the ROS graph did not come within {timeout_s:g} s")
-        return [key for key, _ in found]
+            return await self._tokens.keys(timeout_s)
 
     async def connected(self, within_s: float) -> bool:
         """Whether it has a connection to any other peer or router, or gets one in time."""

@@ -1,11 +1,13 @@
 """`operator-panel doctor` on broken set-ups of the real bridge and real nodes: each is named right, and
 nothing else is."""
 
+import json
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import pytest
 import zenoh
 
 from app.cli.command import main
+from app.cli.doctor import as_text
 from app.diagnose import link
 from app.diagnose.observation import Observation, observe
 from app.transport import bridge_graph_reader
@@ -34,6 +37,8 @@ from tests.diagnose.setups import (
 )
 from tests.support.cyclone import Client
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, publish_and_go, until
+from tests.support.processes import command
+from tests.support.processes.command import COMMAND
 
 TRIGGER = "std_srvs/srv/Trigger"
 LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
@@ -404,6 +409,55 @@ def test_a_bridge_that_is_there_and_does_not_respond(
     token = session.liveliness().declare_token(f"@/{session.zid()}/@ros2_lv")
     assert named(setup.findings(WELL, endpoint)) == [("bridge_silent", str(session.zid()))]
     token.undeclare()
+
+
+MANY = 1000
+WITHIN_S = 30  # on a busy machine; it was 75 s
+
+
+def test_a_thousand_false_bridges_are_a_few_lines_in_a_short_time(domain: int, setup: Setup) -> None:
+    """Half of them answer, each with a namespace of its own that would forge a line."""
+    with started(Bridge(domain + 4)) as bridge, false_bridges(bridge.endpoint):
+        with closing(Client(bridge.endpoint)) as client:
+            until(lambda: len(client.tokens()) >= MANY, "they are announced")
+        began = time.monotonic()
+        report = setup.diagnose(WELL, bridge.endpoint, listen_s=0.2).report
+        listed = command.run(COMMAND, "topics", "-v", "--connect", bridge.endpoint)
+        assert time.monotonic() - began < WITHIN_S
+    lines = as_text(report, verbose=True).splitlines()
+    assert report.count("error") >= MANY / 2
+    assert len(lines) < 400
+    for line in (*lines, *listed.stdout.splitlines(), *listed.stderr.splitlines()):
+        assert not line.startswith("error    forged")
+
+
+@contextmanager
+def false_bridges(endpoint: str) -> Iterator[None]:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{endpoint}"]')
+    zids = [f"{number:032x}" for number in range(1, MANY + 1)]
+
+    def answer(query: zenoh.Query) -> None:
+        part = str(query.key_expr).rpartition("/")[2]
+        for zid in zids[::2]:
+            namespace = json.dumps(f"/x{zid}\nerror    forged: by {zid}")
+            text = f'{{"namespace": {namespace}}}' if part == "config" else '"v1.10.2"'
+            query.reply(f"@/{zid}/ros2/{part}", text)
+        query.reply(f"@/{zids[1]}/ros2/{part}", "[" * 100_000)
+
+    with zenoh.open(config) as session:
+        held = [session.liveliness().declare_token(f"@/{zid}/@ros2_lv") for zid in zids]
+        held += [
+            session.liveliness().declare_token(f"@/{zid}/@ros2_lv/MP/x{zid}/a§msg§B/:1::0,10:")
+            for zid in zids
+        ]
+        answers = [
+            session.declare_queryable(f"@/*/ros2/{part}", answer) for part in ("version", "config")
+        ]
+        yield
+        assert held
+        assert answers
 
 
 def said(key: str, text: str) -> Callable[[zenoh.Query], None]:

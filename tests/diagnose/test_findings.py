@@ -6,7 +6,8 @@ from typing import Final
 
 import pytest
 
-from app.diagnose.findings import KINDS, Report
+from app.cli.doctor import as_text
+from app.diagnose.findings import KINDS, MOST_ALIKE, MOST_TEXT, Report
 from app.diagnose.observation import copies
 from app.robot.sample import Sample
 from app.settings import PACKAGE
@@ -50,6 +51,28 @@ def test_the_same_is_found_once_and_notes_do_not_count() -> None:
     assert report.is_well
     report.find("no_router", "there")
     assert not report.is_well
+
+
+def test_of_many_alike_some_are_listed_and_the_others_are_counted() -> None:
+    report = Report()
+    for number in range(1000):
+        report.find("bridge_silent", f"b{number}")
+        report.fact(f"checked b{number}")
+    report.find("no_router", "there")
+    lines = as_text(report).splitlines()
+    assert sum(line.startswith("error    bridge_silent") for line in lines) == MOST_ALIKE
+    assert lines[MOST_ALIKE] == f"         … and {1000 - MOST_ALIKE} more"
+    assert lines[-1] == "Something is wrong: 1001 errors, 1000 checks were passed."
+    assert len(report.facts) < 1000
+
+
+def test_a_text_of_a_robot_makes_no_line_and_has_a_limit() -> None:
+    report = Report()
+    report.find("bridge_namespace", theirs="/x\nerror    forged: by a robot\t", ours="y" * 10_000)
+    (line, *_) = as_text(report).splitlines()
+    assert line.startswith("error    bridge_namespace: The bridge has the namespace")
+    assert "/x\\u000aerror    forged: by a robot\\u0009" in line
+    assert len(line) < 2 * MOST_TEXT
 
 
 def test_what_a_robot_says_is_made_printable() -> None:

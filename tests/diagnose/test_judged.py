@@ -12,7 +12,6 @@ import pytest
 
 from app.cli.doctor import as_text
 from app.diagnose import link
-from app.diagnose.bridges import denies
 from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge, PanelRobot
@@ -20,11 +19,13 @@ from app.diagnose.observation import Observation
 from app.diagnose.permissions import check_permissions
 from app.diagnose.robot import check_copies
 from app.diagnose.topics import TopicChecks
+from app.graph.forwarding import denies
 from app.graph.model import (
     Bridge,
     BridgeRoute,
     EndpointQos,
     GraphSnapshot,
+    Node,
     RobotGraph,
     Server,
     Topic,
@@ -33,7 +34,18 @@ from app.graph.model import (
 from app.interfaces import load_interfaces
 from app.panel import load_panel
 from app.robot.sample import Sample
-from tests.diagnose.setups import BOOL, STRING, action, button, interlock, named, panel_of, readout
+from tests.diagnose.setups import (
+    BOOL,
+    STRING,
+    action,
+    button,
+    call,
+    interlock,
+    named,
+    panel_of,
+    parameter,
+    readout,
+)
 
 QOS = EndpointQos(reliable=True)
 BRIDGE = Bridge(zid="b1", version="v1.10.2", config={"namespace": "/", "domain": 0})
@@ -103,6 +115,42 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     assert report.codes() == []
 
 
+PARAMETERS = [f"/arm/{name}_parameters" for name in ("get", "describe", "set")]
+
+
+@pytest.mark.parametrize(
+    ("config", "code"),
+    [
+        ({}, "server_unrouted"),
+        ({"deny": {"service_servers": ".*", "action_servers": ".*"}}, "bridge_denies"),
+    ],
+)
+def test_servers_that_the_bridge_has_lost_or_denies(
+    config: dict[str, Any], code: str, tmp_path: Path
+) -> None:
+    here = robot(
+        tmp_path, panel_of(action("/count"), call("/home", "std_srvs/srv/Trigger"), parameter("/arm"))
+    )
+    node = Node(name="/arm", bridge="b1", services=("/home", *PARAMETERS), actions=("/count",))
+    bridge = replace(BRIDGE, config=config)
+    graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), nodes=(node,)),))
+    report = Report()
+    TopicChecks(report, NamesBehindBridge.of(here, graph), INTERFACES).check()
+    assert named(report.findings) == [(code, "/home"), (code, "/count"), (code, PARAMETERS[0])]
+
+
+def test_a_permission_that_the_bridge_has_lost_is_not_called_stale(tmp_path: Path) -> None:
+    here = robot(tmp_path, panel_of(interlock("/permission", max_age_s=1.0)))
+    lost = replace(topic("/permission", BOOL), announced=False)
+    behind = NamesBehindBridge.of(
+        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
+    )
+    report = Report()
+    check_permissions(report, behind, Observation(began=0.0, ended=5.0), INTERFACES)
+    TopicChecks(report, behind, INTERFACES).check()
+    assert named(report.findings) == [("topic_unrouted", "/permission")]
+
+
 @pytest.mark.parametrize(
     ("there", "words"),
     [("/wrods", " Did you mean /wrods?"), ("/cell/words", " Did you mean /cell/words?"), ("/tf", "")],
@@ -145,6 +193,8 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
         ({"deny": {"publishers": "^/wor.*$"}}, True),
         ({"deny": {"subscribers": "^/words$"}}, False),
         ({"deny": {"publishers": "^/(?<no python>"}}, True),
+        ({"deny": {"publishers": "^(/?w*)*$x"}}, True),  # it might take for ever
+        ({"deny": {"publishers": "^/.*/a.*b.*$|^/speed.*$"}}, False),
     ],
 )
 def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> None:

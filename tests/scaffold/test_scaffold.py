@@ -275,8 +275,19 @@ def test_a_value_looks_old_where_its_topic_is_published_regularly(tmp_path: Path
 
 
 def test_a_topic_that_the_bridge_holds_back_is_a_remark() -> None:
-    text = text_of(topics=[Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)])
+    held = Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
+    text = text_of(topics=[held], denied=["/x"])
     assert "# - /x: `allow` or `deny` in the bridge's configuration holds it back" in text
+
+
+def test_what_the_bridge_has_lost_is_a_remark_of_its_own() -> None:
+    held = Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
+    text = text_of(topics=[held], lost=["/x", "/home", "/plc/get_parameters", "/rosout/_hidden"])
+    remarks = [line for line in text.splitlines() if line.startswith("# - ")]
+    assert remarks == [
+        f"# - {name}: the bridge does not forward it: restart its node, or else the bridge"
+        for name in ("/x", "/home")
+    ]
 
 
 def test_two_types_on_one_topic_are_a_remark() -> None:

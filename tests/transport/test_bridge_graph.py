@@ -151,6 +151,12 @@ def test_each_namespace_is_a_robot_and_a_silent_bridge_is_in_the_graph() -> None
     )
 
 
+def test_a_token_with_a_depth_of_many_digits_has_none() -> None:
+    token = f"@/a/@ros2_lv/MP/speed/std_msgs§msg§Bool/:1::0,{'9' * 5000}:"
+    graph = ros_graph(GraphAnswers(tokens=["@/a/@ros2_lv", token]))
+    assert graph.robots[0].topics[0].publishers[0].qos.depth is None
+
+
 def test_a_route_of_the_bridge() -> None:
     answer = json.loads(
         '{"dds_reader":"01","local_nodes":["/io"],"remote_routes":["p:on"],"ros2_name":"/on",'

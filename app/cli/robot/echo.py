@@ -32,7 +32,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 async def _echo(given: Any) -> int:
     place = place_of(given)
     async with opened(place) as (observer, graph):
-        reader = TopicReader.find(observer, graph, place, given.topic, given.type or "")
+        reader = await TopicReader.find(observer, graph, place, given.topic, given.type or "")
         interfaces = await reader.interfaces(place)
         if given.field:
             interfaces.type_at(reader.type, given.field)

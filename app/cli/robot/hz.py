@@ -53,7 +53,7 @@ async def _measure(given: Any) -> int:
     place = place_of(given)
     rate = Rate(given.window)
     async with opened(place) as (observer, graph):
-        reader = TopicReader.find(observer, graph, place, given.topic)
+        reader = await TopicReader.find(observer, graph, place, given.topic)
         showing = asyncio.create_task(_show(rate))
         try:
             with suppress(TimeoutError):

@@ -8,13 +8,15 @@ import argparse
 import asyncio
 import os
 import sys
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from app.cli.arguments import seconds
+from app.diagnose.findings import Finding, few
+from app.dialect.endpoint import within
 from app.errors import KioskError, LinkError
 from app.graph.model import GraphSnapshot, RobotGraph, Topic, near
 from app.interfaces import DISTROS
@@ -37,10 +39,13 @@ ELSEWHERE_HINT: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where to look, by the command line: `namespace` is "" for all robots."""
+    """Where to look, by the command line: `namespace` is "" for all robots. `robots` are the namespaces
+    of the panel's robots, and `bridges` how many bridges they have at least; 0: one an endpoint."""
 
     zenoh: Path
     connect: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+    bridges: int = 0
     namespace: str = ""
     distro: str = DEFAULT_DISTRO
     interfaces: tuple[Path, ...] = ()
@@ -99,16 +104,23 @@ def place_of(given: Any) -> Place:
     settings = Settings.from_environment()
     connect, named = tuple(given.connect or ()), given.namespace
     distro, folders = given.distro, tuple(given.interfaces or ())
+    namespaces: tuple[str, ...] = ()
+    bridges = 0
     if given.panel is not None:
         panel = load_panel(given.panel)
         robots = panel.robots
-        connect = connect or tuple(dict.fromkeys(e for robot in robots for e in robot.connect))
+        if not connect:
+            connect = tuple(dict.fromkeys(e for robot in robots for e in robot.connect))
+            bridges = len({robot.connect for robot in robots if robot.connect})
+        namespaces = tuple(robot.namespace for robot in robots) or (panel.namespace,)
         if named is None:
             named = robots[0].namespace if len(robots) == 1 else panel.namespace
         distro, folders = distro or panel.distro, folders or panel.interfaces
     return Place(
         zenoh=given.zenoh or settings.zenoh,
         connect=connect,
+        robots=namespaces,
+        bridges=bridges,
         namespace=named or "",
         distro=distro or DEFAULT_DISTRO,
         interfaces=tuple(folders),
@@ -142,6 +154,12 @@ async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, GraphSnaps
         await observer.close()
 
 
+def absent_robots(graph: GraphSnapshot, place: Place) -> list[str]:
+    """The namespaces of the panel's robots without a bridge that answers."""
+    there = [one.namespace for one in graph.robots if any(bridge.answers for bridge in one.bridges)]
+    return [name for name in place.robots if not any(within(name, outer) for outer in there)]
+
+
 def full_name(robot: RobotGraph, name: str) -> str:
     """The name behind the namespace of the robot's bridge."""
     return f"{robot.namespace}{name}"
@@ -161,18 +179,34 @@ def check_namespace(graph: GraphSnapshot, below: str) -> None:
     """LinkError if no topic is below the namespace."""
     if below and not shown_topics(graph, below):
         robots = [robot.namespace for robot in graph.robots if robot.namespace]
-        hint = f": the bridges have {', '.join(robots)}" if robots else ": no bridge has a namespace"
+        hint = f": the bridges have {few(robots)}" if robots else ": no bridge has a namespace"
         raise LinkError(f"there are no topics below {below}{hint}")
 
 
-def topic_named(graph: GraphSnapshot, below: str, given: str) -> tuple[RobotGraph, Topic]:
+def report_lost(names: Sequence[str], code: str = "topic_unrouted") -> int:
+    """The exit status. Names that the bridge has lost are printed as the doctor's finding."""
+    if not names:
+        return 0
+    print(lost_text(few(names), code), file=sys.stderr, flush=True)
+    return GONE
+
+
+def lost_text(about: str, code: str = "topic_unrouted") -> str:
+    """The doctor's finding about what the bridge has lost, with what to do."""
+    lost = Finding(code, about)
+    return f"{lost.what} {lost.do}"
+
+
+def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGraph, Topic]:
     """The topic of this name; LinkError with similar names."""
-    check_namespace(graph, below)
-    known = shown_topics(graph, below)
+    check_namespace(graph, place.namespace)
+    known = shown_topics(graph, place.namespace)
     name = f"/{given.lstrip('/')}"
     if name not in known:
         close = near(name, known)
         hint = f"did you mean {' or '.join(close)}?" if close else "`operator-panel topics` lists them"
+        if absent := [name or "/" for name in absent_robots(graph, place)]:
+            hint = f"no bridge answers for the panel's namespace {', '.join(absent)}; {hint}"
         raise LinkError(f"no topic {name} is there: {hint}")
     return known[name]
 

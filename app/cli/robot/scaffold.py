@@ -1,6 +1,7 @@
 """`operator-panel scaffold [-o FILE]`: a first panel that fits the robot behind a bridge.
 
-Exit status: 0 it is written, 1 there is no robot, or the file exists, 2 a mistake on the command line.
+Exit status: 0 it is written, 1 there is no robot, the file exists, or the bridge has lost topics or
+services (the file is written without them), 2 a mistake on the command line.
 """
 
 import os
@@ -12,15 +13,16 @@ from typing import Any, Final
 from app.cli.arguments import seconds
 from app.cli.output import add_force, check_absent, draft_of
 from app.cli.parser import Parser
-from app.cli.robot.link import Place, add_options, check_namespace, ended, opened, place_of
+from app.cli.robot.link import Place, add_options, check_namespace, ended, opened, place_of, report_lost
 from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey
+from app.diagnose.findings import few
 from app.errors import KioskError
 from app.graph.model import GraphSnapshot, RobotGraph
 from app.interfaces import Interfaces, load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
-from app.scaffold.draft import Known, make_draft
+from app.scaffold.draft import Known, lost_names, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
@@ -47,7 +49,7 @@ async def _scaffold(given: Any) -> int:
     place = place_of(given)
     interfaces = load_interfaces(place.distro, place.interfaces)
     async with opened(place) as (observer, graph):
-        graph = await settled_graph(observer, graph)
+        graph = await settled_graph(observer, graph, place)
         check_namespace(graph, place.namespace)
         robot, below = robot_at(graph, place.namespace)
         known = await survey(observer, robot, below, interfaces, given.listen)
@@ -63,11 +65,11 @@ async def _scaffold(given: Any) -> int:
         )
     text = toml_text(draft, given.controls)
     if target is None:
-        print(text, end="")
-        return 0
-    _write(target, text, given.force)
-    print(*_summary(target, draft, given.controls), sep="\n", flush=True)
-    return 0
+        print(text, end="", flush=True)
+    else:
+        _write(target, text, given.force)
+        print(*_summary(target, draft, given.controls), sep="\n", flush=True)
+    return report_lost(lost_names(known))
 
 
 def _checked(known: Known, interfaces: Interfaces, base: Draft, target: Path | None) -> Draft:
@@ -76,7 +78,7 @@ def _checked(known: Known, interfaces: Interfaces, base: Draft, target: Path | N
         partial(make_draft, known, interfaces, base), partial(faults_of_text, folder=_folder(target))
     )
     if faults:
-        raise ScaffoldError(f"no panel can be made of this: {'; '.join(map(str, faults))}")
+        raise ScaffoldError(f"no panel can be made of this: {few([str(one) for one in faults])}")
     return draft
 
 
@@ -136,7 +138,8 @@ def make_parser(prog: str) -> Parser:
         prog=prog,
         description="Writes a first panel file that fits what is on a robot now: lamps, gauges, joints,"
         " cameras, tables, trends, the log; controls commented out.",
-        epilog="It only reads from the robot. Exit status: 1 there is no robot, or the file exists.",
+        epilog="It only reads from the robot. Exit status: 1 there is no robot, the file exists, or the"
+        " bridge has lost topics or services of a node: the file is written without them.",
     )
     add = parser.add_argument
     add(

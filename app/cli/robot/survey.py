@@ -1,7 +1,7 @@
 """What a scaffold is made of: a robot's topics, services, actions, parameters, samples: read once."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from app.cli.robot.topic_reader import endpoint_for
 from app.errors import DecodeError
+from app.graph.forwarding import lost_servers, lost_topics, topic_forwarding
 from app.graph.model import GraphSnapshot, RobotGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces
@@ -19,6 +20,7 @@ from app.transport.bridge_observer import BridgeObserver
 
 ARRIVALS: Final = 3  # of a topic, by which it is known how often it is published
 IRREGULAR: Final = 3.0  # the longest period of a regular topic, in its shortest one
+PARAMETERS_WITHIN_S: Final = 30.0  # of all nodes: one that does not answer takes 2 s
 JITTER_S: Final = 0.2
 
 
@@ -45,7 +47,15 @@ async def survey(
         samples={name: one.message for name, one in heard.items() if one.message is not None},
         periods={name: period for name, one in heard.items() if (period := one.period_s) is not None},
         unreadable=unreadable,
+        denied=_names(
+            (one.name for one in robot.topics if topic_forwarding(robot, one) == "denied"), below
+        ),
+        lost=_names((*(one.name for one in lost_topics(robot)), *lost_servers(robot)), below),
     )
+
+
+def _names(names: Iterable[str], below: str) -> list[str]:
+    return [name.removeprefix(below) for name in names if _is_below(name, below)]
 
 
 async def _parameters(
@@ -55,10 +65,12 @@ async def _parameters(
     found: list[NodeParameter] = []
     unreadable: list[str] = []
     bridges = {bridge.node for bridge in robot.bridges}
+    end = asyncio.get_running_loop().time() + PARAMETERS_WITHIN_S
     for node in robot.nodes:
         if not _is_below(node.name, below) or node.name in bridges:
             continue
-        of_node = await services.parameters(node)
+        late = asyncio.get_running_loop().time() > end
+        of_node = None if late else await services.parameters(node)
         if of_node is not None:
             found += [replace(one, node=one.node.removeprefix(below)) for one in of_node]
         elif robot.service(f"{node.name}/list_parameters") is not None:

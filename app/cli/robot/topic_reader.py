@@ -5,9 +5,11 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.cli.robot.link import Place, topic_named
+from app.cli.robot.link import Place, full_name, lost_text, shown_topics, topic_named
+from app.cli.robot.settled_graph import settled_graph
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import InterfaceError, LinkError
+from app.graph.forwarding import topic_forwarding
 from app.graph.model import GraphSnapshot, RobotGraph, Topic
 from app.graph.node_services import NodeServices
 from app.interfaces import Interfaces, load_interfaces
@@ -38,7 +40,7 @@ class TopicReader:
     type: str
 
     @classmethod
-    def find(
+    async def find(
         cls,
         observer: BridgeObserver,
         graph: GraphSnapshot,
@@ -46,12 +48,23 @@ class TopicReader:
         name: str,
         type_name: str = "",
     ) -> "TopicReader":
-        """LinkError for a topic that is not there or not passed on, and for one of several types."""
-        robot, topic = topic_named(graph, place.namespace, name)
-        if not topic.announced:
-            raise LinkError(
-                f"the bridge does not pass {topic.name} on: see `allow` and `deny` in its configuration"
-            )
+        """LinkError for a topic that is not there or not forwarded, and for one of several types. It is
+        waited for while a bridge may still announce it."""
+
+        def is_forwarded(graph: GraphSnapshot) -> bool:
+            found = shown_topics(graph, place.namespace).get(f"/{name.lstrip('/')}")
+            return found is not None and found[1].announced
+
+        graph = await settled_graph(observer, graph, place, is_forwarded)
+        robot, topic = topic_named(graph, place, name)
+        match topic_forwarding(robot, topic):
+            case "denied":
+                raise LinkError(
+                    f"the bridge does not forward {topic.name}: see `allow` and `deny` in its"
+                    " configuration"
+                )
+            case "lost":
+                raise LinkError(lost_text(full_name(robot, topic.name)))
         if type_name and type_name not in topic.types:
             raise LinkError(
                 f"{topic.name} is {' and '.join(topic.types)} on the robot, not {type_name}"

@@ -1,19 +1,34 @@
 """`operator-panel topics`: the topics of a robot through its bridge, as `ros2 topic list` shows them.
 
-Exit status: 0 they are listed, 1 there is no robot, 2 a mistake on the command line.
+Exit status: 0 they are listed, 1 there is no robot, or the bridge has lost topics of it, 2 a mistake on
+the command line.
 """
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 from app.cli.parser import Parser
-from app.cli.robot.link import add_options, check_namespace, ended, opened, place_of, shown_topics
+from app.cli.robot.link import (
+    add_options,
+    check_namespace,
+    ended,
+    opened,
+    place_of,
+    report_lost,
+    shown_topics,
+)
+from app.cli.robot.settled_graph import settled_graph
+from app.graph.forwarding import Forwarding, topic_forwarding
 from app.graph.model import RobotGraph, Topic, TopicEndpoint
-from app.printable import printable
+from app.printable import one_line
 
 PROG = "python -m app.cli topics"
+NOT_FORWARDED: Final[Mapping[Forwarding, str]] = {
+    "denied": "the bridge's `allow` or `deny` holds it back",
+    "lost": "the bridge has lost it",
+}
 Found = Mapping[str, tuple[RobotGraph, Topic]]
 
 
@@ -24,7 +39,8 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 async def _list(given: Any) -> int:
     place = place_of(given)
-    async with opened(place) as (_, graph):
+    async with opened(place) as (observer, graph):
+        graph = await settled_graph(observer, graph, place)
         check_namespace(graph, place.namespace)
         found = {
             name: one
@@ -37,8 +53,9 @@ async def _list(given: Any) -> int:
         print(json.dumps([_plain(name, *one) for name, one in found.items()], indent=1))
     else:
         for line in _lines(found, given.show_types, given.verbose):
-            print(printable(line))
-    return 0
+            print(one_line(line))
+    states = {name: topic_forwarding(*one) for name, one in found.items()}
+    return report_lost([name for name, state in states.items() if state == "lost"])
 
 
 def is_hidden(name: str) -> bool:
@@ -52,8 +69,8 @@ def _lines(found: Found, types: bool, verbose: bool) -> Iterator[str]:
         if verbose:
             for word, endpoints in (("publisher", topic.publishers), ("subscriber", topic.subscribers)):
                 yield from (f"  {word}: {_described(robot, one)}" for one in endpoints)
-            if not topic.announced:
-                yield "  not passed on: the bridge's `allow` or `deny` holds it back"
+            if words := NOT_FORWARDED.get(topic_forwarding(robot, topic)):
+                yield f"  not forwarded: {words}"
 
 
 def _described(robot: RobotGraph, one: TopicEndpoint) -> str:
@@ -67,6 +84,7 @@ def _plain(name: str, robot: RobotGraph, topic: Topic) -> dict[str, Any]:
         "namespace": robot.namespace,
         "types": topic.types,
         "passed_on": topic.announced,
+        "forwarding": topic_forwarding(robot, topic),
         "publishers": [asdict(one) for one in topic.publishers],
         "subscribers": [asdict(one) for one in topic.subscribers],
     }
@@ -76,7 +94,7 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Lists the topics of a robot, through its bridge and without ROS.",
-        epilog="Exit status: 0 they are listed, 1 there is no robot.",
+        epilog="Exit status: 0 they are listed, 1 there is no robot, or its bridge has lost topics.",
     )
     add = parser.add_argument
     add("-t", "--show-types", action="store_true", help="with their types")

@@ -1,12 +1,14 @@
 """How commands find a robot and a topic, and how often a topic is published."""
 
 import argparse
-from collections.abc import Sequence
+import asyncio
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.cli.robot import topic_reader
 from app.cli.robot.hz import Rate
 from app.cli.robot.link import Place, add_options, place_of, topic_named
 from app.cli.robot.topic_reader import TopicReader
@@ -21,12 +23,20 @@ def topic(name: str, *types: str, **more: Any) -> Topic:
     return Topic(name=name, key=name[1:], publishers=tuple(publishers), **more)
 
 
-def graph_of(*robots: tuple[str, Sequence[Topic]]) -> GraphSnapshot:
+def graph_of(
+    *robots: tuple[str, Sequence[Topic]], config: Mapping[str, Any] | None = None
+) -> GraphSnapshot:
     return GraphSnapshot(
         robots=tuple(
             RobotGraph(
                 namespace=namespace,
-                bridges=(Bridge(zid=namespace or "a", version="v1", config={"namespace": namespace}),),
+                bridges=(
+                    Bridge(
+                        zid=namespace or "a",
+                        version="v1",
+                        config={"namespace": namespace, **(config or {})},
+                    ),
+                ),
                 topics=tuple(topics),
             )
             for namespace, topics in robots
@@ -36,6 +46,10 @@ def graph_of(*robots: tuple[str, Sequence[Topic]]) -> GraphSnapshot:
 
 ONE = graph_of(("", [topic("/arm/enabled"), topic("/speed"), topic("/arm2/enabled")]))
 TWO = graph_of(("/r1", [topic("/speed")]), ("/r2", [topic("/speed"), topic("/load")]))
+
+
+def place_below(namespace: str) -> Place:
+    return Place(zenoh=Path("zenoh.json5"), namespace=namespace)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +65,7 @@ TWO = graph_of(("/r1", [topic("/speed")]), ("/r2", [topic("/speed"), topic("/loa
 def test_a_topic_is_found_by_its_name(
     graph: GraphSnapshot, below: str, given: str, robot: str, name: str
 ) -> None:
-    found, one = topic_named(graph, below, given)
+    found, one = topic_named(graph, place_below(below), given)
     assert (found.namespace, one.name) == (robot, name)
 
 
@@ -70,14 +84,15 @@ def test_a_topic_that_is_not_there_is_a_sentence(
     graph: GraphSnapshot, below: str, given: str, sentence: str
 ) -> None:
     with pytest.raises(LinkError) as caught:
-        topic_named(graph, below, given)
+        topic_named(graph, place_below(below), given)
     assert sentence in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("of", "type_name", "sentence"),
     [
-        (topic("/x", announced=False), "", "the bridge does not pass /x on: see `allow` and `deny`"),
+        (topic("/x", announced=False), "", "The robot has /x, and the bridge does not forward it."),
+        (topic("/secret", announced=False), "", "does not forward /secret: see `allow` and `deny`"),
         (topic("/x"), "std_msgs/msg/String", "/x is std_msgs/msg/Bool on the robot, not std_msgs"),
         (
             topic("/x", BOOL, "a/msg/B"),
@@ -86,11 +101,17 @@ def test_a_topic_that_is_not_there_is_a_sentence(
         ),
     ],
 )
-def test_a_topic_that_can_not_be_read_is_a_sentence(of: Topic, type_name: str, sentence: str) -> None:
+def test_a_topic_that_can_not_be_read_is_a_sentence(
+    of: Topic, type_name: str, sentence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def settled(observer: Any, graph: GraphSnapshot, *_: Any) -> GraphSnapshot:
+        return graph
+
+    monkeypatch.setattr(topic_reader, "settled_graph", settled)
     observer: Any = None
-    place = Place(zenoh=Path("zenoh.json5"))
+    graph = graph_of(("", [of]), config={"deny": {"publishers": "^/secret$"}})
     with pytest.raises(LinkError) as caught:
-        TopicReader.find(observer, graph_of(("", [of])), place, "/x", type_name)
+        asyncio.run(TopicReader.find(observer, graph, place_below(""), of.name, type_name))
     assert sentence in str(caught.value)
 
 
@@ -111,6 +132,7 @@ def test_a_panel_file_says_where_the_robot_is(tmp_path: Path) -> None:
     robot = '[[robot]]\nid = "a"\nname = "A"\nnamespace = "/r9"\nconnect = ["tcp/r9:7447"]\n'
     path.write_text(PANEL.replace('namespace = "/r7"\n', robot))
     found = given("--panel", str(path), "--distro", "jazzy")
+    assert (found.robots, found.bridges) == (("/r9",), 1)
     assert (found.namespace, found.distro, found.connect) == ("/r9", "jazzy", ("tcp/r9:7447",))
     assert given("--panel", str(path), "--connect", "tcp/x:1").connect == ("tcp/x:1",)
     with pytest.raises(PanelError):

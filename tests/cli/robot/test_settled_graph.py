@@ -1,15 +1,19 @@
 """A graph that is read once all of it is there."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.cli.robot.link import Place
 from app.cli.robot.settled_graph import settled_graph
 from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 
 LONG_S = 60.0
+PLACE = Place(zenoh=Path("zenoh.json5"))
 
 
 class Reader:
@@ -18,6 +22,7 @@ class Reader:
     def __init__(self, graphs: Sequence[GraphSnapshot]) -> None:
         self._graphs = list(graphs)
         self.read = 0
+        self.endpoints = ("tcp/127.0.0.1:7447",)
 
     async def graph(self) -> GraphSnapshot:
         self.read += 1
@@ -34,10 +39,15 @@ def graph_of(*topics: Topic, **config: Any) -> GraphSnapshot:
     return GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), topics=topics),))
 
 
-def settled(*graphs: GraphSnapshot, within_s: float = LONG_S) -> tuple[GraphSnapshot, int]:
+def settled(
+    *graphs: GraphSnapshot,
+    within_s: float = LONG_S,
+    place: Place = PLACE,
+    is_enough: Callable[[GraphSnapshot], bool] = lambda _: False,
+) -> tuple[GraphSnapshot, int]:
     """The graph, and how often it was read."""
     reader = Reader(graphs[1:] or graphs)
-    found = asyncio.run(settled_graph(reader, graphs[0], within_s, every_s=0.001))
+    found = asyncio.run(settled_graph(reader, graphs[0], place, is_enough, within_s, every_s=0.001))
     return found, reader.read
 
 
@@ -70,3 +80,20 @@ def test_what_the_bridges_file_holds_back_is_not_waited_for() -> None:
 def test_what_never_comes_is_waited_for_no_longer_than_told() -> None:
     graph = graph_of(topic("/a", announced=False))
     assert settled(graph, within_s=0.02)[0] == graph
+
+
+def test_a_graph_that_is_enough_is_not_read_again() -> None:
+    early = graph_of(topic("/a"), topic("/b", announced=False))
+    assert settled(early, WHOLE, is_enough=lambda graph: True) == (early, 0)
+    assert settled(early, WHOLE, is_enough=lambda graph: graph is WHOLE)[0] is WHOLE
+
+
+BEHIND = graph_of(topic("/c"), namespace="/r2")
+BOTH = GraphSnapshot(robots=(*WHOLE.robots, replace(BEHIND.robots[0], namespace="/r2")))
+
+
+@pytest.mark.parametrize("place", [replace(PLACE, robots=("/r1", "/r2")), replace(PLACE, bridges=2)])
+def test_each_bridge_that_the_panel_names_is_waited_for(place: Place) -> None:
+    early = BOTH.robots[1:] if place.robots else WHOLE.robots
+    assert settled(*[GraphSnapshot(robots=early)] * 3, BOTH, place=place)[0] == BOTH
+    assert settled(GraphSnapshot(robots=early), place=place, within_s=0.02)[0].robots == early
