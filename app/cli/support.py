@@ -11,13 +11,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from app.cli.doctor import add_options, as_json, options_of, settings_of
+from app.cli.doctor import add_options, options_of, settings_of
 from app.cli.output import OutputError, writing
 from app.cli.parser import Parser
-from app.diagnose.bundle import Part, Sources, journal, parts, write
+from app.diagnose.bundle import Part, Sources, parts, write
 from app.diagnose.doctor import diagnose
+from app.diagnose.journal import journal
 from app.errors import KioskError
 
+ONLY: Final = "Only names, numbers, codes and times that are known to be harmless: no texts, no values."
 PROG: Final = "python -m app.cli support"
 
 
@@ -34,7 +36,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(error, file=sys.stderr)
         return 2
     sources = Sources(environment=os.environ, journal=journal)
-    made = parts(settings, options, found, as_json(settings, found), sources)
+    made = parts(settings, options, found, sources)
     print(listed(made))
     if given.list:
         return 0
@@ -54,7 +56,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 def listed(made: Sequence[Part]) -> str:
     """What the bundle holds, a line for each file."""
     lines = [f"  {one.name:32} {_size(one.size):>8}  {one.about}" for one in made]
-    return "\n".join(["The bundle holds:", *lines, "Without passwords, tokens, keys and typed values."])
+    return "\n".join(["The bundle holds:", *lines, ONLY])
 
 
 def _size(count: int) -> str:
@@ -69,8 +71,8 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Collects what support needs to know in a zip file: panel, settings, versions, the"
-        " last hour of logs, state, ROS graph, metrics and the doctor's findings. It lists what the"
-        " file holds, and asks before it writes it.",
+        " last hour of logs, state, ROS graph, metrics and the doctor's findings, of all this only what"
+        " is known to be harmless. It lists what the file holds, and asks before it writes it.",
         epilog="Exit status: 0 written or listed, 1 it can't be written, 2 a mistake on the command"
         " line, or not wanted.",
     )

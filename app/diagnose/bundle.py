@@ -1,12 +1,10 @@
-"""The support bundle: a zip of what one who helps from afar needs to know. Without secrets, of a
-limited size, and listed before it is written."""
+"""The support bundle: a zip of what one who helps from afar needs to know. Only what is known to be
+harmless is in it, it is of a limited size, and listed before it is written."""
 
-import csv
-import io
 import json
 import os
+import re
 import shutil
-import subprocess
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,23 +13,28 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from app.audit.export import csv_chunks
-from app.audit.queries import Filter
+from app.audit.queries import Filter, Row, rows
+from app.diagnose.config_text import MOST_CHARS, harmless_text
 from app.diagnose.doctor import Diagnosis, Options
+from app.diagnose.harmless import PLACE, Rules, harmless, harmless_value
+from app.diagnose.harmless_entries import harmless_entry
+from app.diagnose.harmless_findings import harmless_report
+from app.diagnose.harmless_keys import GRAPH, PANEL, SETTINGS, VERSIONS, ZENOH
+from app.diagnose.journal import LAST_S, harmless_journal
 from app.diagnose.machine import MB, ask_server
-from app.diagnose.redaction import plain_without_secrets, without_secrets
 from app.diagnose.screen import displays
-from app.diagnose.versions import versions
+from app.diagnose.server_state import harmless_metrics, harmless_ready, harmless_snapshot
+from app.diagnose.versions import installed_version, versions
 from app.errors import LogError
-from app.settings import PREFIX, VARIABLES, Settings
+from app.settings import PACKAGE, PREFIX, VARIABLES, Settings, shipped_path
 
-LAST_S: Final = 3600.0  # of logs
 MOST_BYTES: Final = 4 * MB  # of one file; of a longer one the end is kept
-UNITS: Final = ("operator-panel*", "zenoh-bridge*")
-JOURNAL_S: Final = 20.0
+MOST_PRESSES: Final = 20_000  # rows of the operator's log
 TOO_LARGE: Final = f"left out: more than {MOST_BYTES} bytes"
 CUT: Final = "(the beginning is left out)\n"
-TYPED: Final = "values"  # the log's column with what operators typed in
+# The files of the data folder.
+_DATA: Final = re.compile(r"(?:operators-log|trends)\.sqlite3(?:-wal|-shm)?|server\.lock")
+ROWS_AT_ONCE: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,66 +52,68 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """Where parts come from; tests give others."""
+    """Where parts come from; tests give others. `journal` is as of `app.diagnose.journal`."""
 
     environment: Mapping[str, str]
-    journal: Callable[[], str]
+    journal: Callable[[], bytes]
 
 
-def journal(units: Sequence[str] = UNITS) -> str:
-    """The last hour of the units' lines; "" where there is no journal."""
-    program = shutil.which("journalctl")
-    if program is None:
-        return ""
-    named = [f"--unit={unit}" for unit in units]
-    options = ["--no-pager", "--quiet", "--output=short-iso", f"--since=-{LAST_S:.0f}s"]
-    try:
-        done = subprocess.run([program, *named, *options], capture_output=True, timeout=JOURNAL_S)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.decode(errors="replace")
-
-
-def parts(
-    settings: Settings, options: Options, found: Diagnosis, doctor: Mapping[str, Any], sources: Sources
-) -> list[Part]:
-    """The files, without secrets; what is not there is left out. `doctor` is what its `--json` says."""
+def parts(settings: Settings, options: Options, found: Diagnosis, sources: Sources) -> list[Part]:
+    """The files, without what may be a secret; what is not there is left out."""
+    report = harmless_report(found, installed_version())
     made = [
-        _json("doctor.json", "findings of `operator-panel doctor`", doctor),
-        _json("versions.json", "versions of the panel, its libraries and the system", versions()),
+        _json("doctor.json", "findings of `operator-panel doctor`", report),
+        _json("versions.json", "versions of the panel, its libraries and the system", _versions()),
         _json("settings.json", "KIOSK_ variables", _settings(settings, sources.environment)),
         _json("machine.json", "load, memory, disk and screens", _machine(settings, found)),
         *_files(settings),
-        *_logs(settings, found, sources),
+        text_part("logs/journal.txt", "the units' log", harmless_journal(sources.journal())),
+        *_operators_log(_data_folder(settings, found)),
         *_of_server(options, found),
         *(
-            _json(
-                f"graph{f'-{name}' if name else ''}.json", "ROS graph behind the bridges", asdict(graph)
-            )
+            _json(f"graph{f'-{name}' if name else ''}.json", "ROS graph", _graph(graph))
             for name, graph in found.graphs.items()
         ),
     ]
-    return [one for one in made if one.text]
+    return [part for part in made if part.text]
 
 
 def _json(name: str, about: str, value: Any) -> Part:
-    text = json.dumps(plain_without_secrets(value), indent=1, ensure_ascii=False, default=str)
+    text = json.dumps(value, indent=1, ensure_ascii=False, default=str)
     return Part(name, about, text if len(text) <= MOST_BYTES else json.dumps(TOO_LARGE))
 
 
 def text_part(name: str, about: str, text: str) -> Part:
-    """With the end of a long text."""
-    if len(text) > MOST_BYTES:  # from the beginning of a line: a key is not cut from its secret
-        end = text[-MOST_BYTES:]
-        text = CUT + end.partition("\n")[2]
-    return Part(name, about, without_secrets(text))
+    """With the end of a long text, from the beginning of a line."""
+    if len(text) > MOST_BYTES:
+        text = CUT + text[-MOST_BYTES:].partition("\n")[2]
+    return Part(name, about, text)
+
+
+def _graph(graph: Any) -> Any:
+    return harmless_value(asdict(graph), GRAPH)
+
+
+def _versions() -> dict[str, str]:
+    return {name: harmless(version, VERSIONS) for name, version in versions().items()}
 
 
 def _settings(settings: Settings, environment: Mapping[str, str]) -> dict[str, Any]:
-    """Nothing else of the environment."""
-    names = [PREFIX + name for name in VARIABLES]
-    given = {name: environment[name] for name in names if name in environment}
-    return {"environment": given, "in use": asdict(settings)}
+    """Which variables are set, and the settings in use. Nothing else of the environment."""
+    shipped = {PACKAGE / "panel.toml", shipped_path("zenoh.json5")}
+    files = {
+        name: "shipped" if path in shipped else harmless(str(path), PLACE)
+        for name in ("panel", "zenoh", "data")
+        if (path := getattr(settings, name)) is not None
+    }
+    return {
+        "set": [PREFIX + name for name in VARIABLES if PREFIX + name in environment],
+        "in use": harmless_value(asdict(settings), SETTINGS) | files,
+    }
+
+
+def _data_folder(settings: Settings, found: Diagnosis) -> Path:
+    return settings.data_folder(settings.mode or (found.panel.mode if found.panel else "live"))
 
 
 def _machine(settings: Settings, found: Diagnosis) -> dict[str, Any]:
@@ -119,63 +124,63 @@ def _machine(settings: Settings, found: Diagnosis) -> dict[str, Any]:
         facts["memory"] = Path("/proc/meminfo").read_text().splitlines()[:5]
     with suppress(OSError):
         facts["uptime_s"] = float(Path("/proc/uptime").read_text().split()[0])
-    folder = settings.data_folder(settings.mode or (found.panel.mode if found.panel else "live"))
+    folder = _data_folder(settings, found)
     with suppress(OSError):
         facts["disk"] = shutil.disk_usage(folder)._asdict()
     with suppress(OSError):
-        facts["data"] = {one.name: one.stat().st_size for one in folder.iterdir() if one.is_file()}
+        files = [file for file in folder.iterdir() if file.is_file()]
+        facts["data"] = {file.name: file.stat().st_size for file in files if _DATA.fullmatch(file.name)}
+        facts["other files"] = len(files) - len(facts["data"])
     facts["screens"] = [asdict(display) for display in displays()]
     return facts
 
 
 def _files(settings: Settings) -> Iterator[Part]:
-    named = (
-        ("panel", settings.panel, "the panel file"),
-        ("zenoh", settings.zenoh, "Zenoh configuration"),
+    files: tuple[tuple[str, Path, str, Rules], ...] = (
+        ("panel.toml", settings.panel, "the panel file, without its texts", PANEL),
+        ("zenoh.json5", settings.zenoh, "Zenoh configuration, known keys only", ZENOH),
     )
-    for kind, path, about in named:
-        with suppress(OSError):
-            text = path.read_text(encoding="utf-8", errors="replace")
-            yield text_part(f"{kind}/{path.name}", about, text)
+    for name, path, about, rules in files:
+        with suppress(OSError), path.open(encoding="utf-8", errors="replace") as file:
+            is_toml = path == settings.panel
+            yield text_part(name, about, harmless_text(file.read(MOST_CHARS), rules, is_toml))
 
 
-def _logs(settings: Settings, found: Diagnosis, sources: Sources) -> Iterator[Part]:
-    yield text_part("logs/journal.txt", "the units' log of the last hour", sources.journal())
-    folder = settings.data_folder(settings.mode or (found.panel.mode if found.panel else "live"))
+def _operators_log(folder: Path) -> Iterator[Part]:
     with suppress(LogError, OSError):
-        about = "operator's log of the last hour, without what was typed in"
-        yield text_part("logs/operators-log.csv", about, _operators_log(folder))
+        about = "operator's log, without values and texts"
+        lines = (json.dumps(harmless_entry(row)) for row in _presses(folder))
+        yield text_part("logs/operators-log.jsonl", about, "".join(f"{line}\n" for line in lines))
 
 
-def _operators_log(folder: Path) -> str:
-    """CSV, as the page of the log gives it, but for the values of inputs."""
-    since = int((time.time() - LAST_S) * 1000)
-    chunks = csv_chunks(folder, Filter(since=since, every=True), None)
-    rows = csv.DictReader(io.StringIO(b"".join(chunks).decode("utf-8-sig")))
-    names = [name for name in rows.fieldnames or () if name != TYPED]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, extrasaction="ignore")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+def _presses(folder: Path) -> list[Row]:
+    """The entries of the last hour, the oldest first."""
+    wanted, found = Filter(since=int((time.time() - LAST_S) * 1000), every=True), list[Row]()
+    while len(found) < MOST_PRESSES:
+        before = found[-1].entry.seq if found else None
+        more = rows(folder, wanted, before, ROWS_AT_ONCE)
+        found += more
+        if len(more) < ROWS_AT_ONCE:
+            break
+    return found[::-1]
 
 
 def _of_server(options: Options, found: Diagnosis) -> Iterator[Part]:
     """What a running server says; nothing without one."""
     if "server_running" not in found.report.codes():
         return
-    queries = [("readyz.json", "/readyz", "whether the server reaches the robot")]
-    robots = [f"/robots/{one.id}" for one in found.panel.robots] if found.panel else []
-    queries += [
-        (f"snapshot{base.replace('/', '-')}.txt", f"{base}/events?once=1", "what the pages show")
-        for base in robots or [""]
-    ]
-    queries.append(("metrics.txt", "/metrics", "metrics"))
-    for name, path, about in queries:
+
+    def ask(path: str) -> Any:
         answer = ask_server(options.host, options.port, path)
-        if answer is not None:
-            body = answer[1]
-            yield text_part(f"state/{name}", about, body if isinstance(body, str) else json.dumps(body))
+        return None if answer is None else answer[1]
+
+    ready = harmless_ready(ask("/readyz"))
+    yield _json("state/readyz.json", "whether the server reaches the robot", ready)
+    robots = [f"/robots/{robot.id}" for robot in found.panel.robots] if found.panel else []
+    for base in robots or [""]:
+        state = harmless_snapshot(str(ask(f"{base}/events?once=1")))
+        yield _json(f"state/snapshot{base.replace('/', '-')}.json", "states of widgets", state)
+    yield text_part("state/metrics.txt", "metrics", harmless_metrics(str(ask("/metrics"))))
 
 
 def write(file: Path, made: Sequence[Part]) -> int:

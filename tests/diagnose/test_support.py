@@ -1,4 +1,4 @@
-"""The support bundle: what it holds, what it does not, and that it asks."""
+"""The support bundle: what it holds, what it never holds, and that it asks."""
 
 import io
 import json
@@ -6,19 +6,36 @@ import os
 import sys
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from app.cli.command import main
-from app.diagnose.bundle import CUT, MOST_BYTES, Part, journal, text_part, write
-from app.diagnose.redaction import REMOVED, is_secret, plain_without_secrets, without_secrets
+from app.diagnose.bundle import CUT, Part, Sources, parts, text_part, write
+from app.diagnose.doctor import Diagnosis, Options
+from app.diagnose.findings import Report
+from app.diagnose.journal import MOST_BYTES as JOURNAL_BYTES
+from app.diagnose.journal import harmless_journal, journal
+from app.settings import Settings
+from tests.diagnose.secrets import FORMS, SECRET, secrets_in
 from tests.diagnose.setups import Setup, button, call, panel_of
 from tests.support.parts import ROOT, Bridge, Server, until, zenoh_file
 
-SECRET = "swordfish"
-INPUT = '[[page.widget]]\nid = "words"\nkind = "text"\nlabel = "Words"\n'
+TEXT = '[[page.widget]]\nid = "words"\nkind = "text"\nlabel = "Words"\nmax_length = 200\n'
+COUNT = '[[page.widget]]\nid = "amount"\nkind = "number"\nlabel = "Count"\nmin = 0\nmax = 9\n'
+NEEDED = {
+    "doctor.json",
+    "versions.json",
+    "settings.json",
+    "machine.json",
+    "panel.toml",
+    "zenoh.json5",
+    "logs/operators-log.jsonl",
+    "state/readyz.json",
+    "state/snapshot.json",
+    "state/metrics.txt",
+}
 
 
 @pytest.fixture
@@ -26,14 +43,29 @@ def setup(tmp_path: Path) -> Setup:
     return Setup(tmp_path)
 
 
+def panel_with_secrets() -> str:
+    """A good panel file with a secret in each of its texts and comments."""
+    say = button("/say").replace("message = {}", 'message = { data = "{words}" }')
+    more = button("/count", "std_msgs/msg/Int32").replace(
+        "message = {}", "message = { data = '{amount}' }"
+    )
+    texts = [
+        f"[[page.widget]]\nid = 'text{n}'\nkind = 'label'\nlabel = {json.dumps(form)}\n# {form}\n"
+        for n, form in enumerate(FORMS)
+    ]
+    return panel_of(TEXT, COUNT, say, more, *texts, more='mode = "demo"\n')
+
+
 @pytest.fixture
 def demo(setup: Setup) -> Iterator[Server]:
-    """A running server, whose operator typed something in."""
-    say = button("/say").replace("message = {}", 'message = { data = "{words}" }')
-    setup.panel.write_text(panel_of(INPUT, say, more='mode = "demo"\n') + f'# password = "{SECRET}"\n')
+    """A running server, whose operator typed secrets in: accepted ones, and some that were refused."""
+    setup.panel.write_text(panel_with_secrets())
     mine = Server(ROOT, KIOSK_PANEL=str(setup.panel))
     until(lambda: mine.widget("say")["enabled"], "open")
-    assert mine.press("say", inputs={"words": SECRET}).status_code == 200
+    for form in FORMS:
+        for widget, entry in (("say", "words"), ("count", "amount"), ("say", form)):
+            answer = mine.press(widget, inputs={entry: form})
+            assert answer.status_code in (200, 422), answer.text
     yield mine
     mine.end()
 
@@ -49,45 +81,98 @@ def command(setup: Setup, server: Server | None, *more: str) -> list[str]:
     return ["support", str(setup.panel), "--port", str(port), "--data", str(data), *more]
 
 
-def test_what_is_listed_is_what_it_holds_without_secrets(
-    setup: Setup,
-    demo: Server,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def journal_of(folder: Path, lines: Sequence[str], unit: str = "operator-panel.service") -> None:
+    """A program `journalctl` that prints lines as the real one does, the newest first."""
+    fields = [
+        {"__REALTIME_TIMESTAMP": f"{1795631090000000 + n}", "_SYSTEMD_UNIT": unit, "MESSAGE": line}
+        for n, line in enumerate(lines)
+    ]
+    (folder / "journal").write_text("".join(f"{json.dumps(one)}\n" for one in reversed(fields)))
+    program = folder / "journalctl"
+    program.write_text(f'#!/bin/sh\ncat "{folder}/journal"\n')
+    program.chmod(0o755)
+
+
+def test_no_secret_is_in_it_in_any_form_from_anywhere(
+    setup: Setup, demo: Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("KIOSK_HOSTS", "panel1.local")
-    monkeypatch.setenv("DATABASE_PASSWORD", SECRET)
+    monkeypatch.setenv("PATH", f"{setup.folder}:{os.environ['PATH']}")
+    for name in ("DATABASE_PASSWORD", "PGPASSWORD", "TOKEN", "apiKey"):
+        monkeypatch.setenv(name, SECRET)
+    shipped = (ROOT / "zenoh.json5").read_text()
+    login = f'auth: {{ usrpwd: {{ user: "{SECRET}", password: "{SECRET}" }} }},'
+    listed = "".join(
+        f"{json.dumps(form)}, [{json.dumps(form)}, [{json.dumps(form)}]], " for form in FORMS
+    )
+    comments = "".join(f"// {form}\n" for form in FORMS)
     zenoh = setup.folder / "zenoh.json5"
-    said = (ROOT / "zenoh.json5").read_text()
-    login = f'auth: {{ usrpwd: {{ user: "u", password: "{SECRET}" }} }},'
-    zenoh.write_text(said.replace("transport: {", "transport: {\n" + login, 1))
+    zenoh.write_text(
+        comments
+        + shipped.replace("transport: {", f"transport: {{\n{login}", 1)
+        .replace("endpoints: [", f"endpoints: [{listed}", 1)
+        .replace("scouting: {", f"secrets: [{listed}], scouting: {{", 1)
+    )
     path = setup.folder / "bundle.zip"
-    options = ["--zenoh", str(zenoh), "-o", str(path), "--yes"]
-    assert main(command(setup, demo, *options)) == 0
+    logged = demo.process.text.splitlines()
+    assert any(SECRET in line for line in logged)
+    journal_of(setup.folder, [*logged, *FORMS, *(f"[WARN] [1.5] [web_ui]: {form}" for form in FORMS)])
+    demo.http.get("/", params={"token": SECRET}, headers={"Referer": f"http://x/?password={SECRET}"})
+    assert main(command(setup, demo, "--zenoh", str(zenoh), "-o", str(path), "--yes")) == 0
     output = capsys.readouterr().out
-    found = files_of(path)
-    assert {line.split()[0] for line in output.splitlines() if line.startswith("  ")} == set(found)
-    assert set(found) - {"logs/journal.txt"} == {
-        "doctor.json",
-        "versions.json",
-        "settings.json",
-        "machine.json",
-        "panel/cell1.toml",
-        "zenoh/zenoh.json5",
-        "logs/operators-log.csv",
-        "state/readyz.json",
-        "state/snapshot.txt",
-        "state/metrics.txt",
-    }
-    assert [name for name, text in found.items() if SECRET in text] == []
-    assert REMOVED in found["panel/cell1.toml"]
-    assert json.loads(found["settings.json"])["environment"]["KIOSK_HOSTS"] == "panel1.local"
-    assert json.loads(found["versions.json"])["eclipse-zenoh"].startswith("1.")
-    assert json.loads(found["doctor.json"])["findings"][0]["code"] == "server_running"
-    assert ",say," in found["logs/operators-log.csv"]
-    assert "event: snapshot" in found["state/snapshot.txt"]
-    assert "# HELP" in found["state/metrics.txt"]
+    files = files_of(path)
+    assert secrets_in(files | {"output": output}) == []
+    assert {line.split()[0] for line in output.splitlines() if line.startswith("  ")} == set(files)
+    assert set(files) == NEEDED | {"logs/journal.txt"}
     assert path.stat().st_mode & 0o777 == 0o600
+
+    # What helps is there.
+    settings = json.loads(files["settings.json"])
+    assert "KIOSK_HOSTS" in settings["set"]
+    assert "panel1.local" in settings["in use"]["hosts"]
+    assert json.loads(files["versions.json"])["eclipse-zenoh"].startswith("1.")
+    doctor = json.loads(files["doctor.json"])
+    assert doctor["findings"][0]["code"] == "server_running"
+    assert doctor["findings"][0]["about"] == f"127.0.0.1 port {demo.port}"
+    entries = [json.loads(line) for line in files["logs/operators-log.jsonl"].splitlines()]
+    outcomes = {(one.get("widget"), one.get("outcome")) for one in entries}
+    assert {("say", "published"), ("count", "refused")} <= outcomes
+    sent = next(one for one in entries if one.get("outcome") == "published")
+    assert (sent["codes"], sent["parameters"]["topic"]) == (["published"], "/say")
+    refused = next(one for one in entries if one.get("outcome") == "refused")
+    assert "no_number" in refused["codes"]
+    assert json.loads(files["state/snapshot.json"])["widgets"]["say"]["enabled"] is True
+    assert json.loads(files["state/readyz.json"]) == {"ready": True, "robots": {}}
+    assert 'kiosk_presses_total{outcome="published"}' in files["state/metrics.txt"]
+    lines = files["logs/journal.txt"].splitlines()
+    assert len(lines) == len(logged) + 2 * len(FORMS)
+    assert lines[0].startswith("2026-11-25T18:24:50.000+00:00 operator-panel.service INFO ")
+    press = entries[-1]["press"]
+    assert any(f"INFO press {press} of " in line or f"WARN press {press} of " in line for line in lines)
+    assert 'topic = "/say"' in files["panel.toml"]
+    assert 'label = "(left out)"' in files["panel.toml"]
+    assert "lease: 2000, keep_alive: 4" in files["zenoh.json5"]
+    assert '"tcp/127.0.0.1:7447"' in files["zenoh.json5"]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_no_secret_of_a_broken_file_is_in_it(
+    setup: Setup, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor in the errors that tell what is wrong with it."""
+    zenoh = setup.folder / "zenoh.json5"
+    settings = Settings(panel=setup.panel, zenoh=zenoh, mode="live", data=setup.data)
+    options = Options(port=setup.port)
+    for panel in (f"{form}\n", f'title = "Cell"\n{form}\n', f'[[page]]\nid = "a"\n{form} = 1\n'):
+        settings.panel.write_text(panel_of(button("/say")) + panel)
+        settings.zenoh.write_text(f"{{ mode: 'peer', connect: {{ endpoints: [{form}] }}, {form} }}")
+        found = Diagnosis(report=Report())
+        found.report.find("zenoh_config", str(settings.zenoh), detail=form)
+        found.report.find("panel_fault", f"{form} (line 3)", detail=form)
+        found.report.find("panel_fault", f"page[0].{form}", detail=form)
+        sources = Sources(environment={"KIOSK_PANEL": form, "X": form}, journal=bytes)
+        made = parts(settings, options, found, sources)
+        assert secrets_in({part.name: part.text for part in made}) == []
 
 
 def test_the_graph_is_in_it(setup: Setup, domain: int, capsys: pytest.CaptureFixture[str]) -> None:
@@ -160,13 +245,21 @@ def test_the_journal_is_asked_for_the_last_hour_of_our_units(
     program.write_text('#!/bin/sh\necho "$@"\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    command = journal().split()
-    assert {"--unit=operator-panel*", "--unit=zenoh-bridge*", "--since=-3600s"} <= set(command)
+    words = journal().decode().split()
+    assert {"--unit=operator-panel*", "--unit=zenoh-bridge*", "--since=-3600s"} <= set(words)
 
 
-@pytest.mark.parametrize("line", ["x" * 99 + "\n", "a=b " * 24 + "\n", "key\n", '"' * 99 + "\n"])
-def test_of_a_long_log_the_end_is_kept(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    most = 400_000
+def test_a_journal_without_end_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "journalctl"
+    program.write_text("#!/bin/sh\nexec yes\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert len(journal()) == JOURNAL_BYTES
+    assert harmless_journal(journal()) == ""
+
+
+def test_of_a_long_log_the_end_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    most, line = 4_000, "x" * 99 + "\n"
     monkeypatch.setattr("app.diagnose.bundle.MOST_BYTES", most)
     part = text_part("logs/journal.txt", "", line * (2 * most // len(line)))
     assert part.text.startswith(CUT + line)
@@ -174,13 +267,9 @@ def test_of_a_long_log_the_end_is_kept(line: str, monkeypatch: pytest.MonkeyPatc
     assert most - len(line) <= part.size - len(CUT) <= most
 
 
-def test_a_line_without_end_is_left_out() -> None:
-    assert text_part("logs/journal.txt", "", "x" * (2 * MOST_BYTES)).text == CUT
-
-
 def test_without_a_journal_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    assert journal() == ""
+    assert journal() == b""
 
 
 def test_a_bundle_is_a_zip(tmp_path: Path) -> None:
@@ -189,41 +278,3 @@ def test_a_bundle_is_a_zip(tmp_path: Path) -> None:
     assert write(path, [Part("a/b.txt", "", "äöü")]) == path.stat().st_size
     assert files_of(path) == {"a/b.txt": "äöü"}
     assert path.stat().st_mtime >= began - 1
-
-
-SECRETS = "password pin user_pin tls_private_key apiToken Set-Cookie KIOSK_PIN_1 usrpwd"
-
-
-@pytest.mark.parametrize("key", SECRETS.split())
-def test_keys_of_secrets(key: str) -> None:
-    assert is_secret(key)
-
-
-@pytest.mark.parametrize("key", ["pinch", "spin", "tokenizer", "topic", "interlock", "author"])
-def test_keys_of_no_secrets(key: str) -> None:
-    assert not is_secret(key)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        f'password = "{SECRET}"',
-        f"password: '{SECRET}'",
-        f'{{"token":"{SECRET}", "x": 1}}',
-        f"KIOSK_PIN={SECRET} other",
-        f'pins = ["1234", "{SECRET}"]',
-        f"Authorization: Bearer {SECRET}",
-        f"http://user:{SECRET}@robot/",
-        f"-----BEGIN PRIVATE KEY-----\n{SECRET}\n-----END PRIVATE KEY-----",
-        f'listen_private_key_base64: "{SECRET}",',
-    ],
-)
-def test_secrets_are_taken_out_of_texts(text: str) -> None:
-    assert SECRET not in without_secrets(text)
-    assert REMOVED in without_secrets(text)
-
-
-def test_what_is_no_secret_stays() -> None:
-    text = 'topic = "/pin_state"\nspeed = 3\n# see http://robot/x\n[tls]\nlease: 2000,\n'
-    assert without_secrets(text) == text
-    assert plain_without_secrets({"a": [1, {"pin": 1}]}) == {"a": [1, {"pin": REMOVED}]}

@@ -1,0 +1,67 @@
+"""The doctor's findings for a support bundle: codes, and names that are known to be harmless."""
+
+import re
+from typing import Any, Final
+
+from app.diagnose.doctor import Diagnosis
+from app.diagnose.findings import KINDS, Finding
+from app.diagnose.harmless import (
+    ADDRESS,
+    ENDPOINT,
+    HEX,
+    LEFT_OUT,
+    PLACE,
+    ROS_NAME,
+    harmless,
+    words,
+)
+from app.diagnose.harmless_keys import DETAILS, PANEL
+from app.i18n.catalogue import files
+
+_PORT: Final = re.compile(rf"(?:{ADDRESS.pattern}) port \d{{1,5}}")
+_SCREEN: Final = re.compile(r"(?:HDMI|DP|eDP|DVI|VGA|DSI|LVDS)(?:-[A-Z0-9]{1,3}){1,2}")
+_ABOUT: Final = (ENDPOINT, ROS_NAME, HEX, PLACE, _PORT, _SCREEN, words(" ".join(files())))
+# The place of a fault in the panel file: "page[0].widget[2].topic (line 5)".
+_PART: Final = re.compile(r"([A-Za-z0-9_\-]+)((?:\[\d{1,6}\])?)")
+_LINE: Final = re.compile(r" \(line \d{1,7}\)")
+OF_THE_FILE: Final = ("panel_fault", "type_unknown")
+
+
+def harmless_report(found: Diagnosis, version: str) -> dict[str, Any]:
+    report = found.report
+    return {
+        "version": version,
+        "well": report.is_well,
+        "passed": len(report.facts),
+        "findings": [_finding(one) for one in report.findings],
+    }
+
+
+def _finding(one: Finding) -> dict[str, str]:
+    about = _place(one.about) if one.code in OF_THE_FILE else _names(one.about, *_ABOUT)
+    details = {
+        name: _names(str(value), rule) if (rule := DETAILS.get(name)) else LEFT_OUT
+        for name, value in one.details.items()
+    }
+    what = KINDS[one.code].what.format(about=about, **details)
+    shown = {"severity": one.severity, "code": one.code, "about": about}
+    return shown | {"robot": one.robot, "what": what}
+
+
+def _names(text: str, *expected: re.Pattern[str]) -> str:
+    """Each of the names if one of the rules expects it."""
+    shown = []
+    for name in text.split(", "):
+        kept = (harmless(name, rule) for rule in expected)
+        shown.append(next((one for one in kept if one != LEFT_OUT), LEFT_OUT))
+    return ", ".join(shown)
+
+
+def _place(text: str) -> str:
+    """A place in the panel file, as far as its keys are those of panel files."""
+    line = _LINE.search(text)
+    parts = []
+    for part in text[: line.start() if line else None].split("."):
+        key = _PART.fullmatch(part)
+        parts.append(part if key is not None and key[1] in PANEL else LEFT_OUT)
+    return ".".join(parts) + (line[0] if line else "")
