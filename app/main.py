@@ -56,6 +56,7 @@ from app.web.routes import (
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, urls
+from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
 
@@ -104,6 +105,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
     app.add_middleware(LanguageHeaders)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(RequestGuard, hosts=settings.hosts)
+    app.add_middleware(Turns)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(ReadableStartupErrors)

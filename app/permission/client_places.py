@@ -43,6 +43,18 @@ class ClientPlaces:
         self._taken: Counter[str] = Counter()
         self._total = 0
 
+    @property
+    def empty(self) -> bool:
+        """Whether no place is taken."""
+        return not self._total
+
+    def most(self, client: str) -> int:
+        """How many places the client may have: its own share where it has that, else that of all."""
+        limits, kiosk = self.limits, client in KIOSK
+        if self.client_full(client):
+            return limits.kiosk if kiosk else limits.client
+        return limits.total if kiosk else limits.others
+
     def client_full(self, client: str) -> bool:
         """Whether the client has all places that it may have."""
         return self._taken[client] >= (self.limits.kiosk if client in KIOSK else self.limits.client)

@@ -16,13 +16,14 @@ from typing import Final
 from app.errors import LinkError, TooMany
 from app.i18n import TextLike, say
 from app.panel.widgets.camera import Camera
+from app.permission.client_places import ClientPlaces, PlaceLimits
 from app.robot.camera_topic import CameraTopicState
 from app.robot.pictures import NoPicture, Picture, picture
 from app.robot.sample import Buffer
 from app.transport.peer import RobotContext
 
 LINGER_S: Final = 6.0  # a page without scripts requests the next frame after five seconds
-VIEWERS_MOST: Final = 32  # of one topic
+VIEWERS: Final = PlaceLimits(total=32, others=28, client=12, kiosk=16)  # of one topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +80,7 @@ class Feed:
         self._changed = context.changed
         self._update_tokens = update_tokens
         self._loop = asyncio.get_running_loop()
-        self._viewers = 0
+        self._viewers = ClientPlaces(VIEWERS)
         self._closing: asyncio.TimerHandle | None = None
         self._newest: Frame | None = None  # set on the link's thread
         self._state = CameraTopicState()
@@ -88,17 +89,18 @@ class Feed:
         self._encoding: tuple[Frame, asyncio.Task[Picture]] | None = None
 
     @contextmanager
-    def subscribed(self) -> Iterator[None]:
-        """Keeps the topic subscribed to during the block, and `LINGER_S` longer."""
-        if self._viewers >= VIEWERS_MOST:
-            raise TooMany(say("camera_lookers", most=VIEWERS_MOST), 5)
-        self._viewers += 1
+    def subscribed(self, client: str) -> Iterator[None]:
+        """Keeps the topic subscribed to during the block, and `LINGER_S` longer. `client` is that of
+        `client_key`; TooMany if no more of its viewers may look."""
+        if not self._viewers.has_place(client):
+            raise TooMany(say("camera_lookers", most=self._viewers.most(client)), 5)
+        self._viewers.take(client)
         self._subscribe()
         try:
             yield
         finally:
-            self._viewers -= 1
-            if not self._viewers and self._robot.camera_topics.get(self._key) is self._state:
+            self._viewers.release(client)
+            if self._viewers.empty and self._robot.camera_topics.get(self._key) is self._state:
                 self._closing = self._loop.call_later(LINGER_S, self.close)
 
     async def newer(self, than: int) -> Frame:

@@ -8,6 +8,7 @@ from fastapi import Request
 from fastapi.responses import Response
 from starlette.requests import HTTPConnection
 
+from app.permission.client_places import client_key
 from app.permission.clients import TOKEN, anonymous, new_client, new_token
 from app.permission.principal import Principal
 from app.web.app_state import AppState
@@ -35,6 +36,11 @@ def caller(request: HTTPConnection) -> Caller:
     token = request.cookies.get(COOKIE, "")
     address = request.client.host if request.client else ""
     return Caller(token if TOKEN.fullmatch(token) else "", address)
+
+
+def client_of(connection: HTTPConnection) -> str:
+    """The client of a connection by its address, for limits."""
+    return client_key(connection.client.host if connection.client else "")
 
 
 def principal_of(request: HTTPConnection, state: AppState) -> Principal:

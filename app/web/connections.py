@@ -4,7 +4,6 @@ places for the kiosk's own browser."""
 
 import asyncio
 import logging
-import math
 import resource
 from typing import ClassVar, Final, cast
 
@@ -21,7 +20,6 @@ HEAD_MOST: Final = 65_536  # bytes after those that came with its first one
 CONNECTIONS_MOST: Final = 2000
 FILES_WANTED: Final = 4096  # as the unit's LimitNOFILE
 FILES_KEPT: Final = 200  # for all that is no connection
-WARN_EVERY_S: Final = 60.0
 
 
 class Connection(HttpToolsProtocol):
@@ -33,7 +31,6 @@ class Connection(HttpToolsProtocol):
 
     places: ClassVar = ClientPlaces(shares(CONNECTIONS_MOST))
     waiting: ClassVar[dict["Connection", None]] = {}  # for their first head, the oldest first
-    warned_at: ClassVar[float] = -math.inf
 
     client_transport: ClientTransport
     client_id: str
@@ -48,7 +45,8 @@ class Connection(HttpToolsProtocol):
         super().connection_made(cast(asyncio.Transport, own))
         self.client_id = client_key(self.client[0] if self.client else "")
         if not self.places.has_place(self.client_id):
-            self._warn()
+            where = self.client[0] if self.client else "a local socket"
+            log.warning("too many connections: one closed for one from %s", where)
             if not self._displace():
                 own.close_now()
                 return
@@ -137,13 +135,6 @@ class Connection(HttpToolsProtocol):
                 other.client_transport.close_now()
                 return True
         return False
-
-    def _warn(self) -> None:
-        now = self.loop.time()
-        if now - Connection.warned_at >= WARN_EVERY_S:
-            Connection.warned_at = now
-            where = self.client[0] if self.client else "a local socket"
-            log.warning("too many connections (%d): closed one from %s", len(self.connections), where)
 
 
 def connections_most() -> int:

@@ -11,7 +11,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import JSONResponse
+from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.printable import printable
@@ -53,22 +53,11 @@ class RequestGuard:
             await self._app(scope, receive, send)
             return
 
-        async def send_secured(message: Message) -> None:
-            if message["type"] in STARTS:
-                headers = MutableHeaders(scope=message)
-                document = not headers.get("content-type", "").startswith(NO_DOCUMENTS)
-                for name, value in (SECURITY_HEADERS if document else FOR_ALL).items():
-                    headers.setdefault(name, value)
-            await send(message)
-
         why = self._refusal(scope)
-        answer = self._app if why is None else JSONResponse({"error": printable(why)}, status_code=403)
-        if why is not None and scope["type"] == "websocket":
-            await receive()  # its wish to connect
-            if "websocket.http.response" not in scope.get("extensions", {}):
-                await send({"type": "websocket.close", "code": POLICY_VIOLATION, "reason": ""})
-                return
-        await answer(scope, receive, send_secured)
+        if why is None:
+            await self._app(scope, receive, secured(send))
+        else:
+            await refuse(JSONResponse({"error": printable(why)}, status_code=403), scope, receive, send)
 
     def _refusal(self, scope: Scope) -> str | None:
         headers = Headers(scope=scope)
@@ -88,6 +77,30 @@ class RequestGuard:
             if _host_of(origin) != host:
                 return f'a page of "{origin}" asked for this'
         return None
+
+
+def secured(send: Send) -> Send:
+    """`send` with the security headers."""
+
+    async def send_secured(message: Message) -> None:
+        if message["type"] in STARTS:
+            headers = MutableHeaders(scope=message)
+            document = not headers.get("content-type", "").startswith(NO_DOCUMENTS)
+            for name, value in (SECURITY_HEADERS if document else FOR_ALL).items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return send_secured
+
+
+async def refuse(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:
+    """Answers a request, or the opening of a WebSocket, which is closed where the server can't."""
+    if scope["type"] == "websocket":
+        await receive()  # its connection request
+        if "websocket.http.response" not in scope.get("extensions", {}):
+            await send({"type": "websocket.close", "code": POLICY_VIOLATION, "reason": ""})
+            return
+    await answer(scope, receive, secured(send))
 
 
 def _host_of(origin: str) -> str | None:

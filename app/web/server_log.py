@@ -10,7 +10,7 @@ from typing import Final
 from app.repeated_records import RepeatedRecords
 
 # asyncio logs what fails below a connection, such as a TLS handshake.
-LOGGERS: Final = ("uvicorn.error", "asyncio", "kiosk.web")
+LOGGERS: Final = ("uvicorn.error", "asyncio", "kiosk.connections", "kiosk.web")
 COUNT_EVERY_S: Final = 5.0
 # uvicorn's and websockets' words → ours, for faults of a client.
 CLIENT_FAULTS: Final[Mapping[str, str]] = {

@@ -247,8 +247,7 @@ def test_other_machines_leave_places_for_the_kiosk(hasty: Server) -> None:
         with opened(hasty) as kiosk:
             kiosk.sendall(HEAD + b"\r\n")
             assert kiosk.recv(65_536).startswith(b"HTTP/1.1 200 ")
-        assert hasty.process.count("too many connections") == 1
-    assert hasty.process.count("closed one from 127.0.0.")
+    assert hasty.process.count("too many connections: one closed for one from 127.0.0.")
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1", ELSEWHERE], ids=["the kiosk", "another"])

@@ -17,7 +17,7 @@ import logging
 from contextlib import suppress
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Query, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 
 from app.clock import format_time
@@ -28,6 +28,7 @@ from app.panel.widgets.camera import Camera
 from app.robot.pictures import NoPicture, Picture
 from app.runtime.frames import Feed, Frame
 from app.web.app_state import CurrentSession, CurrentState
+from app.web.client_cookie import client_of
 from app.web.language import language_of
 from app.web.openapi_parts import Described, errors
 from app.web.request_body import received
@@ -39,7 +40,9 @@ router = APIRouter()
 FIRST_WITHIN_S: Final = 2.0  # for the first picture of a topic that no browser showed
 AFTER_WITHIN_S: Final = 10.0
 BAD_PAUSE_S: Final = 0.2  # between two pictures that can't be shown
+SILENT_S: Final = 10.0  # without a request while none is open
 TRY_AGAIN_LATER: Final = 4429  # 4000 + HTTP's
+SILENT: Final = 4408
 IMAGES: Final[Described] = {
     200: {
         "content": {
@@ -57,11 +60,11 @@ IMAGES: Final[Described] = {
     responses=errors(403, 404, 422, 429) | IMAGES,
 )
 async def frame(
-    widget: str, session: CurrentSession, after: Annotated[int, Query(ge=0)] = 0
+    widget: str, request: Request, session: CurrentSession, after: Annotated[int, Query(ge=0)] = 0
 ) -> Response:
     camera = session.panel.widget(widget, Camera)
     feed = session.frames.feed(camera)
-    with feed.subscribed():
+    with feed.subscribed(client_of(request)):
         try:
             async with asyncio.timeout(AFTER_WITHIN_S if after else FIRST_WITHIN_S):
                 shown, picture = await _next(feed, camera, after)
@@ -106,19 +109,37 @@ class _FrameSocket:
         self._feed = feed
         self._camera = camera
         self._requested = asyncio.Event()
+        self._waits = False  # for the picture that it asked for
         self._language = language_of(socket)
 
     async def run(self) -> None:
         """Sends frames until the browser closes the WebSocket."""
-        with self._feed.subscribed():
-            writing = spawn_logged(self._write(), log, "sending pictures failed")
+        with self._feed.subscribed(client_of(self._socket)):
+            writing = spawn_logged(self._send_pictures(), log, "sending pictures failed")
             try:
-                while (message := await received(self._socket))["type"] == "websocket.receive":
-                    if message.get("text"):
-                        self._requested.set()
+                while await self._read():
+                    pass
             finally:
                 writing.cancel()
                 await asyncio.gather(writing, return_exceptions=True)
+
+    async def _read(self) -> bool:
+        """Receives a request; False at the end. A browser that asks for nothing has no place here."""
+        try:
+            async with asyncio.timeout(SILENT_S):
+                message = await received(self._socket)
+        except TimeoutError:
+            if not self._waits:
+                await self._socket.close(SILENT)
+            return self._waits
+        if message.get("text"):
+            self._waits = True
+            self._requested.set()
+        return bool(message["type"] == "websocket.receive")
+
+    async def _send_pictures(self) -> None:
+        with suppress(WebSocketDisconnect):
+            await self._write()
 
     async def _write(self) -> None:
         """Sends the newest picture each time that one is asked for, not too often."""
@@ -135,4 +156,5 @@ class _FrameSocket:
             }
             await self._socket.send_text(json.dumps(about))
             await self._socket.send_bytes(picture.data)
+            self._waits = self._requested.is_set()
             await asyncio.sleep(due - loop.time())

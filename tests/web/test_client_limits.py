@@ -1,0 +1,231 @@
+"""What one client takes, others still have: requests, pictures and connections, while a hold goes on.
+
+Another machine is another loopback address here: the kiosk's own is 127.0.0.1 and no other.
+"""
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Final
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.protocol import State
+from websockets.sync.client import ClientConnection, connect
+
+from app.runtime.frames import VIEWERS
+from app.web.turns import READ_QUOTA
+from tests.support.holds import PANEL
+from tests.support.parts import ENOUGH_S, ROOT, Server, until
+from tests.support.servers import demo_server
+from tests.web.test_hold_socket import Socket, held
+
+KIOSK: Final = "127.0.0.1"
+OTHER: Final = "127.0.0.2"
+ANOTHER: Final = "127.0.0.3"
+ATTACK_S: Final = 3.0
+# As many widgets as a large page has, and a camera.
+LARGE: Final = (
+    PANEL
+    + "".join(
+        f"""
+[[page.widget]]
+id = "value_{number}"
+kind = "readout"
+label = "Value {number}"
+topic = "/value_{number}"
+type = "std_msgs/msg/Float64"
+field = "data"
+"""
+        for number in range(150)
+    )
+    + """
+[[page.widget]]
+id = "view"
+kind = "camera"
+label = "View"
+topic = "/view"
+type = "sensor_msgs/msg/CompressedImage"
+"""
+)
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with demo_server(
+        tmp_path_factory.mktemp("cell"), LARGE, app="tests.support.apps.permitted:app"
+    ) as mine:
+        yield mine
+
+
+def client(server: Server, address: str) -> httpx.Client:
+    """An HTTP client at an address."""
+    transport = httpx.HTTPTransport(local_address=address)
+    return httpx.Client(base_url=server.url, transport=transport, timeout=ENOUGH_S)
+
+
+@contextmanager
+def flooding(
+    server: Server, address: str, path: str, connections: int = 20
+) -> Iterator[dict[str, int]]:
+    """A client asks as fast as it can for `ATTACK_S`; the answers by status are there at the end."""
+    words = ["-m", "tests.support.flood", str(server.port), address, path, str(connections)]
+    command = [sys.executable, *words, str(ATTACK_S)]
+    answers: dict[str, int] = {}
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as attacker:
+        yield answers
+        assert attacker.stdout is not None
+        answers.update(json.loads(attacker.stdout.read()))
+    assert attacker.returncode == 0
+
+
+@contextmanager
+def a_hold_that_lasts(server: Server) -> Iterator[None]:
+    """A hold that is kept, from another process's point of view by a browser, during the block."""
+    with held(server) as hold:
+        ends: list[str] = []
+        over = threading.Event()
+
+        def keep() -> None:
+            while not over.wait(0.08):
+                said = hold.beat()
+                if said["state"] != "held":
+                    ends.append(said["code"])
+                    return
+
+        keeping = threading.Thread(target=keep)
+        keeping.start()
+        try:
+            yield
+        finally:
+            over.set()
+            keeping.join()
+        assert ends == []
+        assert server.widget("jog")["held"] is True
+        release(hold)
+
+
+def release(hold: Socket) -> None:
+    hold.say(do="end", why="released", lease=hold.lease)
+    assert hold.hear()["state"] == "ended"
+
+
+def page_s(server: Server, address: str = KIOSK) -> float:
+    """How long a page takes."""
+    began = time.monotonic()
+    with client(server, address) as browser:
+        answer = browser.get("/", headers={"accept": "text/html"})
+    assert (answer.status_code, "Value 149" in answer.text) == (200, True)
+    return time.monotonic() - began
+
+
+FLOODS: Final = [
+    "/",
+    "/log",
+    "/events?once=1",
+    "/openapi.json",
+    "/metrics",
+    "/none",
+    "POST /widgets/none",
+]
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("path", FLOODS)
+@pytest.mark.parametrize("address", [KIOSK, OTHER], ids=["at the kiosk", "elsewhere"])
+def test_a_hold_lives_through_twenty_connections_that_ask_without_a_pause(
+    cell: Server, address: str, path: str
+) -> None:
+    with a_hold_that_lasts(cell), flooding(cell, address, path) as answers:
+        time.sleep(ATTACK_S / 4)
+        assert page_s(cell) < 2
+        assert page_s(cell, ANOTHER) < 2
+    assert sum(answers.values()) > 10, answers
+
+
+def test_a_client_with_too_many_requests_is_told_when_to_ask_again(cell: Server) -> None:
+    with client(cell, OTHER) as program, client(cell, ANOTHER) as another:
+        refused = None
+        for _ in range(int(READ_QUOTA.burst + 20 * READ_QUOTA.per_s)):
+            answer = program.get("/healthz")
+            if answer.status_code == 429:
+                refused = answer
+                break
+        assert refused is not None
+        assert refused.headers["retry-after"] == "1"
+        assert refused.json()["error"].startswith("Too many requests from this device")
+        assert refused.headers["x-content-type-options"] == "nosniff"
+        page = program.get("/", headers={"accept": "text/html", "accept-language": "en"})
+        assert (page.status_code, page.headers["refresh"]) == (429, "2")
+        assert page.text.startswith("Too many requests")
+        assert another.get("/healthz").status_code == 200
+        assert cell.http.get("/healthz").status_code == 200
+        assert cell.process.count(f"too many requests from {OTHER}: answered 429") == 1
+        until(lambda: program.get("/healthz").status_code == 200, "it may ask again")
+
+
+def test_the_kiosks_own_requests_have_no_rate(cell: Server) -> None:
+    statuses = {cell.http.get("/healthz").status_code for _ in range(int(READ_QUOTA.burst) + 100)}
+    assert statuses == {200}
+
+
+def test_a_press_over_the_limit_has_a_receipt_not_this_answer(cell: Server) -> None:
+    """The limit of presses is reached first."""
+    with client(cell, OTHER) as program:
+        answers = [program.post("/widgets/none") for _ in range(50)]
+    assert {answer.status_code for answer in answers} == {404}
+
+
+# Viewers of a camera.
+
+
+@contextmanager
+def looking(server: Server, address: str, count: int) -> Iterator[list[ClientConnection]]:
+    """Open sockets for pictures that ask for none; those that were refused are not among them."""
+    url = f"ws://127.0.0.1:{server.port}/widgets/view/frames"
+    with ExitStack() as stack:
+        sockets = []
+        for _ in range(count):
+            way = socket.create_connection(("127.0.0.1", server.port), 10, (address, 0))
+            sockets.append(stack.enter_context(connect(url, sock=way, open_timeout=ENOUGH_S)))
+        yield [one for one in sockets if not refused(one)]
+
+
+def refused(one: ClientConnection) -> bool:
+    """Whether the server has closed the socket at once."""
+    with suppress(ConnectionClosed):
+        one.ping().wait(ENOUGH_S)
+    if one.protocol.state is State.OPEN:
+        return False
+    assert one.close_code == 4429
+    return True
+
+
+@pytest.mark.real_time
+def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) -> None:
+    with a_hold_that_lasts(cell), looking(cell, OTHER, 40) as silent:
+        assert len(silent) == VIEWERS.client
+        with looking(cell, ANOTHER, 40) as more, looking(cell, "127.0.0.4", 40) as most:
+            assert len(silent) + len(more) + len(most) == VIEWERS.others
+            with looking(cell, KIOSK, 1) as own:
+                assert len(own) == 1
+                own[0].send('{"next": true}')
+                assert json.loads(own[0].recv(ENOUGH_S))["number"] >= 1
+            with client(cell, OTHER) as program:
+                answer = program.get("/widgets/view/frame")
+                assert (answer.status_code, answer.headers["retry-after"]) == (429, "5")
+        with looking(cell, ANOTHER, 1) as own:
+            assert len(own) == 1
+
+
+def test_a_viewer_that_asks_for_nothing_is_closed(cell: Server) -> None:
+    with looking(cell, OTHER, 1) as silent:
+        with pytest.raises(ConnectionClosed):
+            silent[0].recv(ENOUGH_S)
+        assert silent[0].close_code == 4408
