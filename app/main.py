@@ -7,6 +7,7 @@ import secrets
 import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -37,6 +38,7 @@ from app.web.openapi_parts import errors
 from app.web.proxies import Proxies
 from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
+from app.web.root_path import RootPath, root_path_of
 from app.web.routes import audit_log as log_routes
 from app.web.routes import (
     control,
@@ -108,6 +110,7 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
     app.add_middleware(Turns)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
+    app.add_middleware(RootPath, root=settings.root_path)
     app.add_middleware(ReadableStartupErrors)
 
 
@@ -170,6 +173,7 @@ async def _app_state(
     settings: Settings, panel: Panel, server: ServerConfig | None
 ) -> AsyncIterator[AppState]:
     """Opens everything that requests need, and closes it at the end."""
+    settings = replace(settings, root_path=root_path_of(settings, server))
     async with open_log(settings, panel) as oplog:
         check_port(server)
         # In development the gallery shows all kinds.

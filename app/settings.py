@@ -16,10 +16,11 @@ Mode = Literal["demo", "live"]
 APP = "operator-panel"
 PACKAGE = Path(__file__).resolve().parent
 LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
+ROOT_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)*")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 PREFIX = "KIOSK_"
-VARIABLES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "LOG_LEVEL", "DEV")
+VARIABLES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "ROOT_PATH", "LOG_LEVEL", "DEV")
 
 
 def shipped_path(name: str) -> Path:
@@ -37,6 +38,7 @@ class Settings:
     mode: Mode | None = None
     hosts: tuple[str, ...] = LOOPBACK_HOSTS
     proxies: tuple[str, ...] = ()
+    root_path: str = ""
     log_level: str = "info"
     dev: bool = False
     data: Path | None = None
@@ -60,6 +62,7 @@ class Settings:
             mode=_parse_mode(env.get("KIOSK_MODE", "")),
             hosts=(*LOOPBACK_HOSTS, *_parse_hosts(env.get("KIOSK_HOSTS", ""))),
             proxies=tuple(_parse_proxies(env.get("KIOSK_PROXIES", ""))),
+            root_path=parse_root_path(env.get("KIOSK_ROOT_PATH", "")),
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
             data=_parse_path(env, "KIOSK_DATA", None),
@@ -81,6 +84,17 @@ def _check_names(variables: Iterable[str]) -> None:
             there = ", ".join(PREFIX + known for known in VARIABLES)
             hint = f"did you mean {PREFIX}{close[0]}?" if close else f"there are {there}"
             raise SettingsError(f"{variable} is not a setting of this server: {hint}")
+
+
+def parse_root_path(given: str) -> str:
+    """The path below which a proxy shows the panel, without a slash at its end; "" for none."""
+    path = given.rstrip("/")
+    if not ROOT_PATH.fullmatch(path) or {".", ".."} & set(path.split("/")):
+        raise SettingsError(
+            f'KIOSK_ROOT_PATH is "{given}": it must be a path such as /cell1, of letters, digits, ".", '
+            '"_", "~" and "-"'
+        )
+    return path
 
 
 def _parse_mode(given: str) -> Mode | None:

@@ -18,6 +18,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "data": "KIOSK_DATA",
     "names": "KIOSK_HOSTS",
     "proxies": "KIOSK_PROXIES",
+    "root_path": "KIOSK_ROOT_PATH",
     "log_level": "KIOSK_LOG_LEVEL",
 }
 

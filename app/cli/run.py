@@ -78,6 +78,11 @@ def make_parser(prog: str) -> Parser:
         help="address of a trusted proxy: its X-Forwarded-For counts; may be given several times"
         " (KIOSK_PROXIES)",
     )
+    add(
+        "--root-path",
+        metavar="PATH",
+        help="the path below which a proxy shows the panel, such as /cell1 (KIOSK_ROOT_PATH)",
+    )
     add("--log-level", choices=LOG_LEVELS, help="default: info (KIOSK_LOG_LEVEL)")
     add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")
     add("--ssl-keyfile", type=Path, metavar="FILE", help="for HTTPS: its key")

@@ -70,7 +70,15 @@ async def open_fleet(
             return config_to(stack.enter_context(simulated_robot(panel, entry)))
 
         recordings = _recordings(settings, panel)
-        fleet = Fleet(panel, config_of, revision, oplog, recordings=recordings, simulated=demo)
+        fleet = Fleet(
+            panel,
+            config_of,
+            revision,
+            oplog,
+            recordings=recordings,
+            simulated=demo,
+            root_path=settings.root_path,
+        )
         trends = _trend_disk(settings, panel, fleet)
         try:
             if recordings is not None:

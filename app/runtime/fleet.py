@@ -36,11 +36,13 @@ class Fleet:
         *,
         recordings: "Recordings | None" = None,
         simulated: bool = False,
+        root_path: str = "",
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
+        self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
-        server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated)
+        server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated, root_path)
         for entry in panel.robots or (None,):
             self._sessions[entry.id if entry else None] = RobotSession(
                 server, config_of(entry), entry=entry, others=self

@@ -51,7 +51,8 @@ ALONE: Final = NoOtherRobots()
 
 @dataclass(frozen=True, slots=True)
 class ServerParts:
-    """The parts that all sessions share; `revision` is that of the page's files."""
+    """The parts that all sessions share; `revision` is that of the page's files, `root_path` that below
+    which a proxy shows all pages."""
 
     panel: Panel
     revision: str
@@ -59,6 +60,7 @@ class ServerParts:
     recordings: "Recordings | None" = None
     slices: Slices | None = None
     simulated: bool = False
+    root_path: str = ""
 
 
 class RobotSession:
@@ -78,7 +80,7 @@ class RobotSession:
         panel, operators_log = server.panel, server.operators_log
         self.panel = panel
         self.entry = entry
-        self.base = f"/robots/{entry.id}" if entry else ""
+        self.base = server.root_path + (f"/robots/{entry.id}" if entry else "")
         self._operators_log = operators_log
         self._listeners = ExitStack()
         self.interfaces = load_interfaces(panel.distro, panel.interfaces)

@@ -34,6 +34,11 @@ class AppState:
     in_flight: InFlight = field(default_factory=InFlight)
 
     @property
+    def root(self) -> str:
+        """The path below which a proxy shows all pages; "" without one."""
+        return self.fleet.root_path
+
+    @property
     def banner(self) -> TextLike:
         """The banner of a page that belongs to no robot: that one of the robots is simulated; "" for
         none."""

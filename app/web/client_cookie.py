@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection
 from app.permission.client_places import client_key
 from app.permission.clients import TOKEN, anonymous, new_client, new_token
 from app.permission.principal import Principal
-from app.web.app_state import AppState
+from app.web.app_state import AppState, site_of
 
 COOKIE: Final = "panel_browser"
 KEPT_S: Final = 365 * 86_400
@@ -70,7 +70,7 @@ def set_client_cookie(response: Response, request: Request, token: str) -> Respo
             COOKIE,
             token,
             max_age=KEPT_S,
-            path="/",
+            path=site_of(request).root or "/",
             httponly=True,
             samesite="strict",
             secure=request.url.scheme == "https",

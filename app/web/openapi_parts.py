@@ -23,16 +23,16 @@ REASONS: Final = {
     408: "the body took too long",
     413: "the body is too large",
     422: "it is not what this description says",
-    429: "others do that already; `Retry-After` says when to try again",
+    429: "too many requests, or others do that already; `Retry-After` says when to try again",
     503: "the operator's log can't be read",
 }
 PAGE: Final = {"text/html": {"schema": TEXT}}
 
 
 def errors(*statuses: int) -> Described:
-    """The error responses of a route."""
+    """The error responses of a route; each may be answered 429."""
     content = {JSON: {"schema": ErrorAnswer.model_json_schema()}, **PAGE}
-    return {status: {"description": REASONS[status], "content": content} for status in statuses}
+    return {one: {"description": REASONS[one], "content": content} for one in (*statuses, 429)}
 
 
 def described_body(

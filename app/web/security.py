@@ -15,6 +15,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.printable import printable
+from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
 GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines))/?")
@@ -67,7 +68,7 @@ class RequestGuard:
         if (
             scope["type"] == "http"
             and scope["method"] in READING
-            and not GUARDED.fullmatch(scope["path"])
+            and not GUARDED.fullmatch(path_of(scope))
         ):
             return None
         for site in headers.getlist("sec-fetch-site"):

@@ -20,6 +20,7 @@ from app.permission.client_places import KIOSK
 from app.rate_limit import Quota, TokenBuckets
 from app.web.client_cookie import client_of
 from app.web.language import language_of
+from app.web.root_path import path_of
 from app.web.security import READING, refuse
 from app.web.turn_queue import Lane, TurnQueue, lane_of
 
@@ -117,7 +118,7 @@ class Turns:
 def moves(scope: Scope) -> bool:
     """Whether a request may move something: a post, or a socket that does not only read."""
     if scope["type"] == "websocket":
-        return not scope["path"].endswith("/frames")
+        return not path_of(scope).endswith("/frames")
     return scope["method"] not in READING
 
 

@@ -23,6 +23,11 @@ ABOUT: Final = {
         "with commas between them.",
         "none",
     ),
+    "ROOT_PATH": (
+        "The path below which a proxy shows the panel, such as `/cell1`. The proxy may take it off or "
+        "leave it.",
+        "none, or that of uvicorn's `--root-path`",
+    ),
     "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "

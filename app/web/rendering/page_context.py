@@ -98,7 +98,9 @@ def page_context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words=page_words(session, page, f"/static/{state.assets.revision}/{PICTURES}", language),
+        words=page_words(
+            session, page, f"{state.root}/static/{state.assets.revision}/{PICTURES}", language
+        ),
         lost=say("server_lost"),
         lost_short=say("lost"),
         locks_all=say("locks_all"),

@@ -37,10 +37,12 @@ BODY: Final = {
 async def choose(request: Request, state: CurrentState) -> Response:
     """Keeps each choice that the form has; the others stay. Back to the form's `page`."""
     given = form_of(await body_of(request))
-    page = given.get("page", "")
-    answer = RedirectResponse(page if OWN_PAGE.fullmatch(page) else "/", status_code=303)
+    page = given.get("page", "").removeprefix(state.root)
+    back = state.root + (page if OWN_PAGE.fullmatch(page) else "/")
+    answer = RedirectResponse(back, status_code=303)
     known = {**CHOICES, LANGUAGE: state.fleet.panel.readers_languages}
     for name, values in known.items():
         if given.get(name) in values:
-            answer.set_cookie(COOKIE.format(name), given[name], max_age=KEPT_S, samesite="strict")
+            cookie, path = COOKIE.format(name), state.root or "/"
+            answer.set_cookie(cookie, given[name], max_age=KEPT_S, path=path, samesite="strict")
     return answer

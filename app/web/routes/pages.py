@@ -72,10 +72,10 @@ async def compiled(templates: Environment) -> None:
 
 def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None:
     """The redirect to the first robot's page, for a path without a robot on a panel with several."""
-    first = state.fleet.first.base
-    if not first or "robot" in request.path_params:
+    first = state.fleet.first
+    if first.entry is None or "robot" in request.path_params:
         return None
-    return RedirectResponse(first + path, status_code=303)
+    return RedirectResponse(first.base + path, status_code=303)
 
 
 def _render(request: Request, state: AppState, page: Page) -> Response:
