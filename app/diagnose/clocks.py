@@ -22,7 +22,10 @@ def check_clocks(
     report: Report, robot: PanelRobot, observed: Observation, interfaces: Interfaces
 ) -> None:
     types = robot.panel.subscriptions()
-    live = {topic: observed.live(robot.key(topic)) for topic in types}
+    live = {
+        topic: [one for key in robot.possible_keys(topic) for one in observed.live(key)]
+        for topic in types
+    }
     sent = [one.sent - one.wall for several in live.values() for one in several if one.sent]
     if not sent:
         report.find("clock_unknown", robot=robot.id, window=f"{observed.window_s:.1f}")

@@ -22,7 +22,7 @@ from app.graph.model import (
     TopicEndpoint,
     near,
 )
-from app.interfaces.names import key_of
+from app.interfaces.names import GLOBAL, PARAMETER_EVENTS, SHARED_TOPICS, key_of, possible_keys
 from app.panel.model import Panel, RobotEntry
 
 
@@ -44,12 +44,16 @@ class PanelRobot:
     def key(self, name: str) -> str:
         return key_of(name, self.namespace)
 
+    def possible_keys(self, name: str) -> tuple[str, ...]:
+        """Several of a topic that nodes publish in any namespace, such as /rosout."""
+        return possible_keys(name, self.namespace)
+
     def needed(self) -> set[str]:
         """The names of all topics, services, actions and nodes that the panel uses."""
         panel = self.panel
         servers = {name for widget in panel.widgets() for _, name in widget.endpoints()}
         nodes = {widget.node for widget in panel.parameters()}
-        return {*panel.listened(), *panel.publications(), *servers, *nodes} - {"/parameter_events"}
+        return {*panel.listened(), *panel.publications(), *servers, *nodes} - {PARAMETER_EVENTS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +66,22 @@ class NamesBehindBridge:
 
     @classmethod
     def of(cls, robot: PanelRobot, graph: GraphSnapshot) -> "NamesBehindBridge":
-        return cls(robot, tuple(one for one in graph.robots if within(robot.namespace, one.namespace)))
+        elsewhere = [f"/{robot.key(one)}" for one in robot.needed() if one.startswith(GLOBAL)]
+        names = (robot.namespace, *elsewhere)
+        own = (one for one in graph.robots if any(within(name, one.namespace) for name in names))
+        return cls(robot, tuple(own))
 
-    def _places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:
-        """Each graph, with the name as the robot has it there: without the bridge's namespace."""
+    def places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:
+        """Each graph that can have a name, with the name as the robot has it there: without the
+        bridge's namespace."""
         for graph in self.graphs:
-            yield graph, f"/{self.robot.key(name)}".removeprefix(graph.namespace)
+            for key in self.robot.possible_keys(name):
+                own = f"/{key}".removeprefix(graph.namespace)
+                if within(f"/{key}", graph.namespace) and (own == name or name not in SHARED_TOPICS):
+                    yield graph, own
 
     def topics(self, name: str) -> list[Topic]:
-        return [topic for graph, own in self._places(name) if (topic := graph.topic(own)) is not None]
+        return [topic for graph, own in self.places(name) if (topic := graph.topic(own)) is not None]
 
     def publishers(self, name: str) -> list[TopicEndpoint]:
         return [one for topic in self.topics(name) for one in topic.publishers]
@@ -80,7 +91,7 @@ class NamesBehindBridge:
 
     def topic_forwarding(self, name: str, of: TopicList) -> Forwarding | None:
         """Of the publishers or subscribers of a topic; None without any."""
-        places = ((graph, graph.topic(own)) for graph, own in self._places(name))
+        places = ((graph, graph.topic(own)) for graph, own in self.places(name))
         return _best(
             topic_forwarding(graph, topic, [of])
             for graph, topic in places
@@ -89,38 +100,45 @@ class NamesBehindBridge:
 
     def server_forwarding(self, name: str, kind: ServerList) -> Forwarding | None:
         """Of a service or an action; None if no node offers it."""
-        return _best(server_forwarding(graph, kind, own) for graph, own in self._places(name))
+        return _best(server_forwarding(graph, kind, own) for graph, own in self.places(name))
 
     def services(self, name: str) -> list[Server]:
-        return [one for graph, own in self._places(name) for one in graph.services if one.name == own]
+        return [one for graph, own in self.places(name) for one in graph.services if one.name == own]
 
     def actions(self, name: str) -> list[Server]:
-        return [one for graph, own in self._places(name) for one in graph.actions if one.name == own]
+        return [one for graph, own in self.places(name) for one in graph.actions if one.name == own]
 
     def nodes(self) -> list[Node]:
         return [node for graph in self.graphs for node in graph.nodes]
 
     def has_node(self, name: str) -> bool:
-        return any(graph.node(own) is not None for graph, own in self._places(name))
+        return any(graph.node(own) is not None for graph, own in self.places(name))
 
     def offers(self, name: str) -> bool:
         """Whether a node has a service or an action of this name, announced by its bridge or not."""
         return any(
             own in node.services or own in node.actions
-            for graph, own in self._places(name)
+            for graph, own in self.places(name)
             for node in graph.nodes
         )
 
     def routes(self, name: str) -> list[BridgeRoute]:
-        key = self.robot.key(name)
-        return [one for graph in self.graphs for one in graph.routes if one.key == key]
+        keys = self.robot.possible_keys(name)
+        return [one for graph in self.graphs for one in graph.routes if one.key in keys]
 
     def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
         """A sentence with similar names in the graph; "" if there are none."""
         there = [f"{graph.namespace}{one.name}" for graph in self.graphs for one in _of(graph, kind)]
         own = self.robot.namespace
-        similar = [one.removeprefix(own) for one in near(f"{own}{name}", there)]
+        similar = [self._written(one) for one in near(f"/{self.robot.key(name)}", there)]
+        if own and f"/{name}" not in similar and name in there:
+            similar = [f"/{name}", *similar]  # the same name, not below the namespace
         return f" Did you mean {' or '.join(similar)}?" if similar else ""
+
+    def _written(self, whole: str) -> str:
+        """A whole name as a panel file has it."""
+        own = self.robot.namespace
+        return whole.removeprefix(own) if within(whole, own) else f"/{whole}"
 
     def elsewhere(self, names: set[str]) -> Iterator[tuple[str, str]]:
         """(name, its namespace) of each name in the graph that ends with one of the panel's."""
@@ -128,7 +146,7 @@ class NamesBehindBridge:
         for graph in self.graphs:
             topics, servers = (t.name for t in graph.topics), (*graph.services, *graph.actions)
             for there in (f"{graph.namespace}{one}" for one in (*topics, *(s.name for s in servers))):
-                for name in names:
+                for name in (one for one in names if not one.startswith(GLOBAL)):
                     if there.endswith(name) and there != f"{own}{name}":
                         yield there, there.removesuffix(name)
 

@@ -89,7 +89,8 @@ async def _later(session: ZenohSession, before: GraphSnapshot) -> GraphSnapshot:
 def check_copies(report: Report, robot: PanelRobot, observed: Observation) -> None:
     """Reports topics of which a bridge sends each message more than once."""
     for topic in robot.panel.subscriptions():
-        if (times := copies(observed.live(robot.key(topic)))) > 1:
+        samples = [one for key in robot.possible_keys(topic) for one in observed.live(key)]
+        if (times := copies(samples)) > 1:
             report.find("bridge_piled_readers", topic, robot=robot.id, times=times)
 
 
@@ -100,7 +101,9 @@ async def _observe(
     received often enough."""
     panel, behind, dialect = robot.panel, NamesBehindBridge.of(robot, graph), BridgeDialect()
     topics = panel.subscriptions()
-    expressions = {robot.key(name): dialect.topic(robot.key(name), of) for name, of in topics.items()}
+    expressions = {
+        key: dialect.topic(key, of) for name, of in topics.items() for key in robot.possible_keys(name)
+    }
     waited_for = {
         robot.key(one.topic)
         for one in panel.interlocks

@@ -25,16 +25,31 @@ class Qos(NamedTuple):
 
 
 ROSOUT_TOPIC: Final = "/rosout"
+PARAMETER_EVENTS: Final = "/parameter_events"
+# Nodes publish these by their absolute names, in whatever namespace they are. A bridge's own namespace
+# stands before them, as before every name.
+SHARED_TOPICS: Final = (ROSOUT_TOPIC, PARAMETER_EVENTS)
+GLOBAL: Final = "//"  # begins a name that is not below the panel's namespace
 ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_default
 
 
 def key_of(topic: str, namespace: str = "") -> str:
     """The key of a topic or service: its whole name behind `namespace` ("" for none), without the first
-    slash. By it the panel knows it, whatever key expression it has in Zenoh."""
-    whole = namespace + topic
+    slash. A name that begins with "//" is not below the namespace. By its key the panel knows it,
+    whatever key expression it has in Zenoh."""
+    whole = topic[1:] if topic.startswith(GLOBAL) else namespace + topic
     if not TOPIC.fullmatch(whole):
         raise ValueError(f'"{whole}" is not an absolute ROS 2 topic name')
     return whole[1:]
+
+
+def possible_keys(topic: str, namespace: str) -> tuple[str, ...]:
+    """The keys that a topic can have: one, or of a shared topic one for each namespace that a bridge of
+    this robot can have, the longest first."""
+    if topic not in SHARED_TOPICS:
+        return (key_of(topic, namespace),)
+    parts = namespace.split("/")
+    return tuple(key_of(topic, "/".join(parts[:count])) for count in range(len(parts), 0, -1))
 
 
 def of_action(action_key: str, part: str) -> str:

@@ -22,7 +22,7 @@ from pydantic import (
 from app.errors import InterfaceError
 from app.i18n import ENGLISH, PanelText, TextLike, render, say
 from app.interfaces.field_path import Key, path_steps
-from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
+from app.interfaces.names import ACTION_TYPE, GLOBAL, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import format_value
 from app.pictures import picture_files
 
@@ -38,11 +38,19 @@ def _context(info: ValidationInfo) -> FileContext:
     return info.context or FileContext()
 
 
+def is_absolute_name(given: str) -> bool:
+    """Whether it is the absolute name of a topic, service, action or node; a second slash at the
+    beginning says that it is not below the panel's namespace."""
+    own = given.removeprefix("/") if given.startswith(GLOBAL) else given
+    return TOPIC.fullmatch(own) is not None and "__" not in own
+
+
 def _check_topic(given: str) -> str:
-    if not TOPIC.fullmatch(given) or "__" in given:
+    if not is_absolute_name(given):
         raise ValueError(
-            f'{format_value(given)} is not an absolute ROS 2 topic name: it starts with "/", and each '
-            'part is letters, digits and single "_", and starts with no digit'
+            f'{format_value(given)} is not an absolute ROS 2 topic name: it starts with "/" ("//": not '
+            'below the namespace), and each part is letters, digits and single "_", and starts with no '
+            "digit"
         )
     return given
 

@@ -98,7 +98,7 @@ def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
     reading = robot.reading(topic).of_field(interlock.field, lacking_s)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
-    if robot.silent_publishers.has_silent(key, robot.graph.bridges):
+    if robot.silent_publishers.has_silent(key, robot.bridges_of(key)):
         return locked("new_publisher", topic=topic)
     if not permits(interlock, reading.value(interlock.field)):
         return _forbidden(interlock, reading)

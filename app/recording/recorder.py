@@ -45,10 +45,9 @@ class Recorder:
         }
         types = panel.subscriptions()
         self._channels = {
-            robot.key(topic): Channel(
-                f"/{robot.key(topic)}", types[topic], interfaces.definition(types[topic])
-            )
+            key: Channel(f"/{key}", types[topic], interfaces.definition(types[topic]))
             for topic in (types if rules.topics is None else rules.topics)
+            for key in robot.possible_keys(topic)
         }
         self._ring = RingBuffer(rules.before_s, recordings.ring_bytes)
         self._recording: Recording | None = None

@@ -25,12 +25,10 @@ from app.interfaces.names import Qos
 # The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of the bridge
 # has one type: that of the endpoint that created it, of the robot or of another panel.
 _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
-    "MS": (
-        "MP",
-        "MS",
-        "pub",
-    ),  # the panel subscribes: the robot's publishers, other panels' subscribers
-    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscribers, other panels' publishers
+    # The panel subscribes: the robot's publishers, other panels' subscribers.
+    "MS": ("MP", "MS", "pub"),
+    # The panel publishes: the robot's subscribers, other panels' publishers.
+    "MP": ("MS", "MP", "sub"),
 }
 
 
@@ -86,7 +84,7 @@ class LiveGraph:
         self.cache: dict[Any, Any] = {}  # see `cached_until_change`
         self._namespace = namespace
         self._bridges: set[str] = set()
-        self._namespace_matches: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
+        self._namespaces: dict[str, str] = {}  # of bridges
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
         self._alive_since: dict[str, float] = {}  # of tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
@@ -136,7 +134,7 @@ class LiveGraph:
             self._bridge_versions = None  # the new bridge has not been queried yet
         else:
             self._bridges.discard(zid)
-            self._namespace_matches.pop(zid, None)
+            self._namespaces.pop(zid, None)
         return zid
 
     def update_routes(
@@ -161,16 +159,27 @@ class LiveGraph:
     def update_namespaces(self, namespaces: Mapping[str, str]) -> None:
         """Adds the namespaces of bridges, by zid ("" for none)."""
         self.cache.clear()
-        for zid, namespace in namespaces.items():
-            self._namespace_matches[zid] = self._namespace is None or within(self._namespace, namespace)
+        self._namespaces |= namespaces
 
     @property
     @cached_until_change
     def bridges(self) -> frozenset[str]:
         """The zids of this robot's bridges. If none has its namespace, those with an unknown
         namespace."""
-        matching = {zid for zid in self._bridges if self._namespace_matches.get(zid)}
-        return frozenset(matching or self._bridges - self._namespace_matches.keys())
+        own = self._namespace
+        known = ((zid, self._namespaces[zid]) for zid in self._bridges & self._namespaces.keys())
+        matching = {zid for zid, of in known if own is None or within(own, of)}
+        return frozenset(matching or self._bridges - self._namespaces.keys())
+
+    @property
+    def every_bridge(self) -> Collection[str]:
+        """The zids of all bridges, also of other robots'."""
+        return self._bridges
+
+    @property
+    def namespaces(self) -> set[str]:
+        """The namespaces of this robot's bridges, as far as they are known."""
+        return {of for zid, of in self._namespaces.items() if zid in self.bridges}
 
     @property
     @cached_until_change

@@ -1,7 +1,7 @@
 """The endpoints of the robot (publishers, subscribers, servers) that a panel needs, and which of them
 are missing while their bridge is connected."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 from app.dialect.endpoint import Role
@@ -24,17 +24,22 @@ def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
 class EndpointPresence:
     """The bridges behind which each required endpoint was last seen."""
 
-    def __init__(self, needed: Mapping[RequiredEndpoint, RequiredEndpoint]) -> None:
-        """`needed`: (role, ROS name) → (role, key)."""
-        self.required = needed
+    def __init__(self, needed: Iterable[RequiredEndpoint], key: Callable[[str], str]) -> None:
+        """`key` returns the present key of a ROS name."""
+        self.required = tuple(dict.fromkeys(needed))
+        self._key = key
         self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
 
     def update(self, graph: LiveGraph) -> None:
         """Updates the presence; call it after every change of the graph."""
-        for end, (role, key) in self.required.items():
-            if bridges := graph.bridges_with(role, key):
+        for end in self.required:
+            if bridges := graph.bridges_with(*self.keyed(end)):
                 self.last_bridges[end] = bridges
         graph.cache.clear()  # results depend on `last_bridges` too
+
+    def keyed(self, end: RequiredEndpoint) -> RequiredEndpoint:
+        """An endpoint as (role, key)."""
+        return end[0], self._key(end[1])
 
     def clear(self) -> None:
         """Forgets all endpoints; call it when the link is lost."""
@@ -51,7 +56,7 @@ class EndpointPresence:
 
 @cached_until_change
 def _any_present(graph: LiveGraph, presence: EndpointPresence) -> bool:
-    return any(graph.has_endpoint(role, key) for role, key in presence.required.values())
+    return any(graph.has_endpoint(*presence.keyed(end)) for end in presence.required)
 
 
 @cached_until_change
@@ -59,5 +64,5 @@ def _missing(graph: LiveGraph, presence: EndpointPresence) -> list[str]:
     return [
         end[1]
         for end, bridges in presence.last_bridges.items()
-        if bridges & graph.bridges and not graph.has_endpoint(*presence.required[end])
+        if bridges & graph.bridges and not graph.has_endpoint(*presence.keyed(end))
     ]

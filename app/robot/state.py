@@ -7,7 +7,7 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,7 +17,7 @@ from app.dialect.endpoint import Role
 from app.errors import DecodeError
 from app.i18n import Text, TextLike
 from app.interfaces import Interfaces, has_key
-from app.interfaces.names import ROSOUT_TOPIC, key_of
+from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of, possible_keys
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.robot.camera_topic import CameraTopicState
@@ -33,6 +33,7 @@ from app.robot.replayed import ReplayedMessages
 from app.robot.sample import Buffer as Buffer
 from app.robot.sample import Sample as Sample
 from app.robot.sample import SkippedPayload as SkippedPayload
+from app.robot.shared_topics import present_key
 from app.robot.silent_publishers import SilentPublishers
 from app.robot.slices import Slices
 from app.robot.topic_publishers import TopicPublishers
@@ -67,10 +68,13 @@ class RobotState:
         self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them
         self.settled_at = math.inf  # monotonic seconds: then a new bridge has set up its routes
         self._keys: dict[str, str] = {}  # ROS name → key
+        self._shared = {topic: possible_keys(topic, self.namespace) for topic in SHARED_TOPICS}
+        self._keys |= {topic: keys[0] for topic, keys in self._shared.items()}
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
         named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
-        self.required_keys = frozenset(map(self.key, named))
+        self.required_keys = frozenset(key for name in named for key in self.possible_keys(name))
+        self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
@@ -85,9 +89,7 @@ class RobotState:
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its bridges do not respond
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
-        self.presence = EndpointPresence(
-            {(role, name): (role, self.key(name)) for role, name in needed}
-        )
+        self.presence = EndpointPresence(needed, self.key)
         self.undecodable: Counter[str] = Counter()
         self.slices = slices or Slices()
         # Called with (key, reading) of a message that took more than one turn to decode.
@@ -98,7 +100,10 @@ class RobotState:
         self._topics = dict(self._make_topics(panel))
         self.keyed_entries = KeyedEntries(panel, interfaces, self.key, self.slices)
         self.log_lines = {
-            self.key(topic): LogLines(interfaces, keep) for topic, keep in panel.logs().items()
+            key: lines
+            for topic, keep in panel.logs().items()
+            for lines in [LogLines(interfaces, keep)]
+            for key in self.possible_keys(topic)
         }
         self._logged_at: dict[str, float] = {}
         self.history = History(time.monotonic(), time.time())
@@ -108,8 +113,9 @@ class RobotState:
         fields = panel.subscribed_fields()
         lossless = {one.topic for one in panel.interlocks}
         lossless |= {one.topic for one in panel.confirmations()}
-        for topic, type_name in panel.subscriptions().items():
-            key, paths = self.key(topic), fields.get(topic, ())
+        subscribed = panel.subscriptions()
+        for topic, key in ((one, key) for one in subscribed for key in self.possible_keys(one)):
+            type_name, paths = subscribed[topic], fields.get(topic, ())
             made = Topic(
                 self._interfaces.field_reader(type_name, paths),
                 self.slices,
@@ -129,6 +135,16 @@ class RobotState:
         if key is None:
             key = self._keys[topic] = key_of(topic, self.namespace)
         return key
+
+    def possible_keys(self, topic: str) -> tuple[str, ...]:
+        """All keys that `key` may return for a topic: several of a shared one, as the bridge has it."""
+        return self._shared.get(topic) or (self.key(topic),)
+
+    def update_shared_topics(self) -> None:
+        """Finds out under which keys the bridges have the shared topics. Call it after a change of the
+        graph."""
+        for topic, keys in self._shared.items():
+            self._keys[topic] = present_key(self.graph, topic, keys)
 
     def difference(self, role: Role, key: str) -> Difference | None:
         """How the definition of an endpoint of the robot differs from the panel's; None if it is not
@@ -166,6 +182,7 @@ class RobotState:
     def update_publishers(self, before: float = math.inf) -> None:
         """Call after every change of the graph. If a required publisher has ended, its samples (before
         the sequence number `before`) become invalid, and a new publisher must republish the value."""
+        self.update_shared_topics()
         self.presence.update(self.graph)
         self.drop_misread()
         for key in self._publisher_required:
@@ -208,9 +225,18 @@ class RobotState:
         """The same by the topic's key."""
         known = self._topics[key]
         found, sample = known.reading(), known.sample
-        if sample is None or sample.source is None or sample.source in self.graph.bridges:
+        if sample is None or self.is_from_bridge(key, sample.source):
             return found
         return replace(found, status="cut")
+
+    def is_from_bridge(self, key: str, source: str | None) -> bool:
+        """Whether a sample's source is a bridge that is there: one of this robot, or any for a topic
+        that is not below its namespace."""
+        return source is None or source in self.bridges_of(key)
+
+    def bridges_of(self, key: str) -> Collection[str]:
+        """The zids of the bridges through which a topic may come."""
+        return self.graph.every_bridge if key in self._global_keys else self.graph.bridges
 
     @property
     def keyed_topics(self) -> frozenset[str]:

@@ -88,13 +88,13 @@ class Ingest:
             robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
             for of in panel.interlocks
         }
-        self._events = robot.key(EVENTS)
+        self._events = frozenset(robot.possible_keys(EVENTS))
         sources = (source for widget in panel.commands for source in widget.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
         permitting = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.lossless = permitting | robot.keyed_topics
-        self.immediate = permitting | self._status.keys() | {self._events}
+        self.immediate = permitting | self._status.keys() | self._events
         self._by_key: dict[str, list[SampleListener]] = {}
         for listener in listeners:
             for key in listener.keys:
@@ -122,7 +122,7 @@ class Ingest:
                 key in self._feedback
                 or key in self._status
                 or key in self._needed
-                or key == self._events
+                or key in self._events
             ):
                 updates.other = True
             else:
@@ -172,8 +172,8 @@ class Ingest:
         elif key in self._status:
             self._actions.on_status(self._status[key], sample)
         else:
-            if key == self._events:
-                self._parameters.on_event(sample)
+            if key in self._events:
+                self._parameters.on_event(key, sample)
             self._robot.update(key, sample)
             if self._confirmations.is_awaited(key):
                 updates.readings.append((key, self._robot.reading_by_key(key)))

@@ -9,6 +9,7 @@ from app.errors import InterfaceError
 from app.graph.model import Server, Topic
 from app.graph.node_services import NodeParameter
 from app.interfaces import Interfaces
+from app.interfaces.names import GLOBAL
 from app.scaffold import controls
 from app.scaffold.displays import JOINTS, NODES_PAGE, displays
 from app.scaffold.entry import Draft, Entry, InterlockCandidate
@@ -60,7 +61,8 @@ def _is_public(topic: Topic) -> bool:
 
 
 def _is_public_name(name: str) -> bool:
-    return name not in LEFT_OUT and "/_" not in name
+    own = name[1:] if name.startswith(GLOBAL) else name
+    return own not in LEFT_OUT and "/_" not in own
 
 
 def lost_names(known: Known) -> list[str]:

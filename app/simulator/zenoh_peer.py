@@ -46,8 +46,9 @@ class Simulator:
         self._lock = threading.Lock()
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
+        keys: set[str] = set()
         self._played = [
-            PlayedRobot(self._session, namespace, robot, interfaces, self._lock)
+            PlayedRobot(self._session, namespace, robot, interfaces, self._lock, keys)
             for namespace, robot in robots.items()
         ]
         self._declared = list(self._graph(robots))

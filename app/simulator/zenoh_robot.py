@@ -24,21 +24,28 @@ class PlayedRobot:
         robot: SimulatedRobot,
         interfaces: Interfaces,
         lock: threading.Lock,
+        played: set[str],
     ) -> None:
+        """`played` are the keys of what other robots publish and serve: names that are not below a
+        namespace. It gets those of this one."""
         self._session = session
         self._namespace = namespace
         self._robot = robot
         self._lock = lock
-        self._publishers = {
-            topic: self._publisher(topic, about) for topic, about in robot.publishes.items()
-        }
+        own = {name for name in (*robot.publishes, *robot.services, *robot.actions)
+               if self._key(name) not in played}  # fmt: skip
+        played |= {self._key(name) for name in own}
+        self._publishes = {topic: of for topic, of in robot.publishes.items() if topic in own}
+        self._services = {name: of for name, of in robot.services.items() if name in own}
+        self._servers = {name: of for name, of in robot.actions.items() if name in own}
+        self._publishers = {topic: self._publisher(topic, of) for topic, of in self._publishes.items()}
         self._actions = [
             PlayedAction(session, self._key(name), action, interfaces, lock)
-            for name, action in robot.actions.items()
+            for name, action in self._servers.items()
         ]
         self._declared = [
             *(self._subscriber(topic) for topic in robot.subscribes),
-            *(served(session, self._key(one), self._server(one)) for one in robot.services),
+            *(served(session, self._key(one), self._server(one)) for one in self._services),
         ]
 
     def tokens(self, zid: str) -> Iterator[str]:
@@ -46,18 +53,19 @@ class PlayedRobot:
         robot, key = self._robot, self._key
         for topic, of in robot.subscribes.items():
             yield bridge_dialect.token(zid, "MS", key(topic), of.type, of.qos, of.type_hash)
-        for topic, of in robot.publishes.items():
+        for topic, of in self._publishes.items():
             yield bridge_dialect.token(zid, "MP", key(topic), of.type, of.qos, of.type_hash)
-        for service, name in robot.services.items():
+        for service, name in self._services.items():
             yield bridge_dialect.server_token(zid, "SS", key(service), name)
-        for action, server in robot.actions.items():
+        for action, server in self._servers.items():
             yield bridge_dialect.server_token(zid, "AS", key(action), server.type)
 
     def step(self, moment: Moment) -> None:
         with self._lock:
             messages = list(self._robot.step(moment))
         for topic, payload in messages:
-            self._publishers[topic].put(payload)
+            if topic in self._publishers:
+                self._publishers[topic].put(payload)
         for action in self._actions:
             action.step()
 

@@ -42,6 +42,7 @@ class BridgeAdmin:
         }
         graph.update_namespaces(namespaces)
         self.namespaces = namespaces or self.namespaces
+        self._robot.update_shared_topics()
         self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
             graph.update_versions(versions)

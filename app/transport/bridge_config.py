@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from app.interfaces.names import ROSOUT_TOPIC
+from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.panel.widgets.service_action import Action, Call, ServerCommand
@@ -66,7 +66,7 @@ def timeouts(panel: Panel) -> tuple[dict[str, float], dict[str, float]]:
 def bridge_config(panel: Panel, entry: RobotEntry | None, options: BridgeOptions) -> str:
     """The file's text, JSON5 with comments. `entry` is one of several robots."""
     namespace = entry.namespace if entry else panel.namespace
-    before = namespace if options.prefixed else ""
+    names = _Names(namespace, options.prefixed)
     return "\n".join(
         [
             f"// The bridge beside the robot, for the panel {_comment(str(panel.title))}.",
@@ -84,8 +84,8 @@ def bridge_config(panel: Panel, entry: RobotEntry | None, options: BridgeOptions
             f"      domain: {options.domain},",
             *_namespace(namespace, options.prefixed),
             _BLOCKING,
-            *_timeouts(panel, before),
-            *_allow(panel, before),
+            *_timeouts(panel, names),
+            *_allow(panel, names),
             "    },",
             "  },",
             "}",
@@ -106,26 +106,50 @@ def _namespace(namespace: str, prefixed: bool) -> Iterator[str]:
         yield f"      // No namespace here: the robot's nodes have {namespace} in their own names."
 
 
-def _timeouts(panel: Panel, before: str) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """The panel's names as this bridge's robot has them."""
+
+    namespace: str
+    prefixed: bool
+
+    def on_robot(self, name: str) -> str | None:
+        """The name on the robot; None if this bridge can't have it: it puts its namespace before each
+        name, and this one is not below it."""
+        if self.prefixed and name not in SHARED_TOPICS:
+            return f"/{key_of(name, self.namespace)}"
+        if not name.startswith(GLOBAL):
+            return name
+        inner = name[1:].removeprefix(self.namespace)
+        return inner if inner.startswith("/") and (inner != name[1:] or not self.namespace) else None
+
+
+def _timeouts(panel: Panel, names: _Names) -> Iterator[str]:
     services, actions = timeouts(panel)
     if services or actions:
         yield "      // Seconds for an answer, where the panel waits longer than the bridge by itself."
         yield "      queries_timeout: {"
         yield f"        default: {TIMEOUT_S},"
-        yield f"        services: {_timed(services, before)},"
-        yield f"        actions: {{ send_goal: {_timed(actions, before)} }},"
+        yield f"        services: {_timed(services, names)},"
+        yield f"        actions: {{ send_goal: {_timed(actions, names)} }},"
         yield "      },"
 
 
-def _timed(limits: Mapping[str, float], before: str) -> str:
-    return json.dumps([f"^{before}{name}$={seconds:g}" for name, seconds in sorted(limits.items())])
+def _timed(limits: Mapping[str, float], names: _Names) -> str:
+    known = ((names.on_robot(name), seconds) for name, seconds in sorted(limits.items()))
+    return json.dumps([f"^{name}$={seconds:g}" for name, seconds in known if name is not None])
 
 
-def _allow(panel: Panel, before: str) -> Iterator[str]:
+def _allow(panel: Panel, names: _Names) -> Iterator[str]:
+    every = allowed(panel)
     yield "      // Nothing else of the robot goes through: not to the panel, and not to its nodes."
+    for name in sorted({one for some in every.values() for one in some}):
+        if names.on_robot(name) is None:
+            yield f"      // {name} is not below {names.namespace}: it needs another bridge."
     yield "      allow: {"
-    for kind, names in allowed(panel).items():
-        yield from _named(kind, [before + name for name in names])
+    for kind, some in every.items():
+        known = [own for name in some if (own := names.on_robot(name)) is not None]
+        yield from _named(kind, sorted(known))
     yield "      },"
 
 

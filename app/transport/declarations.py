@@ -48,7 +48,7 @@ def declarations(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Dec
 
 def _subscribed(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
     for topic, name in panel.subscriptions().items():
-        yield robot.key(topic), name
+        yield from ((key, name) for key in robot.possible_keys(topic))
     for action, name in panel.actions().items():
         types = interfaces.action_types(name)
         yield feedback(robot.key(action)), types.feedback_message
@@ -57,7 +57,7 @@ def _subscribed(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Name
 
 def _published(panel: Panel, robot: RobotState) -> Named:
     for topic, name in {**panel.publications(), ROSOUT_TOPIC: LOG_TYPE}.items():
-        yield robot.key(topic), name
+        yield from ((key, name) for key in robot.possible_keys(topic))
 
 
 def _latched(panel: Panel, robot: RobotState) -> Iterator[str]:

@@ -23,7 +23,8 @@ def definition_notes(robot: RobotState) -> TextLike:
 def _notes(graph: LiveGraph, robot: RobotState) -> TextLike:
     differing: dict[str, Difference] = {}
     unhashed: list[str] = []
-    for (role, name), (_, key) in robot.presence.required.items():
+    for role, name in robot.presence.required:
+        key = robot.key(name)
         if (found := robot.difference(role, key)) is not None:
             differing[name] = found
         elif not graph.is_simulated and _can_not_be_compared(graph, role, key):

@@ -97,7 +97,8 @@ class ViewRefresher:
         self._link_times = LinkTimes()
         self._frame_s = 1 / panel.display_hz
         self._displays = [
-            (frozenset(robot.key(source.topic) for source in w.sources()), w) for w in panel.displays
+            (frozenset(key for source in w.sources() for key in robot.possible_keys(source.topic)), w)
+            for w in panel.displays
         ]
         self._current = self._build()
         self.lamp = self._current.robot

@@ -89,6 +89,39 @@ def test_names_of_a_robot_that_has_the_namespace_itself(panel: Path) -> None:
     assert "/cell9/pressure" in allow["publishers"]
 
 
+OUTSIDE = """
+[[page.widget]]
+id = "diagnostics"
+kind = "readout"
+label = "Diagnostics"
+topic = "//diagnostics"
+type = "std_msgs/msg/String"
+[[page.widget]]
+id = "own"
+kind = "call"
+label = "Own"
+service = "//cell9/own"
+type = "std_srvs/srv/Trigger"
+timeout_s = 9.0
+"""
+
+
+def test_names_that_are_not_below_the_namespace(panel: Path) -> None:
+    """A bridge that adds its namespace has no others."""
+    panel.write_text(panel.read_text() + OUTSIDE)
+    prefixed, adding = plugin(written(panel, "--prefixed")), plugin(written(panel))
+    assert isinstance(there := prefixed["allow"], dict)
+    assert {"/diagnostics", "/parameter_events", "/cell9/pressure"} <= set(there["publishers"])
+    assert there["subscribers"] == ["/cell9/start", "/rosout"]
+    assert "/cell9/own" in there["service_servers"]
+    assert isinstance(there := adding["allow"], dict)
+    assert not any("diagnostics" in name for name in there["publishers"])
+    assert "/own" in there["service_servers"]
+    text = panel.with_name("bridge.json5").read_text()
+    assert "// //diagnostics is not below /cell9: it needs another bridge." in text
+    assert "^/own$=9" in text
+
+
 @pytest.mark.parametrize(
     "place", ["mode", "transport/link/tx", "scouting/multicast", "listen/endpoints"]
 )

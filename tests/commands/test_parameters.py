@@ -114,7 +114,7 @@ class Bench:
         lists = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
         fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": node, **lists}
         payload = INTERFACES.encode(EVENT_TYPE, fields)
-        self.parameters.on_event(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
+        self.parameters.on_event("parameter_events", Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
 
     async def until(self, what: Callable[[], bool]) -> None:
         async with asyncio.timeout(5):
@@ -198,7 +198,7 @@ def test_an_event_of_the_node_counts_and_one_of_another_does_not() -> None:
         assert bench.known().value == 0.7
         for other in ("/arm2", "/cell/arm", "arm"):
             bench.event(other, changed_parameters=change(9.0))
-        bench.parameters.on_event(Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
+        bench.parameters.on_event("parameter_events", Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
         assert bench.known().value == 0.7
         assert len(bench.line.queries) == 2
 
@@ -212,7 +212,7 @@ def test_an_event_by_a_bridge_that_is_gone_does_not_count() -> None:
         fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": "/arm", "new_parameters": [],
                   "changed_parameters": change(0.7), "deleted_parameters": []}  # fmt: skip
         payload = INTERFACES.encode(EVENT_TYPE, fields)
-        bench.parameters.on_event(Sample(payload, 1, NOW, NOW, "gone"))
+        bench.parameters.on_event("parameter_events", Sample(payload, 1, NOW, NOW, "gone"))
         assert bench.known().value == 0.5
 
     run(test)

@@ -47,6 +47,8 @@ from tests.diagnose.setups import (
     readout,
 )
 
+LOG_TYPE = "rcl_interfaces/msg/Log"
+LOG_WIDGET = '[[page.widget]]\nid = "log"\nkind = "log"\nlabel = "Log"\n'
 QOS = EndpointQos(reliable=True)
 BRIDGE = Bridge(zid="b1", version="v1.10.2", config={"namespace": "/", "domain": 0})
 INTERFACES = load_interfaces("jazzy")
@@ -181,6 +183,26 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
     behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
     TopicChecks(report, behind, INTERFACES).check()
     assert report.codes() == []
+
+
+def test_a_name_that_is_there_outside_of_the_namespace_is_named(tmp_path: Path) -> None:
+    text = f'namespace = "/amr"\n{panel_of(readout("/words"))}'
+    report = judged(robot(tmp_path, text), topics=(topic("/words"),))
+    assert named(report.findings) == [("topic_no_publisher", "/words")]
+    assert "Did you mean //words?" in as_text(report)
+
+
+def test_names_outside_of_the_namespace_and_the_nodes_log_are_found(tmp_path: Path) -> None:
+    """Behind a bridge without a namespace, and behind another robot's."""
+    text = f'namespace = "/amr"\n{panel_of(readout("//cell/words"), LOG_WIDGET)}'
+    topics = (topic("/cell/words"), topic("/rosout", LOG_TYPE))
+    assert named(judged(robot(tmp_path, text), topics=topics).findings) == []
+    own = RobotGraph(namespace="/amr", bridges=(BRIDGE,), topics=(topic("/rosout", LOG_TYPE),))
+    cell = RobotGraph(namespace="/cell", bridges=(BRIDGE,), topics=(topic("/words"),))
+    report = Report()
+    behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
+    TopicChecks(report, behind, INTERFACES).check()
+    assert named(report.findings) == []
 
 
 @pytest.mark.parametrize(

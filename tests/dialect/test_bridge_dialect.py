@@ -14,6 +14,7 @@ from app.interfaces.names import (
     TOPIC,
     Qos,
     key_of,
+    possible_keys,
     valid_type,
 )
 from tests.support.builders import BOOL, TEXT
@@ -140,16 +141,42 @@ def test_what_is_no_topics_token_shows_nothing(key: str) -> None:
 
 @pytest.mark.parametrize(
     ("topic", "namespace", "key"),
-    [("/a", "", "a"), ("/a/b", "", "a/b"), ("/a", "/robot1", "robot1/a"), ("/a", "/x/y", "x/y/a")],
+    [
+        ("/a", "", "a"),
+        ("/a/b", "", "a/b"),
+        ("/a", "/robot1", "robot1/a"),
+        ("/a", "/x/y", "x/y/a"),
+        ("//a", "/robot1", "a"),
+        ("//robot1/a", "/robot1", "robot1/a"),
+        ("//a/b", "", "a/b"),
+    ],
 )
 def test_a_topic_has_the_key_that_the_bridge_gives_it(topic: str, namespace: str, key: str) -> None:
     assert key_of(topic, namespace) == key
 
 
-@pytest.mark.parametrize("topic", ["", "a", "/", "/a/", "//a", "/1", "/a b", "/*", "/a\n"])
+@pytest.mark.parametrize(
+    "topic", ["", "a", "/", "/a/", "///a", "//", "//a/", "/a//b", "/1", "/a b", "/*", "/a\n"]
+)
 def test_what_is_no_topic_has_no_key(topic: str) -> None:
     with pytest.raises(ValueError, match="not an absolute ROS 2 topic name"):
         key_of(topic)
+
+
+@pytest.mark.parametrize(
+    ("topic", "namespace", "keys"),
+    [
+        ("/rosout", "", ("rosout",)),
+        ("/rosout", "/site/amr", ("site/amr/rosout", "site/rosout", "rosout")),
+        ("/parameter_events", "/amr", ("amr/parameter_events", "parameter_events")),
+        ("//rosout", "/amr", ("rosout",)),
+        ("/speed", "/amr", ("amr/speed",)),
+    ],
+)
+def test_a_shared_topic_is_behind_the_namespace_of_any_bridge(
+    topic: str, namespace: str, keys: tuple[str, ...]
+) -> None:
+    assert possible_keys(topic, namespace) == keys
 
 
 def test_a_namespace_can_not_smuggle_in_a_wildcard() -> None:

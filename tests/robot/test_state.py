@@ -1,10 +1,13 @@
 """The latest sample per topic: waiting, a message, unreadable, or from before a cut."""
 
 import logging
+from typing import Final
 
 import pytest
 
 from app.dialect import bridge_dialect
+from app.dialect.bridge_dialect import bridge_token, token
+from app.interfaces.names import Qos
 from app.panel.model import RobotEntry
 from app.robot.state import UNREADABLE_LOG_S, RobotState, Sample
 from tests.support.builders import (
@@ -12,10 +15,12 @@ from tests.support.builders import (
     BRIDGE,
     DIALECT,
     ENABLED,
+    HEARD,
     INTERFACES,
     KIOSK,
     NOW,
     TEXT,
+    panel_of,
     robot_there,
     says,
     small_panel,
@@ -126,6 +131,50 @@ def test_a_sample_of_another_bridge_is_not_cut(robot: RobotState) -> None:
     says(robot, "/heard", "fresh", source="b2")
     robot.mark_bridge_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
+
+
+OTHER: Final = "b2"
+LOG: Final = {"id": "log", "kind": "log", "label": "Log"}
+
+
+def robot_of_several(namespace: str) -> RobotState:
+    """A robot with a namespace, whose panel has a topic of the cell, which has its own bridge."""
+    panel = panel_of({**HEARD, "topic": "//cell/heard"}, LOG)
+    entry = RobotEntry(id="r1", name="Robot 1", namespace=namespace)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, entry)
+    for zid, of in ((BRIDGE, namespace), (OTHER, "/cell")):
+        robot.graph.apply_token(bridge_token(zid), True)
+        robot.graph.update_namespaces({zid: of})
+    return robot
+
+
+def test_a_topic_of_the_cell_comes_through_another_bridge() -> None:
+    robot = robot_of_several("/r1")
+    assert robot.graph.bridges == {BRIDGE}
+    says(robot, "//cell/heard", "open", source=OTHER)
+    assert robot.reading("//cell/heard").status == "message"
+    robot.graph.apply_token(bridge_token(OTHER), False)
+    assert robot.reading("//cell/heard").status == "cut"
+
+
+@pytest.mark.parametrize(
+    ("bridge", "publisher", "key"),
+    [
+        ("/r1", None, "r1/rosout"),
+        ("", None, "rosout"),
+        ("", "rosout", "rosout"),
+        ("", "r1/rosout", "r1/rosout"),  # of the simulated robots of a panel
+    ],
+)
+def test_the_nodes_log_is_where_the_bridge_has_it(bridge: str, publisher: str | None, key: str) -> None:
+    robot = robot_of_several("/r1")
+    robot.graph.update_namespaces({BRIDGE: bridge})
+    if publisher:
+        name = "rcl_interfaces/msg/Log"
+        robot.graph.apply_token(token(BRIDGE, "MP", publisher, name, Qos(), ""), True)
+    robot.update_publishers()
+    assert robot.key("/rosout") == key
+    assert robot.log_lines["rosout"] is robot.log_lines["r1/rosout"]
 
 
 def test_a_sample_from_after_the_loss_is_not_cut(robot: RobotState) -> None:

@@ -149,7 +149,8 @@ class Node:
 
     def tell(self) -> None:
         """Publishes which readers and writers are this node's; again whenever they have changed."""
-        node = NodeEntitiesInfo("/", self.name, list(self._readers), list(self._writers))
+        namespace, _, own = f"/{self.name}".rpartition("/")
+        node = NodeEntitiesInfo(namespace or "/", own, list(self._readers), list(self._writers))
         self._info.write(ParticipantEntitiesInfo(_gid(self._participant), [node]))
 
     def close(self) -> None:

@@ -120,10 +120,13 @@ class CycloneRobot(Commanded):
     If it ends regularly, it announces that, and the bridge removes it at once.
     """
 
-    def __init__(self, domain: int, lease_s: float = 10, *, hashed: bool = True) -> None:
-        """With `hashed` its services have type hashes, as since iron."""
+    def __init__(
+        self, domain: int, lease_s: float = 10, *, hashed: bool = True, namespace: str = ""
+    ) -> None:
+        """With `hashed` its services have type hashes, as since iron. `namespace` is its node's, like
+        "/amr"."""
         super().__init__(
-            [ROS_PYTHON, TESTS / "ros/cyclone_robot.py", NODE],
+            [ROS_PYTHON, TESTS / "ros/cyclone_robot.py", f"{namespace}/{NODE}"[1:]],
             {
                 "ROS_DOMAIN_ID": str(domain),
                 "CYCLONEDDS_URI": CYCLONE.format(lease_s=lease_s),

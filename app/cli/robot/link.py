@@ -20,7 +20,7 @@ from app.dialect.endpoint import within
 from app.errors import KioskError, LinkError
 from app.graph.model import GraphSnapshot, RobotGraph, Topic, near
 from app.interfaces import DISTROS
-from app.interfaces.names import NAMESPACE
+from app.interfaces.names import GLOBAL, NAMESPACE
 from app.panel import load_panel
 from app.settings import LOOPBACK_HOSTS, Settings
 from app.transport.bridge_observer import CONNECT_S, BridgeObserver
@@ -198,9 +198,10 @@ def lost_text(about: str, code: str = "topic_unrouted") -> str:
 
 
 def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGraph, Topic]:
-    """The topic of this name; LinkError with similar names."""
+    """The topic of this name, which is not below the namespace if it begins with "//"; LinkError with
+    similar names."""
     check_namespace(graph, place.namespace)
-    known = shown_topics(graph, place.namespace)
+    known = shown_topics(graph, "" if given.startswith(GLOBAL) else place.namespace)
     name = f"/{given.lstrip('/')}"
     if name not in known:
         close = near(name, known)

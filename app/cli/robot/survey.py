@@ -13,6 +13,7 @@ from app.graph.forwarding import lost_servers, lost_topics, topic_forwarding
 from app.graph.model import GraphSnapshot, RobotGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces
+from app.interfaces.names import SHARED_TOPICS
 from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, shown
 from app.scaffold.fields import shown_fields
@@ -37,7 +38,7 @@ async def survey(
 ) -> Known:
     """What is on the robot, with names below the panel's namespace."""
     parameters, unreadable = await _parameters(NodeServices(robot, interfaces, observer), robot, below)
-    topics = [_topic(one, below) for one in robot.topics if _is_below(one.name, below)]
+    topics = [_topic(one, below) for one in robot.topics if _is_of(one, below)]
     heard = await _listen(observer, topics, interfaces, listen_s)
     return Known(
         topics=topics,
@@ -82,8 +83,17 @@ def _is_below(name: str, namespace: str) -> bool:
     return name.startswith(f"{namespace}/")
 
 
+def _is_of(topic: Topic, namespace: str) -> bool:
+    """Whether a topic is below a namespace, or a node below it has the topic by its absolute name."""
+    nodes = (node for end in (*topic.publishers, *topic.subscribers) for node in end.nodes)
+    return _is_below(topic.name, namespace) or any(_is_below(node, namespace) for node in nodes)
+
+
 def _topic(one: Topic, below: str) -> Topic:
-    return replace(one, name=one.name.removeprefix(below))
+    """With its name as a panel file has it."""
+    if _is_below(one.name, below):
+        return replace(one, name=one.name.removeprefix(below))
+    return one if one.name in SHARED_TOPICS else replace(one, name=f"/{one.name}")
 
 
 def _server(one: Server, below: str) -> Server:

@@ -25,6 +25,7 @@ from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Interfaces
+from app.interfaces.names import PARAMETER_EVENTS
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.permission.servers import SERVER_SETTLE_S, parameters_offered
@@ -67,6 +68,7 @@ class ParameterSync:
         self._nodes: dict[str, Node] = {}
         for widget in panel.parameters():
             self._nodes.setdefault(widget.node, Node(widget.node)).widgets.append(widget)
+        self._nodes_by_full_name = {f"/{robot.key(name)}": node for name, node in self._nodes.items()}
         services = (name for name, _ in (GET, DESCRIBE, SET))
         self._served_by = {
             robot.key(f"{node.name}/{service}"): node
@@ -111,9 +113,10 @@ class ParameterSync:
 
     # Queries and events.
 
-    def on_event(self, sample: Sample) -> None:
-        """Applies a parameter event of any node. Queries the nodes if an event may have been missed."""
-        passed_on = sample.source is None or sample.source in self._robot.graph.bridges
+    def on_event(self, key: str, sample: Sample) -> None:
+        """Applies a parameter event of any node, from the topic of this key. Queries the nodes if an
+        event may have been missed."""
+        passed_on = self._robot.is_from_bridge(key, sample.source)
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
@@ -124,7 +127,9 @@ class ParameterSync:
             self._log.debug("%s", error)
             self._query_all()
             return
-        if (node := self._nodes.get(event.node)) and node.task is not None:
+        of_bridge = f"/{key}".removesuffix(PARAMETER_EVENTS)  # its namespace
+        node = self._nodes_by_full_name.get(f"{of_bridge}{event.node}")
+        if node is not None and node.task is not None:
             self._apply_event(node, event, sample.wall)
 
     def _query_all(self) -> None:

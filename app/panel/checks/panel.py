@@ -9,6 +9,7 @@ from app.i18n.values import alike
 from app.interfaces import Interfaces
 from app.panel.checks.interlocks import interlock_faults
 from app.panel.checks.languages import language_faults
+from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
@@ -56,6 +57,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from found
     yield from _topic_conflicts(panel, [fault.place for fault in found])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
+    yield from spelling_faults(panel, _widgets_with_places(panel))
     yield from _record_faults(panel)
     yield from _trend_faults(panel)
     yield from page_template_faults(panel)

@@ -15,6 +15,7 @@ from pydantic import Field
 from app.dialect.endpoint import Role
 from app.errors import Fault
 from app.interfaces import Interfaces
+from app.interfaces.names import ROSOUT_TOPIC
 from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
@@ -291,7 +292,7 @@ class PublishCommand(TopicWidget, Command):
         yield "MS", self.topic
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        if self.topic == "/rosout":
+        if self.topic in (ROSOUT_TOPIC, f"/{ROSOUT_TOPIC}"):
             what = "/rosout is where the panel server's own log goes: choose another"
             yield Fault(f"{place}.topic", what)
         yield from super().faults(place, checking)

@@ -12,9 +12,9 @@ from app.i18n import PanelText, Text, TextLike, number, say
 from app.i18n.typed_numbers import read_number, read_numbers
 from app.i18n.values import numbers, with_unit
 from app.interfaces import INTEGER_RANGES, Interfaces
-from app.interfaces.names import TOPIC
+from app.interfaces.names import PARAMETER_EVENTS
 from app.interfaces.validation import format_value
-from app.panel.base import SaidLabel, Seconds, Span, catalogue_default
+from app.panel.base import SaidLabel, Seconds, Span, catalogue_default, is_absolute_name
 from app.panel.list_text import join_list, quote_element
 from app.panel.number_range import Range, decimal_text
 from app.panel.values import number_text, same_value
@@ -25,7 +25,7 @@ from app.panel.widgets.numbers import Number, SteppedWidget, Unit
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]
 
-EVENTS: Final = "/parameter_events"
+EVENTS: Final = PARAMETER_EVENTS
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
 
 # The node's parameter services that are used, with their types.
@@ -43,7 +43,7 @@ TYPE_TEXTS: Final[Mapping[str, str]] = {
 
 
 def _check_node(given: str) -> str:
-    if not TOPIC.fullmatch(given) or "__" in given:
+    if not is_absolute_name(given):
         raise ValueError(
             f"{format_value(given)} is not the absolute name of a ROS 2 node: "
             "it must be like /cell1/arm"

@@ -83,7 +83,7 @@ def _check_mcap_ends(path: Path) -> None:
     where it looked for one."""
     with path.open("rb") as stream:
         begins = stream.read(len(MCAP_MAGIC))
-        stream.seek(max(path.stat().st_size - len(MCAP_MAGIC), 0))
+        stream.seek(max(path.stat().st_size - len(MCAP_MAGIC), len(begins)))
         ends = stream.read()
     if begins != MCAP_MAGIC:
         raise RecordingError(f"{path} can't be read: it is not an MCAP file")

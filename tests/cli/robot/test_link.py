@@ -58,6 +58,7 @@ def place_below(namespace: str) -> Place:
         (ONE, "", "/speed", "", "/speed"),
         (ONE, "", "speed", "", "/speed"),
         (ONE, "/arm", "/enabled", "", "/arm/enabled"),
+        (ONE, "/arm", "//speed", "", "/speed"),
         (TWO, "", "/r2/speed", "/r2", "/speed"),
         (TWO, "/r1", "/speed", "/r1", "/speed"),
     ],

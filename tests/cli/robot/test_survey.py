@@ -1,8 +1,14 @@
-"""How often a topic is published, from when its messages arrived."""
+"""What is known of a robot: its topics by their names in a panel file, and how often they are
+published, from when their messages arrived."""
+
+import asyncio
+from typing import Any
 
 import pytest
 
-from app.cli.robot.survey import Heard
+from app.cli.robot.survey import Heard, survey
+from app.graph.model import Bridge, EndpointQos, RobotGraph, Topic, TopicEndpoint
+from tests.support.builders import INTERFACES
 
 
 @pytest.mark.parametrize(
@@ -25,3 +31,22 @@ def test_of_a_latched_topic_one_message_is_enough() -> None:
     assert not Heard(message=True, arrivals=[1.0]).is_enough(latched=False)
     assert Heard(message=True, arrivals=[1.0, 2.0, 3.0]).is_enough(latched=False)
     assert not Heard(arrivals=[1.0, 2.0, 3.0]).is_enough(latched=False)
+
+
+def topic(name: str, node: str) -> Topic:
+    end = TopicEndpoint(type="none_msgs/msg/None", qos=EndpointQos(), bridge="a", nodes=(node,))
+    return Topic(name=name, key=name[1:], publishers=(end,))
+
+
+def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
+    topics = (
+        topic("/amr/speed", "/amr/drive"),
+        topic("/diagnostics", "/amr/drive"),
+        topic("/rosout", "/amr/drive"),
+        topic("/lift", "/other/lift"),
+    )
+    robot = RobotGraph(bridges=(Bridge(zid="a", version="v1", config={}),), topics=topics)
+    observer: Any = None  # nothing is listened to: no type is known
+    known = asyncio.run(survey(observer, robot, "/amr", INTERFACES, 0))
+    assert [one.name for one in known.topics] == ["/speed", "//diagnostics", "/rosout"]
+    assert [one.key for one in known.topics] == ["amr/speed", "diagnostics", "rosout"]
