@@ -19,6 +19,7 @@ from app import ros_logging
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
+from app.panel.rules import EmbedRules
 from app.panel.widgets.kinds import KINDS
 from app.process import listen_sockets
 from app.process.sd_notify import ServiceManager
@@ -31,6 +32,7 @@ from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets
+from app.web.connections import Connection
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
@@ -95,18 +97,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
     )
-    _add_middleware(app, settings)
+    _add_middleware(app, settings, panel.embed)
     _add_routes(app, settings.dev)
     return app
 
 
-def _add_middleware(app: FastAPI, settings: Settings) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None:
     """The last that is added sees a request first."""
     if settings.dev:
         app.add_exception_handler(Exception, on_error_in_development)
     app.add_middleware(LanguageHeaders)
     app.add_middleware(GZipMiddleware, minimum_size=500)
-    app.add_middleware(RequestGuard, hosts=settings.hosts)
+    app.add_middleware(RequestGuard, hosts=settings.hosts, embed=embed)
     app.add_middleware(Turns)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
@@ -174,6 +176,7 @@ async def _app_state(
 ) -> AsyncIterator[AppState]:
     """Opens everything that requests need, and closes it at the end."""
     settings = replace(settings, root_path=root_path_of(settings, server))
+    Connection.proxies.name(settings.proxies)
     async with open_log(settings, panel) as oplog:
         check_port(server)
         # In development the gallery shows all kinds.

@@ -25,7 +25,7 @@ from app.panel.demo import DemoEntry
 from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
-from app.panel.rules import ControlRules, LogRules, RecordRules
+from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.texts import panel_texts
 from app.panel.widgets.families import (
@@ -101,6 +101,7 @@ class Panel(Description):
     screen: ScreenRules = ScreenRules()
     frame: Frame = Frame.model_validate({})
     control: ControlRules = ControlRules(required=False)
+    embed: EmbedRules = EmbedRules()
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()

@@ -1,6 +1,6 @@
-"""The tables `[control]`, `[log]` and `[record]` of a panel file."""
+"""The tables `[control]`, `[embed]`, `[log]` and `[record]` of a panel file."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field
 
@@ -14,6 +14,18 @@ class ControlRules(Description):
     required: bool
     takeover_after_s: Seconds = 30.0
     local: bool = True
+
+
+ORIGIN: Final = r"^https?://([a-z0-9-]+(\.[a-z0-9-]+)*|\[[0-9a-f:.]+\])(:[1-9][0-9]{0,4})?$"
+Origin = Annotated[str, Field(pattern=ORIGIN, max_length=255)]
+
+
+class EmbedRules(Description):
+    """Pages of these origins may show the panel's pages in a frame. `controls`: also what can be
+    pressed."""
+
+    origins: Annotated[tuple[Origin, ...], Field(strict=False, max_length=20)] = ()
+    controls: bool = False
 
 
 class LogRules(Description):

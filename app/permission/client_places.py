@@ -5,6 +5,7 @@ machine, so that no number of other clients shuts it out.
 """
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from ipaddress import IPv6Address, ip_address, ip_network
@@ -36,10 +37,12 @@ def shares(total: int) -> PlaceLimits:
 class ClientPlaces:
     """The taken places by client. Used on the event loop only."""
 
-    __slots__ = ("_taken", "_total", "limits")
+    __slots__ = ("_shared", "_taken", "_total", "limits")
 
-    def __init__(self, limits: PlaceLimits) -> None:
+    def __init__(self, limits: PlaceLimits, shared: Callable[[str], bool] = lambda _: False) -> None:
+        """`shared`: whether a client is many, as a proxy is. It may take what all others may."""
         self.limits = limits
+        self._shared = shared
         self._taken: Counter[str] = Counter()
         self._total = 0
 
@@ -52,12 +55,17 @@ class ClientPlaces:
         """How many places the client may have: its own share where it has that, else that of all."""
         limits, kiosk = self.limits, client in KIOSK
         if self.client_full(client):
-            return limits.kiosk if kiosk else limits.client
+            return self._share(client)
         return limits.total if kiosk else limits.others
 
     def client_full(self, client: str) -> bool:
         """Whether the client has all places that it may have."""
-        return self._taken[client] >= (self.limits.kiosk if client in KIOSK else self.limits.client)
+        return self._taken[client] >= self._share(client)
+
+    def _share(self, client: str) -> int:
+        if client in KIOSK:
+            return self.limits.kiosk
+        return self.limits.others if self._shared(client) else self.limits.client
 
     def full(self, client: str) -> bool:
         """Whether all places are taken that a client like this may have."""

@@ -6,8 +6,9 @@ from app.i18n import TextLike, number, say
 from app.panel.rules import ControlRules
 from app.permission.principal import Principal
 
-# What a client is to who has control; "" where control is not required.
-Role = Literal["", "free", "held", "over", "asking", "holding", "asked"]
+# What a client is to who has control; "" where control is not required, `embedded` for a page in a
+# frame of another site, which may only show.
+Role = Literal["", "free", "held", "over", "asking", "holding", "asked", "embedded"]
 IN_CONTROL: Final = frozenset[Role]({"", "holding", "asked"})
 
 

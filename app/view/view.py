@@ -187,7 +187,18 @@ def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) 
     """The view for clients of this role; without control, commands are locked."""
     if not role:
         return view
+    if role == "embedded":
+        widgets = {name: _embedded(attributes) for name, attributes in view["widgets"].items()}
+        return {**view, "control": {**NO_CONTROL, "role": role}, "widgets": widgets}
     control = control_for_role(view["control"], role)
     if role in IN_CONTROL:
         return {**view, "control": control}
     return {**view, "control": control, "widgets": {**view["widgets"], **without_control}}
+
+
+def _embedded(attributes: Attributes) -> Attributes:
+    """The attributes of a widget on a page that may only show."""
+    reason = say("embedded")
+    overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
+    overlay |= {"stoppable": False, "askable": False}
+    return {name: overlay.get(name, value) for name, value in attributes.items()}

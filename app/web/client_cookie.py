@@ -48,14 +48,16 @@ def principal_of(request: HTTPConnection, state: AppState) -> Principal:
     return caller(request).principal(state)
 
 
-def principal_with_new_token(request: Request, state: AppState) -> tuple[Principal, str]:
+def principal_with_new_token(
+    request: Request, state: AppState, embedded: bool = False
+) -> tuple[Principal, str]:
     """The client of a request, and the token to set with the response, "" if it needs none.
 
     A browser that follows a link from another site does not send its cookie. It gets no second one,
-    since its next request has the first.
+    since its next request has the first. One that shows a page in a frame (`embedded`) would keep none.
     """
     who = principal_of(request, state)
-    if who.client.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
+    if who.client.id or embedded or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return who, ""
     token = new_token()
     if opened_by_person(request):

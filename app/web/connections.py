@@ -12,6 +12,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResp
 
 from app.permission.client_places import KIOSK, ClientPlaces, client_key, shares
 from app.web.client_transport import DRAIN_MOST, DRAIN_WITHIN_S, ClientTransport
+from app.web.proxies import NamedProxies
 
 log = logging.getLogger("kiosk.connections")
 
@@ -29,7 +30,8 @@ class Connection(HttpToolsProtocol):
     its share, else of any client but the kiosk's own. Without such a one the new connection is closed.
     """
 
-    places: ClassVar = ClientPlaces(shares(CONNECTIONS_MOST))
+    proxies: ClassVar = NamedProxies()
+    places: ClassVar = ClientPlaces(shares(CONNECTIONS_MOST), proxies)
     waiting: ClassVar[dict["Connection", None]] = {}  # for their first head, the oldest first
 
     client_transport: ClientTransport

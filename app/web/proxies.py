@@ -2,6 +2,7 @@
 only."""
 
 from collections.abc import Sequence
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from typing import Any, Final
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -10,6 +11,26 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from app.permission.clients import where
 
 PEER: Final = "panel.peer"  # of the connection, in the scope
+
+
+class NamedProxies:
+    """Whether an address is that of a proxy: its connections are those of many clients."""
+
+    def __init__(self) -> None:
+        self._networks: list[IPv4Network | IPv6Network] = []
+
+    def name(self, proxies: Sequence[str]) -> None:
+        """Names the proxies, by addresses and networks."""
+        self._networks = [ip_network(proxy) for proxy in proxies]
+
+    def __call__(self, address: str) -> bool:
+        if not self._networks:
+            return False
+        try:
+            found = ip_network(address)  # of IPv6 it is a subnet
+        except ValueError:
+            return False
+        return any(found.version == own.version and found.overlaps(own) for own in self._networks)
 
 
 class Proxies:

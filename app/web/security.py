@@ -14,7 +14,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.panel.rules import EmbedRules
 from app.printable import printable
+from app.web.embedding import from_frame, only_shows
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
@@ -23,17 +25,25 @@ STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
 HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:\d{1,5})?")
+NO_FRAMES: Final = EmbedRules()
 OWN_SITE: Final = frozenset({"same-origin", "none"})
+
+
+def content_security_policy(ancestors: str = "'none'", forms: str = "'self'") -> str:
+    """The policy of a page; `ancestors` may show it in a frame."""
+    return (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+        f"connect-src 'self'; form-action {forms}; base-uri 'none'; frame-ancestors {ancestors}"
+    )
+
 
 FOR_ALL: Final = {
     "x-content-type-options": "nosniff",
     "cross-origin-resource-policy": "same-origin",
 }
+POLICY: Final = "content-security-policy"
 SECURITY_HEADERS: Final = FOR_ALL | {
-    "content-security-policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-        "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-    ),
+    POLICY: content_security_policy(),
     # Not "no-referrer": with it browsers send "Origin: null" with the panel's own form posts.
     "referrer-policy": "same-origin",
     "cross-origin-opener-policy": "same-origin",
@@ -45,9 +55,10 @@ NO_DOCUMENTS: Final = ("text/css", "text/javascript", "text/event-stream")
 class RequestGuard:
     """Refuses with 403 before anything is read; adds the security headers to what goes out."""
 
-    def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
+    def __init__(self, app: ASGIApp, hosts: Iterable[str], embed: EmbedRules = NO_FRAMES) -> None:
         self._app = app
         self._hosts = frozenset(hosts)
+        self._embed = embed
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -77,7 +88,16 @@ class RequestGuard:
         for origin in headers.getlist("origin"):
             if _host_of(origin) != host:
                 return f'a page of "{origin}" asked for this'
+        if moves(scope) and only_shows(self._embed, from_frame(scope)):
+            return "a page in a frame asked for this: open the panel itself"
         return None
+
+
+def moves(scope: Scope) -> bool:
+    """Whether a request may move something: a post, or a socket that does not only read."""
+    if scope["type"] == "websocket":
+        return not path_of(scope).endswith("/frames")
+    return scope["method"] not in READING
 
 
 def secured(send: Send) -> Send:

@@ -48,7 +48,7 @@ def bound(server: Config) -> None:
     want_files()
     if server.http_protocol_class is HttpToolsProtocol:
         server.http_protocol_class = Connection
-        Connection.places = ClientPlaces(shares(connections_most()))
+        Connection.places = ClientPlaces(shares(connections_most()), Connection.proxies)
     if server.ws_protocol_class is not None:
         server.ws_protocol_class = Socket
 

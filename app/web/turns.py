@@ -20,8 +20,7 @@ from app.permission.client_places import KIOSK
 from app.rate_limit import Quota, TokenBuckets
 from app.web.client_cookie import client_of
 from app.web.language import language_of
-from app.web.root_path import path_of
-from app.web.security import READING, refuse
+from app.web.security import moves, refuse
 from app.web.turn_queue import Lane, TurnQueue, lane_of
 
 log = logging.getLogger("kiosk.connections")
@@ -113,13 +112,6 @@ class Turns:
                 await self._came.wait()
         except TimeoutError:
             pass
-
-
-def moves(scope: Scope) -> bool:
-    """Whether a request may move something: a post, or a socket that does not only read."""
-    if scope["type"] == "websocket":
-        return not path_of(scope).endswith("/frames")
-    return scope["method"] not in READING
 
 
 def _too_many(connection: HTTPConnection) -> Response:

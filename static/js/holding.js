@@ -57,7 +57,8 @@ export class Holding {
     this.#show("", "");
     this.#lease = "";
     this.#number = 0;
-    const path = `${document.body.dataset.base}/widgets/${this.root.dataset.widget}/hold`;
+    const { base, embed } = document.body.dataset;
+    const path = `${base}/widgets/${this.root.dataset.widget}/hold${embed}`;
     const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
     this.#socket = socket;
     this.#stampedAt = performance.now();

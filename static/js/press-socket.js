@@ -5,7 +5,8 @@ export class PressSocket {
   #leaving = false;
 
   constructor(onClose) {
-    const url = new URL(`${document.body.dataset.base}/presses`, location);
+    const { base, embed } = document.body.dataset;
+    const url = new URL(`${base}/presses${embed}`, location);
     this.#socket = new WebSocket(url.href.replace(/^http/, "ws"));
     this.#socket.onmessage = ({ data }) => {
       const response = JSON.parse(data);

@@ -106,7 +106,7 @@ def test_pages_presses_events_holds_and_pictures_work_below_a_path(
     page.goto(f"{url}/")
     say = widget(page, "say").get_by_role("button")
     expect(say).to_be_enabled()  # by the events
-    page.get_by_label("Text").fill("below a path")
+    page.locator("#input-text").fill("below a path")
     say.click()
     expect(page.locator("#receipt-say")).to_contain_text("/say")
     until(lambda: widget(page, "view").get_attribute("data-frame"), "a picture")

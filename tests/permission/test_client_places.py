@@ -3,6 +3,7 @@
 import pytest
 
 from app.permission.client_places import ClientPlaces, PlaceLimits, client_key, shares
+from app.web.proxies import NamedProxies
 
 LIMITS = PlaceLimits(total=10, others=8, client=3, kiosk=5)
 KIOSK = "127.0.0.1"
@@ -28,6 +29,22 @@ def test_the_kiosk_leaves_places_for_others() -> None:
     places = ClientPlaces(LIMITS)
     assert taken(places, KIOSK) == 5
     assert [taken(places, f"192.0.2.{number}") for number in range(3)] == [3, 2, 0]
+
+
+def test_a_proxy_is_many_clients() -> None:
+    proxies = NamedProxies()
+    proxies.name(["192.0.2.9", "198.51.100.0/24", "2001:db8::1"])
+    places = ClientPlaces(LIMITS, proxies)
+    assert taken(places, "192.0.2.1") == LIMITS.client
+    assert taken(places, "192.0.2.9") == LIMITS.others - LIMITS.client
+    addresses = (
+        "198.51.100.7",
+        client_key("2001:db8::1"),
+        "192.0.2.8",
+        "2001:db9::/64",
+        "not an address",
+    )
+    assert [proxies(address) for address in addresses] == [True, True, False, False, False]
 
 
 def test_a_place_that_is_given_back_can_be_taken_again() -> None:

@@ -14,6 +14,7 @@ from app.web.root_path import OWN_PATHS, RootPath, path_of, root_path_of
 from app.web.security import RequestGuard
 from docs._generate import places
 from tests.support.holds import PANEL
+from tests.support.parts import ROOT
 from tests.support.servers import demo_server
 
 ROBOTS = """
@@ -124,3 +125,9 @@ def test_pages_of_several_robots_are_below_the_root_path(tmp_path: Path) -> None
         assert 'href="/cell1/robots/r2/pages/one"' in text
         assert 'data-base="/cell1/robots/r1"' in text
         assert json.loads(mine.http.get("/openapi.json").text)["servers"] == [{"url": "/cell1"}]
+
+
+def test_no_page_has_a_path_without_the_root_path() -> None:
+    files = [*(ROOT / "templates").rglob("*.html"), *(ROOT / "static").rglob("*.js")]
+    absolute = re.compile(r"""(?:href|src|action)="/|["'`]/(?:static|pages|events|widgets|log)""")
+    assert [file.name for file in files if absolute.search(file.read_text())] == []

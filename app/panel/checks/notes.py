@@ -14,6 +14,7 @@ from app.panel.widgets.trend import Trend, history_bytes
 def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """All notes with their places in the panel file, without ids and lines."""
     yield from _unbounded_trust_notes(panel)
+    yield from _embedded_controls_notes(panel)
     yield from _unused_interlock_notes(panel)
     yield from _unusable_type_notes(panel, interfaces)
     yield from _trend_notes(panel)
@@ -32,6 +33,16 @@ def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:
                 "also when its publisher is gone or one of its messages is lost: give max_age_s where "
                 "it is published regularly, or require_publisher = true where its publisher stays",
             )
+
+
+def _embedded_controls_notes(panel: Panel) -> Iterator[Note]:
+    """Controls in pages of others."""
+    if panel.embed.controls and panel.embed.origins:
+        yield Note(
+            "embed.controls",
+            "a page that embeds this panel can lay something over a button, so that an operator "
+            "presses without seeing it: list only origins that you trust as much as the panel",
+        )
 
 
 def _unused_interlock_notes(panel: Panel) -> Iterator[Note]:

@@ -102,6 +102,13 @@ LOGS: Final = (
 
 MESSAGES: Final = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
 LINES: Final[Sequence[Mapping[str, TextLike]]] = [
-    {"time": AT, "level": level, "word": say(f"rosout_{level}"), "node": "cell", "text": text}
+    {
+        "time": AT,
+        "at": "2026-11-21T10:00:00+00:00",
+        "level": level,
+        "word": say(f"rosout_{level}"),
+        "node": "cell",
+        "text": text,
+    }
     for level, text in zip(LOG_LEVELS, MESSAGES, strict=True)
 ]

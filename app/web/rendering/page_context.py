@@ -23,6 +23,8 @@ from app.view.sections import SECTIONS, Section
 from app.view.view import View
 from app.web.app_state import AppState
 from app.web.assets import PICTURES
+from app.web.embedding import QUERY as EMBED
+from app.web.embedding import only_shows
 from app.web.language import language_of
 from app.web.rendering.display_choice import Choice, Display, choices, display_of, language_choice
 from app.web.rendering.page_words import page_words
@@ -70,12 +72,23 @@ class PageContext(TypedDict):
 
 
 def page_context(
-    request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
+    request: Request,
+    state: AppState,
+    session: RobotSession,
+    page: Page,
+    who: Principal,
+    refresh_s: int,
+    embedded: bool = False,
 ) -> PageContext:
-    """The context of a page for one request, but `inside`, which the page's own template renders."""
+    """The context of a page for one request, but `inside`, which the page's own template renders.
+    `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
+    again |= {EMBED: 1} if embedded else {}
+    now_role = role(publisher.view["control"], who, rules)
+    if only_shows(session.panel.embed, embedded):
+        now_role = "embedded"
     now, wall = clock.server_now(), time.time()
     panel, language = state.fleet.panel, language_of(request)
     display = display_of(request, panel)
@@ -88,7 +101,7 @@ def page_context(
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=publisher.for_role(role(publisher.view["control"], who, rules)),
+        view=publisher.for_role(now_role),
         sections=SECTIONS,
         event_id=publisher.id,
         revision=publisher.revision,
@@ -98,7 +111,8 @@ def page_context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words=page_words(
+        words={"embed": f"?{EMBED}=1" if embedded else ""}
+        | page_words(
             session, page, f"{state.root}/static/{state.assets.revision}/{PICTURES}", language
         ),
         lost=say("server_lost"),

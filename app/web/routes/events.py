@@ -16,6 +16,7 @@ from app.view.publisher import EVERYTHING, Reader, ViewPublisher, client_id_even
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import server_send
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.embedding import from_frame, only_shows
 from app.web.language import language_of
 from app.web.metrics import Open
 from app.web.openapi_parts import TEXT, errors
@@ -40,13 +41,22 @@ async def events(
     session: CurrentSession,
     once: bool = False,
     page: str = "",
+    embed: bool = False,
 ) -> Response:
     """`once`: one snapshot and the end, for programs. `page`: of its widgets only, and those of the
-    frame; without one, or with one that the panel does not have, of all."""
+    frame; without one, or with one that the panel does not have, of all. `embed`: for a page in a
+    frame."""
     publisher, rules = session.publisher, session.control.rules
-    who, token = principal_with_new_token(request, state) if rules.required else (None, "")
+    embedded = embed or from_frame(request.scope)
+    who, token = None, ""
+    if only_shows(state.fleet.panel.embed, embedded):
+        role_now = embedded_role
+    elif rules.required:
+        who, token = principal_with_new_token(request, state, embedded)
+        role_now = _role_of(who, publisher, rules)
+    else:
+        role_now = no_role
     first = client_id_event(who.client.id) if who else b""
-    role_now = _role_of(who, publisher, rules) if who else no_role
     answer: Response
     reader = publisher.reader(language_of(request), page)
     if once:
@@ -64,6 +74,11 @@ def _role_of(who: Principal, publisher: ViewPublisher, rules: ControlRules) -> C
 def no_role() -> Role:
     """The role of all clients if control is not required."""
     return ""
+
+
+def embedded_role() -> Role:
+    """The role of a page in a frame that may only show."""
+    return "embedded"
 
 
 class EventStream(Response):

@@ -69,6 +69,7 @@ def _words() -> dict[str, Any]:
     return {word: say(word) for word in (*WORDS, *TREND_WORDS)} | {
         **UNREADABLE,
         "base": "",
+        "embed": "",
         "pictures": "/gallery",
         "asks": {},
         "lines": lambda _: LINES,

@@ -12,9 +12,11 @@ from app.panel.layout import Page
 from app.panel.widgets.families import EntryWidget
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
+from app.web.embedding import QUERY, frame_ancestors, is_embedded, only_shows, says_embedded
 from app.web.language import language_of
 from app.web.openapi_parts import PAGE, Described, errors
 from app.web.rendering.page_context import page_context
+from app.web.security import POLICY, content_security_policy
 
 router = APIRouter(include_in_schema=True)
 
@@ -80,16 +82,24 @@ def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None
 
 def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
+    rules = session.panel.embed
+    embedded = bool(rules.origins) and is_embedded(request)
+    if embedded and not says_embedded(request.url.query):
+        again = request.url.include_query_params(**{QUERY: 1})
+        return RedirectResponse(f"{again.path}?{again.query}", status_code=303)
     typed = any(isinstance(widget, EntryWidget) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    who, token = principal_with_new_token(request, state)
-    if session.control.rules.required:
+    who, token = principal_with_new_token(request, state, embedded)
+    if session.control.rules.required and not embedded:
         session.control.loaded(who, refresh_s + GRACE_S, opened_by_person(request))
         session.show()
     language = language_of(request)
-    context = page_context(request, state, session, page, who, refresh_s)
+    context = page_context(request, state, session, page, who, refresh_s, embedded)
     widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
     pictures = state.fleet.panel.picture_files
     context["inside"] = state.templates.inside(page, pictures, language, **widgets)
     html = state.templates.render("screen.html", language, **context)
-    return set_client_cookie(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
+    forms = "'none'" if only_shows(rules, embedded) else "'self'"
+    policy = content_security_policy(frame_ancestors(rules, embedded), forms)
+    headers = {"cache-control": "no-store", POLICY: policy}
+    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
