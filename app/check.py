@@ -3,6 +3,7 @@
 import sys
 
 from app.cli.check import main
+from app.cli.pipe import until_closed
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(until_closed(lambda: main(sys.argv[1:])))

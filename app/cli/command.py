@@ -8,12 +8,17 @@ from typing import NoReturn
 
 from app.cli.command_table import COMMANDS
 from app.cli.parser import USAGE_ERROR, Parser
+from app.cli.pipe import until_closed
 from app.settings import APP
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The exit status; `--help` and a mistake on the command line raise SystemExit."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    return until_closed(lambda: _run(given))
+
+
+def _run(given: list[str]) -> int:
     if not given:
         program_parser().print_help(sys.stderr)
         return USAGE_ERROR

@@ -90,7 +90,8 @@ class Fleet:
         if robot in self._sessions:
             return self._sessions[robot]
         if robot is None:
-            raise NotFound(f"this panel has several robots: begin with {self.first.base}/")
+            has = "several robots" if len(self.sessions) > 1 else "a robot with a path of its own"
+            raise NotFound(f"this panel has {has}: begin with {self.first.base}/")
         known = ", ".join(str(name) for name in self._sessions if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
 

@@ -107,7 +107,7 @@ def test_echo_shows_the_last_value_of_a_latched_topic(cyclone_bridge: Bridge, io
     [
         (["--field", "position"], "- 0.5\n- -1.0\n---\n"),
         (["--field", "position[name=j2]"], "-1.0\n---\n"),
-        (["--csv"], "0,0,,j1,j2,0.5,-1.0\n"),
+        (["--csv"], "0,0,,j1,j2,0.5,-1.0,,\n"),
         (["--field", "name", "--json"], '["j1", "j2"]\n'),
     ],
 )
@@ -300,10 +300,13 @@ def test_a_scaffold_of_a_domain_without_nodes_says_so_and_writes_no_file(
     path = tmp_path / "cell.toml"
     try:
         done = run(bridge, "scaffold", "-o", str(path))
+        listed = run(bridge, "topics")
     finally:
         bridge.end()
     assert (done.returncode, done.stdout, path.exists()) == (1, "", False)
-    assert f"the bridge sees no topic in domain {bridge.domain}: start the robot's nodes" in done.stderr
+    for each in (done, listed):
+        assert (each.returncode, each.stdout) == (1, "")
+        assert f"the bridge sees no topic in domain {bridge.domain}: start the rob" in each.stderr
 
 
 def client_tokens(bridge: Bridge) -> list[str]:

@@ -94,6 +94,15 @@ def test_a_page_without_a_robot_leads_to_the_first(ten: Server, path: str) -> No
     assert (answer.status_code, answer.headers["location"]) == (303, f"/robots/r1{path}")
 
 
+def test_one_robot_with_a_path_of_its_own_is_not_called_several(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(Server(ROOT, KIOSK_PANEL=str(panel_file(tmp_path, entry(1)))))
+    until(kiosk.ready, "ready")
+    error = kiosk.press("operation", "whose?").json()["error"]
+    assert error == "this panel has a robot with a path of its own: begin with /robots/r1/"
+
+
 def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
     answer = ten.press("operation", "whose?")
     assert answer.status_code == 404

@@ -6,7 +6,6 @@ line.
 
 import argparse
 import asyncio
-import os
 import sys
 from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager
@@ -154,6 +153,16 @@ async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, GraphSnaps
         await observer.close()
 
 
+def nothing_there(robots: Sequence[RobotGraph], below: str) -> str:
+    """The sentence about a domain without nodes."""
+    where = f" below {below}" if below else ""
+    domains = few(sorted({str(bridge.domain) for robot in robots for bridge in robot.bridges}))
+    return (
+        f"the bridge sees no topic{where} in domain {domains}: start the robot's nodes, and set"
+        " `domain` in the bridge's file to their ROS_DOMAIN_ID"
+    )
+
+
 def absent_robots(graph: GraphSnapshot, place: Place) -> list[str]:
     """The namespaces of the panel's robots without a bridge that answers."""
     there = [one.namespace for one in graph.robots if any(bridge.answers for bridge in one.bridges)]
@@ -213,13 +222,10 @@ def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGr
 
 
 def ended(work: Callable[[], Coroutine[Any, Any, int]]) -> int:
-    """Runs a command to its end. Ctrl-C and a closed output (`| head`) end it without a message."""
+    """Runs a command to its end. Ctrl-C ends it without a message."""
     try:
         return asyncio.run(work())
     except KeyboardInterrupt:
-        return 0
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at exit
         return 0
     except KioskError as error:
         print(error, file=sys.stderr, flush=True)

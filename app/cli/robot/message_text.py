@@ -10,7 +10,7 @@ from app.interfaces.json_values import message_fields
 from app.printable import printable
 
 CUT: Final = "..."
-_PLAIN: Final = re.compile(r"[A-Za-z_/.][\w/.\- ]*(?<! )", re.ASCII)
+_PLAIN: Final = re.compile(r"(?!\.[0-9.])[A-Za-z_/.][\w/.\- ]*(?<! )", re.ASCII)
 _WORDS: Final = frozenset(("true", "false", "yes", "no", "on", "off", "null", "y", "n", ".nan", ".inf"))
 
 
@@ -80,13 +80,20 @@ def _scalar(value: Any, shape: Shape) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}.get(repr(value), repr(value))
+        return _float(repr(value))
     if not isinstance(value, str):
         return str(value)
     text = _text(value, shape)
     if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
         return text
     return printable(json.dumps(text, ensure_ascii=False)) if text else "''"
+
+
+def _float(text: str) -> str:
+    """As YAML 1.1 has it: with a point, else "1e-05" is a text."""
+    if "e" in text and "." not in text:
+        return text.replace("e", ".0e")
+    return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}.get(text, text)
 
 
 def _text(value: str, shape: Shape) -> str:
@@ -97,8 +104,8 @@ def _text(value: str, shape: Shape) -> str:
 
 
 def csv_line(value: Any, shape: Shape) -> str:
-    """All values of a message in the order of their definition (RFC 4180), with no header: lists have
-    any length."""
+    """All values of a message in the order of their definition (RFC 4180), with no header, as
+    `ros2 topic echo --csv` writes them: lists have any length, and an empty one has an empty cell."""
     return ",".join(map(_csv_cell, _scalars(value, shape)))
 
 
@@ -108,7 +115,9 @@ def _scalars(value: Any, shape: Shape) -> Iterator[Any]:
             yield from _scalars(one, shape)
     elif not _is_list(value):
         yield _text(value, shape) if isinstance(value, str) else value
-    elif shape.lists:
+    elif not shape.lists or not len(value):
+        yield f"<{len(value)} elements>" if len(value) else ""
+    else:
         for one in value[: shape.most]:
             yield from _scalars(one, shape)
         if shape.most is not None and len(value) > shape.most:

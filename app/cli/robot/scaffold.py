@@ -13,12 +13,21 @@ from typing import Any, Final
 from app.cli.arguments import seconds
 from app.cli.output import add_force, check_absent, draft_of
 from app.cli.parser import Parser
-from app.cli.robot.link import Place, add_options, check_namespace, ended, opened, place_of, report_lost
+from app.cli.robot.link import (
+    Place,
+    add_options,
+    check_namespace,
+    ended,
+    nothing_there,
+    opened,
+    place_of,
+    report_lost,
+)
 from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey
 from app.diagnose.findings import few
 from app.errors import KioskError
-from app.graph.model import GraphSnapshot, RobotGraph
+from app.graph.model import GraphSnapshot
 from app.interfaces import Interfaces, load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
@@ -54,7 +63,7 @@ async def _scaffold(given: Any) -> int:
         robot, below = robot_at(graph, place.namespace)
         known = await survey(observer, robot, below, interfaces, given.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
-        raise ScaffoldError(_nothing_there(robot, f"{robot.namespace}{below}"))
+        raise ScaffoldError(nothing_there([robot], f"{robot.namespace}{below}"))
     draft = _checked(
         known, interfaces, _base(place, graph, f"{robot.namespace}{below}", target), target
     )
@@ -84,15 +93,6 @@ def _checked(known: Known, interfaces: Interfaces, base: Draft, target: Path | N
 
 def _folder(target: Path | None) -> Path:
     return Path() if target is None else target.resolve().parent
-
-
-def _nothing_there(robot: RobotGraph, namespace: str) -> str:
-    where = f" below {namespace}" if namespace else ""
-    domains = ", ".join(sorted({str(bridge.domain) for bridge in robot.bridges}))
-    return (
-        f"the bridge sees no topic{where} in domain {domains}: start the robot's nodes, and set"
-        " `domain` in the bridge's file to their ROS_DOMAIN_ID"
-    )
 
 
 def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | None) -> Draft:

@@ -1,19 +1,22 @@
 """`operator-panel topics`: the topics of a robot through its bridge, as `ros2 topic list` shows them.
 
-Exit status: 0 they are listed, 1 there is no robot, or the bridge has lost topics of it, 2 a mistake on
-the command line.
+Exit status: 0 they are listed, 1 there is no robot or no topic, or the bridge has lost topics of it,
+2 a mistake on the command line.
 """
 
 import json
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
 from app.cli.parser import Parser
 from app.cli.robot.link import (
+    GONE,
     add_options,
     check_namespace,
     ended,
+    nothing_there,
     opened,
     place_of,
     report_lost,
@@ -54,6 +57,9 @@ async def _list(given: Any) -> int:
     else:
         for line in _lines(found, given.show_types, given.verbose):
             print(one_line(line))
+    if not found:
+        print(nothing_there(graph.robots, place.namespace), file=sys.stderr, flush=True)
+        return GONE
     states = {name: topic_forwarding(*one) for name, one in found.items()}
     return report_lost([name for name, state in states.items() if state == "lost"])
 
@@ -94,7 +100,8 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Lists the topics of a robot, through its bridge and without ROS.",
-        epilog="Exit status: 0 they are listed, 1 there is no robot, or its bridge has lost topics.",
+        epilog="Exit status: 0 they are listed, 1 there is no robot or no topic, or its bridge has lost"
+        " topics.",
     )
     add = parser.add_argument
     add("-t", "--show-types", action="store_true", help="with their types")

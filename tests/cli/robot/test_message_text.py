@@ -50,6 +50,8 @@ def test_an_empty_message_is_a_pair_of_braces() -> None:
         ("12", '"12"'),
         ("a: b", '"a: b"'),
         ("- x", '"- x"'),
+        (".5", '".5"'),
+        ("...", '"..."'),
         ("two\nlines", '"two\\nlines"'),
         ("\x1b[31mred", '"\\u001b[31mred"'),  # nothing of a robot's moves the terminal's cursor
         ("a\u202eb", '"a\\u202eb"'),
@@ -60,7 +62,15 @@ def test_texts_are_quoted_where_yaml_would_misread_them(text: str, written: str)
 
 
 @pytest.mark.parametrize(
-    ("value", "written"), [(float("nan"), ".nan"), (float("-inf"), "-.inf"), (0.1, "0.1")]
+    ("value", "written"),
+    [
+        (float("nan"), ".nan"),
+        (float("-inf"), "-.inf"),
+        (0.1, "0.1"),
+        (1e-05, "1.0e-05"),
+        (-1e300, "-1.0e+300"),
+        (1.5e-7, "1.5e-07"),
+    ],
 )
 def test_numbers_are_those_of_yaml(value: float, written: str) -> None:
     assert yaml_text(read("std_msgs/msg/Float64", {"data": value}), Shape()) == f"data: {written}"
@@ -78,7 +88,9 @@ def test_long_lists_and_texts_are_cut() -> None:
 
 
 def test_csv_has_all_values_in_order() -> None:
-    assert csv_line(read(STATE, JOINTS), Shape()) == "0,0,a b,j1,j2,0.5,-1.0"
+    assert csv_line(read(STATE, JOINTS), Shape()) == "0,0,a b,j1,j2,0.5,-1.0,,"
+    assert csv_line(read(STATE, {}), Shape()) == "0,0,,,,,"
+    assert csv_line(read(STATE, JOINTS), Shape(lists=False)) == "0,0,a b,<2 elements>,<2 elements>,,"
     assert csv_line(read("std_msgs/msg/Bool", {"data": True}), Shape()) == "True"
     text = read("std_msgs/msg/String", {"data": 'a,"b"\n'})
     assert csv_line(text, Shape()) == '"a,""b""\n"'
