@@ -99,7 +99,9 @@ def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
     if robot.silent_publishers.has_silent(key, robot.bridges_of(key)):
-        return locked("new_publisher", topic=topic)
+        reason = say("new_publisher", topic=topic)
+        which = robot.publishers(key).sentence(topic) if robot.graph.has_endpoint("MP", key) else ""
+        return Verdict(False, "new_publisher", joined([reason, which]))
     if not permits(interlock, reading.value(interlock.field)):
         return _forbidden(interlock, reading)
     if interlock.max_age_s is None:

@@ -6,8 +6,9 @@ to seconds later. So a publisher that appears makes the last value unknown, unti
 The bridge announces a publisher after it has discovered its node. A message that is delivered arrives
 before the token of its publisher: mostly by 5 to 100 ms, sometimes by 3 s (measured, see
 docs/permissions.md). So the first message since the previous publishers ended counts as that of the new
-one, if it is not older than `TOKEN_DELAY_S`. A TRANSIENT_LOCAL publisher loses nothing and does not
-repeat itself: its limit is `TOKEN_DELAY_LATCHED_S`.
+one, if it is not older than `TOKEN_DELAY_S`. If it is not older than `TOKEN_DELAY_MOST_S`, it counts as
+soon as the nodes are known, if only one of them publishes the topic. A TRANSIENT_LOCAL publisher loses
+nothing and does not repeat itself: its limit is `TOKEN_DELAY_LATCHED_S`.
 """
 
 from collections.abc import Collection
@@ -17,6 +18,7 @@ from typing import Final
 from app.dialect.endpoint import Endpoint
 
 TOKEN_DELAY_S: Final = 0.5  # from a message to the token of its publisher, at most
+TOKEN_DELAY_MOST_S: Final = 4.0  # the same, where no other publisher can have sent it
 TOKEN_DELAY_LATCHED_S: Final = 5.0
 
 
@@ -40,6 +42,7 @@ class SilentPublishers:
             tuple[str, str], int
         ] = {}  # sequence numbers of the last appearance or loss of a token
         self._silent: dict[str, dict[str | None, int]] = {key: {} for key in self._topics}
+        self._late: set[tuple[str, str]] = set()  # silent ones that may have sent the last message
 
     def record_message(self, key: str, source: str | None, seq: int, at: float) -> None:
         """A message arrived from the bridge `source`, None if unknown."""
@@ -57,6 +60,7 @@ class SilentPublishers:
         if endpoint.role != "MP" or endpoint.key not in self._topics:
             return
         key, bridge = endpoint.key, endpoint.zid
+        self._late.discard((key, bridge))
         last_change = max(self._last_changes.get((key, bridge), 0), lost_before)
         self._last_changes[key, bridge] = max(seq, last_change)
         before_s = TOKEN_DELAY_LATCHED_S if endpoint.transient_local else TOKEN_DELAY_S
@@ -64,16 +68,26 @@ class SilentPublishers:
             last = self._last_messages.get((key, source))
             if last and (last.seq > seq or (last.seq > last_change and at - last.at <= before_s)):
                 return
+            if last and last.seq > last_change and at - last.at <= TOKEN_DELAY_MOST_S:
+                self._late.add((key, bridge))
         self._silent[key][bridge] = seq
 
     def remove_publisher(self, endpoint: Endpoint, seq: int) -> None:
         """A publisher's token ended. If it never published, its topic stays silent."""
         if endpoint.role == "MP" and endpoint.key in self._topics:
             place = endpoint.key, endpoint.zid
+            self._late.discard(place)
             self._last_changes[place] = max(seq, self._last_changes.get(place, 0))
+
+    def mark_single(self, key: str) -> None:
+        """One node publishes the topic: the message shortly before its token was its own."""
+        for bridge in [bridge for late, bridge in self._late if late == key]:
+            self._late.discard((key, bridge))
+            self._silent[key].pop(bridge, None)
 
     def remove_bridge(self, bridge: str) -> None:
         """A bridge was lost. Its silent publishers count until any newer message arrives."""
+        self._late = {one for one in self._late if one[1] != bridge}
         for silent in self._silent.values():
             if bridge in silent:
                 silent[None] = max(silent.pop(bridge), silent.get(None, 0))

@@ -36,7 +36,7 @@ from app.robot.sample import SkippedPayload as SkippedPayload
 from app.robot.shared_topics import present_key
 from app.robot.silent_publishers import SilentPublishers
 from app.robot.slices import Slices
-from app.robot.topic_publishers import TopicPublishers
+from app.robot.topic_publishers import Publishers, TopicPublishers
 from app.robot.topics import Reading as Reading
 from app.robot.topics import Topic
 from app.ros_logging import RobotLog
@@ -194,6 +194,20 @@ class RobotState:
                 if topic.sample is not None and topic.sample.seq < before:
                     topic.invalidate()
                     self.replayed.begin(key)
+
+    def update_nodes(self) -> None:
+        """Call after the nodes of the graph have been read: what they are may be known now."""
+        self.drop_misread()
+        for key in self._interlock_keys:
+            is_known = self.graph.since("MP", key) <= self.graph.nodes_read_at
+            if is_known and self.publishers(key).number == 1:
+                self.silent_publishers.mark_single(key)
+
+    def publishers(self, key: str) -> Publishers:
+        """The publishers of an interlock's topic, as they are known now."""
+        known = self.topic_publishers.of_topic(key, self.graph)
+        nodes = {one.node for one in self.graph.node_endpoints("MP", key)}
+        return Publishers(max(known.number, len(nodes)), tuple(sorted({*known.nodes, *nodes})))
 
     def drop_misread(self) -> None:
         """Drops values that were decoded by a definition which turned out not to be the publisher's."""

@@ -98,7 +98,7 @@ class Turn:
 
     def on_graph_read(self) -> None:
         """Updates everything after the nodes of the graph were read: what they are may be known now."""
-        self._robot.drop_misread()
+        self._robot.update_nodes()
         self._commands.on_graph_change()
         self.changed()
 

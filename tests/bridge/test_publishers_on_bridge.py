@@ -13,6 +13,7 @@ from tests.support.parts import Bridge, RosNode, Server, live, until
 TRIALS = several(1, 50)  # of each of two kinds
 ONCE = KINDS[0]
 AT_ONCE = next(kind for kind in KINDS if not kind.matched and kind.durability == "volatile")
+NEW_PUBLISHER = "Locked: a new publisher of /kept has not published yet."
 LATCHED = next(kind for kind in KINDS if kind.durability == "transient_local")
 CLOSED_BY = several(1, 20)
 
@@ -62,8 +63,8 @@ def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishe
     publishers.open()
     silent = Kind("silent", times=0, matched=False)
     with publishers.running("fast", silent):
-        publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
-    publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
+        publishers.until_reason(f"{NEW_PUBLISHER} /kept is published by /publisher_")
+    publishers.until_reason(NEW_PUBLISHER)
     publishers.open()
 
 

@@ -173,8 +173,8 @@ class Publishers:
         self._alone()
 
     def until_reason(self, reason: str) -> None:
-        """Waits until the control is locked for this reason."""
-        until(lambda: self._server.widget(WIDGET)["reason"] == reason, reason)
+        """Waits until the control is locked for a reason that begins so."""
+        until(lambda: (self._server.widget(WIDGET)["reason"] or "").startswith(reason), reason)
 
     def trial(self, vendor: Vendor, kind: Kind) -> Trial:
         """A new publisher revokes the permission."""

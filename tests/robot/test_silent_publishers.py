@@ -16,7 +16,13 @@ from app.dialect.endpoint import Endpoint
 from app.interfaces.names import Qos
 from app.permission.interlocks import interlock_verdict
 from app.permission.verdict import Verdict
-from app.robot.silent_publishers import TOKEN_DELAY_LATCHED_S, TOKEN_DELAY_S, SilentPublishers
+from app.robot.sample import Sample
+from app.robot.silent_publishers import (
+    TOKEN_DELAY_LATCHED_S,
+    TOKEN_DELAY_MOST_S,
+    TOKEN_DELAY_S,
+    SilentPublishers,
+)
 from app.robot.state import RobotState
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Inbox
@@ -258,3 +264,54 @@ def test_the_panels_own_publisher_is_none_of_the_robots(incoming: Incoming) -> N
     incoming.publisher(True, KIOSK)
     incoming.publisher(False, KIOSK)
     assert incoming.verdict.permitted
+
+
+WINDOW = [(TOKEN_DELAY_S + 0.1, False), (TOKEN_DELAY_MOST_S, False), (TOKEN_DELAY_MOST_S + 0.1, True)]
+
+
+@pytest.mark.parametrize(("before_s", "is_silent"), WINDOW)
+def test_a_message_within_the_joining_window_is_that_of_the_only_publisher(
+    known: SilentPublishers, before_s: float, is_silent: bool
+) -> None:
+    known.record_message(KEY, BRIDGE, 1, 10.0)
+    known.add_publisher(PUBLISHER, 2, 10.0 + before_s)
+    assert silent(known)
+    known.mark_single(KEY)
+    assert silent(known) is is_silent
+
+
+@pytest.mark.parametrize("end", ["publisher", "bridge"])
+def test_a_publisher_that_ended_is_not_the_only_one(known: SilentPublishers, end: str) -> None:
+    known.record_message(KEY, BRIDGE, 1, 10.0)
+    known.add_publisher(PUBLISHER, 2, 12.0)
+    if end == "publisher":
+        known.remove_publisher(PUBLISHER, 3)
+    else:
+        known.remove_bridge(BRIDGE)
+    known.mark_single(KEY)
+    assert silent(known)
+
+
+def test_a_second_appearance_has_no_message_of_its_own(known: SilentPublishers) -> None:
+    known.record_message(KEY, BRIDGE, 1, 10.0)
+    known.add_publisher(PUBLISHER, 2, 12.0)
+    known.add_publisher(PUBLISHER, 4, 12.1, lost_before=3)
+    known.mark_single(KEY)
+    assert silent(known)
+
+
+@pytest.mark.parametrize(("nodes", "code"), [(1, "permitted"), (2, "new_publisher")])
+def test_a_late_token_locks_until_the_only_publisher_is_known(nodes: int, code: str) -> None:
+    robot = robot_there(small_panel())
+    robot.update(KEY, Sample(TRUE, 1, 10.0, 10.0, BRIDGE))
+    robot.graph.apply_token(token(BRIDGE, "MP", KEY, BOOL, Qos(), ""), True, 12.0)
+    robot.silent_publishers.add_publisher(PUBLISHER, 2, 12.0)
+    (interlock,) = small_panel().interlocks
+    robot.update_nodes()
+    assert interlock_verdict(interlock, robot, 12.0).code == "new_publisher"
+    names = ["/cell_io", "/teach_box"][:nodes]
+    robot.graph.update_routes((), [replace(PUBLISHER, node=name) for name in names], 12.1)
+    robot.update_nodes()
+    verdict = interlock_verdict(interlock, robot, 12.2)
+    assert verdict.code == code
+    assert verdict.permitted or all(name in english(verdict.reason) for name in names)
