@@ -4,7 +4,7 @@ Message definitions come from rosbags (`rosbags.typesys`). This package adds ser
 from files, defaults, and a codec whose errors name the field.
 """
 
-from app.interfaces.cdr.fields import FieldReader, Fields, Walk
+from app.interfaces.cdr.fields import FieldReader, Fields, RowReader, Rows, Walk
 from app.interfaces.definitions import INTEGER_RANGES, PLACEHOLDER, STRING_TYPES, Field, Structure, Type
 from app.interfaces.derived_types import ActionTypes
 from app.interfaces.distributions import DISTROS, read_distribution
@@ -22,6 +22,8 @@ __all__ = [
     "FieldReader",
     "Fields",
     "Interfaces",
+    "RowReader",
+    "Rows",
     "Structure",
     "Type",
     "Walk",

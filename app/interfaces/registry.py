@@ -10,7 +10,7 @@ from typing import Any, Final
 from app.errors import DecodeError, InterfaceError
 from app.interfaces.cdr.codec import Codec
 from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN_HEADER
-from app.interfaces.cdr.fields import FieldReader
+from app.interfaces.cdr.fields import FieldReader, RowReader
 from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import Definitions, Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
@@ -132,6 +132,15 @@ class Interfaces:
             wanted = self._resolver.select(*key)
             self._field_readers[key] = self._codec.field_reader(type_name, wanted)
         return self._field_readers[key]
+
+    def row_reader(
+        self, type_name: str, path: str, fields: Sequence[str | None], most: int
+    ) -> RowReader:
+        """A reader of the fields of each element of the list at a path, up to `most` elements; None is
+        the element itself. InterfaceError if the type has no such field."""
+        self.require(type_name)
+        wanted = self._resolver.select_rows(type_name, path, fields)
+        return self._codec.row_reader(type_name, wanted, fields, most)
 
     def type_hash(self, type_name: str) -> str:
         """The REP 2016 type hash, `RIHS01_…`, of a message, a part, a service or an action.

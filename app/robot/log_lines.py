@@ -2,9 +2,8 @@
 their first reading."""
 
 import asyncio
-from bisect import bisect_left
 from collections.abc import Iterator
-from itertools import islice
+from heapq import merge
 from typing import Final, NamedTuple
 
 from app.bounded import BoundedQueue
@@ -20,6 +19,8 @@ LONGEST_TEXT: Final = 1_000  # characters of a line that are shown
 MOST_READ: Final = 4 * LONGEST_TEXT  # with the codes of terminals
 LONGEST_NAME: Final = 100
 SLICE: Final = 50  # lines that are decoded in one turn of the event loop: some milliseconds
+SEVERE: Final = 30  # from here on a line is kept apart
+LEVEL_AT: Final = 12
 # From the severity's number on; ROS 2 has 10, 20, 30, 40 and 50.
 SEVERITIES: Final = ((50, "fatal"), (40, "error"), (30, "warn"), (20, "info"))
 
@@ -75,11 +76,13 @@ class _Kept:
 
 
 class LogLines:
-    """The lines of one topic, bounded in number and in bytes."""
+    """The lines of one topic, bounded in number and in bytes. Warnings and worse have a bound of their
+    own: no flood of other lines takes them away."""
 
     def __init__(self, interfaces: Interfaces, keep: int) -> None:
         self._interfaces = interfaces
-        self._kept: BoundedQueue[_Kept] = BoundedQueue(keep, KEPT_BYTES)
+        self._severe: BoundedQueue[_Kept] = BoundedQueue(keep, KEPT_BYTES)
+        self._others: BoundedQueue[_Kept] = BoundedQueue(keep, KEPT_BYTES)
         self.count = 0  # of all that came
 
     def add(self, payload: Buffer) -> None:
@@ -87,7 +90,9 @@ class LogLines:
         self.count += 1
         if len(payload) > LONGEST_LINE:
             return
-        self._kept.add(_Kept(self.count, bytes(payload)), len(payload))
+        data = bytes(payload)
+        queue = self._severe if _is_severe(data) else self._others
+        queue.add(_Kept(self.count, data), len(data))
 
     async def find(self, wanted: Wanted, after: int, most: int) -> Found:
         """The newest lines with a number above `after`, over as many turns as decoding takes."""
@@ -99,24 +104,31 @@ class LogLines:
         return self._found(wanted, after, most)
 
     def newest(self, wanted: Wanted, most: int) -> Found:
-        """The newest of the last few lines at once, for a page that is rendered."""
-        after = self._kept[-1].number - SLICE if self._kept else 0
-        for kept in self._since(after):
-            self._decode(kept)
-        return self._found(wanted, after, most)
+        """The newest of the last few lines at once, for a page that is rendered; also of the last few
+        warnings and worse."""
+        for queue in (self._severe, self._others):
+            for kept in list(queue)[-SLICE:]:
+                self._decode(kept)
+        return self._found(wanted, 0, most)
 
     def _found(self, wanted: Wanted, after: int, most: int) -> Found:
         read = (kept for kept in self._since(after) if kept.line is not None)
         fitting = [(kept.number, kept.line) for kept in read if kept.line and wanted.has(kept.line)]
-        first = self._kept[0].number if self._kept else self.count + 1
-        gone = max(0, first - after - 1) if after else 0
         shown = fitting[-most:]
-        return Found(shown, len(fitting) - len(shown) + gone, self.count)
+        return Found(shown, len(fitting) - len(shown) + self._gone(after), self.count)
+
+    def _gone(self, after: int) -> int:
+        """How many lines above `after` are not kept any more; 0 where all are asked for."""
+        if not after:
+            return 0
+        first = self._others[0].number if self._others else self.count + 1
+        severe = sum(after < kept.number < first for kept in self._severe)
+        return max(0, first - after - 1 - severe)
 
     def _since(self, after: int) -> Iterator[_Kept]:
         """A copy: more may come while they are read."""
-        numbers = [kept.number for kept in self._kept]
-        return iter(list(islice(self._kept, bisect_left(numbers, after + 1), None)))
+        both = merge(self._severe, self._others, key=lambda kept: kept.number)
+        return iter([kept for kept in both if kept.number > after])
 
     def _decode(self, kept: _Kept) -> None:
         payload, kept.payload = kept.payload, None
@@ -131,3 +143,8 @@ class LogLines:
         if len(text) > LONGEST_TEXT:
             text = text[: LONGEST_TEXT - 1] + "…"
         kept.line = Line(message.level, stamp, readable(message.name[:LONGEST_NAME]), text)
+
+
+def _is_severe(data: bytes) -> bool:
+    """Whether an encoded line is a warning or worse: its level is behind the header and the stamp."""
+    return len(data) > LEVEL_AT and data[LEVEL_AT] >= SEVERE

@@ -9,7 +9,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Final
+from typing import Final, TypeVar
 
 from app.interfaces import FieldReader, Fields, Walk
 
@@ -22,6 +22,9 @@ Resume = Callable[
 ]  # continues until a time (monotonic seconds); returns whether it is done
 
 
+Result = TypeVar("Result")
+
+
 class Slices:
     """Limits the decoding time of each turn. Used on the event loop; without a running loop there is no
     limit."""
@@ -31,7 +34,7 @@ class Slices:
         self._until: float | None = None  # deadline of this turn; None: nothing was decoded in it yet
         self._pending: deque[Resume] = deque()
 
-    def read(self, walk: Walk, size: int) -> Fields | None:
+    def read(self, walk: Walk[Result], size: int) -> Result | None:
         """Decodes a message of `size` bytes; None if this turn's time ends first. DecodeError if the
         bytes are no such message."""
         if size <= SMALL_BYTES:
@@ -39,12 +42,12 @@ class Slices:
         until = self._turn_deadline()
         return None if self._now() >= until else self.read_until(walk, until)
 
-    def read_until(self, walk: Walk, until: float) -> Fields | None:
+    def read_until(self, walk: Walk[Result], until: float) -> Result | None:
         """The same until a time (monotonic seconds)."""
-        while (fields := walk.advance()) is None:
+        while (found := walk.advance()) is None:
             if self._now() >= until:
                 return None
-        return fields
+        return found
 
     def schedule(self, go_on: Resume) -> None:
         """Calls it once a turn, from the next turn on, until it returns true."""

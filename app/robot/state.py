@@ -25,7 +25,6 @@ from app.robot.command_status import CommandStatus
 from app.robot.definitions import Difference, difference
 from app.robot.graph import LiveGraph
 from app.robot.history import History
-from app.robot.keyed_entries import KeyedEntries
 from app.robot.log_lines import LogLines
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
@@ -36,6 +35,7 @@ from app.robot.sample import SkippedPayload as SkippedPayload
 from app.robot.shared_topics import present_key
 from app.robot.silent_publishers import SilentPublishers
 from app.robot.slices import Slices
+from app.robot.table_entries import TableEntries
 from app.robot.topic_publishers import Publishers, TopicPublishers
 from app.robot.topics import Reading as Reading
 from app.robot.topics import Topic
@@ -98,7 +98,7 @@ class RobotState:
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
-        self.keyed_entries = KeyedEntries(panel, interfaces, self.key, self.slices)
+        self.table_entries = TableEntries(panel, interfaces, self.key, self.slices)
         self.log_lines = {
             key: lines
             for topic, keep in panel.logs().items()

@@ -193,5 +193,5 @@ class _PendingRead:
     """A message that is being decoded; `size` in bytes."""
 
     sample: Sample
-    walk: Walk
+    walk: Walk[Fields]
     size: int

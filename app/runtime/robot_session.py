@@ -132,7 +132,7 @@ class RobotSession:
             self._commands.confirmations,
             self._commands.parameters,
             [
-                self.robot.keyed_entries,
+                self.robot.table_entries,
                 LogListener(self.robot),
                 *([self._recorder] if self._recorder else []),
                 *self._trends,
@@ -140,7 +140,7 @@ class RobotSession:
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading
-        self.robot.keyed_entries.on_decoded = lambda key: self.refresher.refresh_values({key})
+        self.robot.table_entries.on_decoded = lambda key: self.refresher.refresh_values({key})
         self.frames = Frames(context, lambda: self.peer.on_graph_change(False))
         self._rosout = Rosout(
             self.robot, self.interfaces, self.link, asyncio.get_running_loop(), self._own_line

@@ -7,8 +7,8 @@ from typing import Any
 from app.clock import age_changes_at, format_age
 from app.i18n import TextLike, say
 from app.panel.widgets.table import Column, ColumnField, Table
-from app.robot.keyed_entries import Entry
-from app.robot.state import Reading, RobotState
+from app.robot.state import RobotState
+from app.robot.table_order import Entry, TableRows, states_of
 from app.view.display_values import NOTHING, cell_text, lamp_of, topic_state
 
 
@@ -19,59 +19,43 @@ def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any],
     whole = topic_state(widget, robot, now)
     if whole.state in ("waiting", "unreadable"):
         return {"state": whole.state, "note": whole.note, "said": "", "table_rows": []}, whole.until
-    entries, is_full = _entries(widget, robot, robot.reading(widget.topic))
-    shown = _sorted(widget, entries)[: widget.rows_shown]
+    rows = robot.table_entries.rows(widget.id)
     constants = _constants(widget, robot)
-    ages = [_age(widget, entry, now) for entry in shown]
+    ages = [_age(widget, entry, now) for entry in rows.first]
     attributes = {
         "state": whole.state,
         "note": whole.note,
-        "said": _said(len(entries), len(shown), is_full=is_full),
+        "said": _said(widget, rows),
         "table_rows": [
             {"age": age, "cells": _cells(widget, entry, constants)}
-            for entry, (age, _) in zip(shown, ages, strict=True)
+            for entry, (age, _) in zip(rows.first, ages, strict=True)
         ],
     }
     return attributes, min([whole.until, *(at for _, at in ages)])
 
 
-def _entries(widget: Table, robot: RobotState, reading: Reading) -> tuple[list[Entry], bool]:
-    """The entries, and whether more may be in the message, unread."""
-    if widget.key is not None:
-        return robot.keyed_entries.entries(widget.id), False
-    found: list[Entry] = []
-    for number in range(widget.entries_read):
-        values = tuple(reading.value(widget.path(number, of)) for of in widget.own_fields)
-        if all(value is None for value in values):
-            return found, False
-        found.append(Entry(values, reading.at))
-    return found, True
+def _said(widget: Table, rows: TableRows) -> TextLike:
+    """What is not in the rows: how many entries more, with their abnormal states, and how many were not
+    read."""
+    more = _hidden(widget, rows)
+    if not rows.unread:
+        return more or ("" if rows.first else say("table_empty"))
+    if not more:
+        return say("table_unread", number=rows.unread)
+    return say("table_more_unread", more=more, number=rows.unread)
 
 
-def _sorted(widget: Table, entries: list[Entry]) -> list[Entry]:
-    sort = widget.sort
-    if sort is None:
-        return entries
-    if sort.by is None:
-        newest_last = sorted(entries, key=lambda entry: entry.at)
-        return newest_last[::-1]
-    at = widget.own_fields.index(sort.by)
-    known = [entry for entry in entries if not _is_unknown(entry.values[at])]
-    unknown = [entry for entry in entries if _is_unknown(entry.values[at])]
-    largest = sort.first == "largest"
-    return [*sorted(known, key=lambda entry: entry.values[at], reverse=largest), *unknown]
-
-
-def _is_unknown(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and math.isnan(value))
-
-
-def _said(count: int, shown: int, *, is_full: bool) -> TextLike:
-    if not count:
-        return say("table_empty")
-    if is_full:
-        return say("table_more_at_least", number=count - shown)
-    return say("table_more", number=count - shown) if count > shown else ""
+def _hidden(widget: Table, rows: TableRows) -> TextLike:
+    if not rows.hidden:
+        return ""
+    if not rows.abnormal:
+        return say("table_more", number=rows.hidden)
+    _, states = states_of(widget)
+    named = tuple(
+        say("table_state", number=number, state=states[state].text)
+        for state, number in rows.abnormal.items()
+    )
+    return say("table_more_abnormal", number=rows.hidden, states=named)
 
 
 def _age(widget: Table, entry: Entry, now: float) -> tuple[TextLike, float]:

@@ -59,6 +59,14 @@ def test_of_too_many_the_newest_are_found_and_the_others_counted() -> None:
     assert (numbers(later), later.left_out) == ([98, 99, 100], 2)
 
 
+def test_a_flood_takes_no_warning_away() -> None:
+    lines = filled([line(1, 40, text="hot"), *(line(n) for n in range(2, 400)), line(400, 30)])
+    assert numbers(find(lines, Wanted(severity=30))) == [1, 400]
+    assert numbers(lines.newest(Wanted(severity=30), 50)) == [1, 400]
+    assert numbers(find(lines, most=200)) == [1, *range(300, 401)]
+    assert find(lines, after=200, most=200).left_out == 99
+
+
 def test_those_that_are_not_kept_any_more_are_counted() -> None:
     lines = filled([line(n) for n in range(1, 201)])
     assert find(lines, after=20, most=100).left_out == 80

@@ -7,8 +7,9 @@ from typing import Any, Final
 import pytest
 
 from app.panel import Panel
-from app.robot.keyed_entries import MAX_KEYS, MAX_QUEUED
 from app.robot.state import RobotState, Sample
+from app.robot.table_entries import MAX_KEYS, MAX_QUEUED
+from app.robot.table_order import NO_ROWS
 from app.view.view import build_view
 from tests.support.builders import BRIDGE, INTERFACES, NOW, panel_of, robot_there
 from tests.support.words import english
@@ -54,8 +55,7 @@ class Robot:
         self.seq += 1
         sample = Sample(payload, self.seq, at, at, BRIDGE)
         self.state.update("diagnostics", sample)
-        if "diagnostics" in self.state.keyed_entries.keys:
-            self.state.keyed_entries.record_sample("diagnostics", sample)
+        self.state.table_entries.record_sample("diagnostics", sample)
 
     def shown(self, now: float = NOW) -> Any:
         return english(build_view(self.panel, self.state, now).view["widgets"]["parts"])
@@ -89,10 +89,44 @@ def test_a_list_that_is_empty_says_so() -> None:
     assert (view["state"], view["said"], view["table_rows"]) == ("live", "No entries", [])
 
 
-def test_more_entries_than_are_read_are_counted_as_far_as_they_are_known() -> None:
+def test_entries_that_are_not_read_are_counted() -> None:
     robot = Robot(entries_read=3)
     robot.says(*(status(f"p{number}") for number in range(9)))
-    assert (robot.names(), robot.shown()["said"]) == (["p0", "p1"], "and 1 or more")
+    assert (robot.names(), robot.shown()["said"]) == (["p0", "p1"], "and 1 more; 6 not read")
+    robot = Robot(entries_read=2)
+    robot.says(*(status(f"p{number}") for number in range(9)))
+    assert robot.shown()["said"] == "7 entries not read"
+
+
+WORST_FIRST: Final = {"first": "largest", "by": "level"}
+
+
+@pytest.mark.parametrize("key", [None, "name"])
+@pytest.mark.parametrize(("count", "bad"), [(120, 100), (300, 250), (2000, 1999)])
+def test_the_worst_of_many_entries_is_the_first_row(count: int, bad: int, key: str | None) -> None:
+    more = {"sort": WORST_FIRST} | ({"key": key} if key else {})
+    robot = Robot(**more)
+    robot.says(*(status(f"p{number}", 1 if number == bad else 0) for number in range(count)))
+    assert robot.names() == [f"p{bad}", "p0"]
+    assert robot.shown()["said"] == f"and {count - 2} more"
+
+
+def test_in_the_order_of_the_list_abnormal_entries_below_the_rows_are_counted() -> None:
+    robot = Robot()
+    robot.says(*(status(f"p{number}", int(number in (1, 70, 99))) for number in range(100)))
+    assert robot.names() == ["p0", "p1"]
+    assert robot.shown()["said"] == "and 98 more: 2 × Warning"
+    robot = Robot(entries_read=80)
+    robot.says(*(status(f"p{number}", int(number in (1, 70, 99))) for number in range(100)))
+    assert robot.shown()["said"] == "and 78 more: 1 × Warning; 20 not read"
+
+
+def test_values_of_each_entry_are_its_own() -> None:
+    """Keys inside of entries, and entries that lack them."""
+    robot = Robot(rows_shown=4)
+    third = status("c", cold="0", heat="3")
+    robot.says(status("a", heat="1"), status("b"), third, status("d", heat="4"))
+    assert [row["cells"][2]["text"] for row in robot.shown()["table_rows"]] == ["1", "—", "3", "4"]
 
 
 @pytest.mark.parametrize(
@@ -131,29 +165,29 @@ def test_the_newest_of_several_messages_come_first() -> None:
 
 
 def test_what_is_kept_is_bounded() -> None:
-    robot = Robot(key="name", entries_read=50, rows_shown=1)
-    for first in range(0, 2 * MAX_KEYS, 50):
-        robot.says(*(status(f"p{first + number}") for number in range(50)), at=NOW + first)
-    assert len(robot.state.keyed_entries.entries("parts")) == MAX_KEYS
+    robot, step = Robot(key="name", rows_shown=1), 1000
+    for first in range(0, 2 * MAX_KEYS, step):
+        robot.says(*(status(f"p{first + number}") for number in range(step)), at=NOW + first)
     assert robot.names() == [f"p{MAX_KEYS}"]
+    assert robot.shown()["said"] == f"and {MAX_KEYS - 1} more; {step} not read"
 
 
 def test_messages_wait_in_a_bounded_queue_and_the_view_is_notified_when_they_are_decoded() -> None:
     robot = Robot(key="name")
-    entries = robot.state.keyed_entries
+    entries = robot.state.table_entries
     decoded: list[str] = []
     entries.on_decoded = decoded.append
 
     async def flood() -> None:
         for number in range(3 * MAX_QUEUED):
             robot.says(status(f"q{number}"))
-        assert (entries.entries("parts"), decoded) == ([], [])
-        while len(entries.entries("parts")) < MAX_QUEUED:
+        assert (entries.rows("parts"), decoded) == (NO_ROWS, [])
+        while entries.rows("parts").hidden < MAX_QUEUED - 2:
             await asyncio.sleep(0)
 
     asyncio.run(asyncio.wait_for(flood(), 10))
-    kept = [entry.values[1] for entry in entries.entries("parts")]
-    assert kept == [f"q{number}" for number in range(2 * MAX_QUEUED, 3 * MAX_QUEUED)]
+    kept = [entry.values[1] for entry in entries.rows("parts").first]
+    assert kept == [f"q{number}" for number in range(2 * MAX_QUEUED, 2 * MAX_QUEUED + 2)]
     assert set(decoded) == {"diagnostics"}
 
 
@@ -178,6 +212,7 @@ def test_a_list_of_single_values() -> None:
     robot = robot_there(panel)
     payload = INTERFACES.encode("sensor_msgs/msg/BatteryState", {"cell_voltage": [3.5, 3.625]})
     robot.update("cells", Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.table_entries.record_sample("cells", Sample(payload, 1, NOW, NOW, BRIDGE))
     view: Any = english(build_view(panel, robot, NOW).view["widgets"]["parts"])
     rows = view["table_rows"]
     assert [row["cells"][0]["text"] for row in rows] == ["3.50 V", "3.62 V"]

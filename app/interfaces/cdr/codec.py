@@ -1,11 +1,11 @@
 """Message objects to and from CDR bytes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, make_dataclass
 from typing import Any, Final
 
 from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN_HEADER, check_end, split_header
-from app.interfaces.cdr.fields import FieldReader
+from app.interfaces.cdr.fields import FieldReader, RowReader
 from app.interfaces.cdr.reader import ByteOrder, Read, message_reader
 from app.interfaces.cdr.scanner import SLICE_ELEMENTS
 from app.interfaces.cdr.selection import Selection
@@ -59,6 +59,13 @@ class Codec:
         """A reader of the selected fields of a type."""
         ops = self._plans.make_program(name, wanted)
         return FieldReader(name, ops, self._fields_and_class)
+
+    def row_reader(
+        self, name: str, wanted: Selection, fields: Sequence[str | None], most: int
+    ) -> RowReader:
+        """A reader of the selected fields of each element of a list."""
+        ops = self._plans.make_program(name, wanted)
+        return RowReader(name, ops, self._fields_and_class, fields, most)
 
     def message_class(self, name: str) -> type[Any]:
         """The class of a structure's message objects: fields as attributes, constants on the class."""

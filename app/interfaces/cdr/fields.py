@@ -1,7 +1,7 @@
 """Reads fields of a message by their paths, without decoding the rest."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from app.errors import DecodeError
 from app.interfaces.cdr.beginnings import StructureFactory, TruncatedReader
@@ -9,7 +9,7 @@ from app.interfaces.cdr.encapsulation import check_end, split_header
 from app.interfaces.cdr.formats import is_number
 from app.interfaces.cdr.reader import ByteOrder, Read, value_reader
 from app.interfaces.cdr.scanner import Scan
-from app.interfaces.cdr.steps import Op
+from app.interfaces.cdr.steps import Mark, Op
 from app.interfaces.definitions import Type
 
 
@@ -32,71 +32,154 @@ class Fields:
         return path in self._ambiguous
 
 
-class Walk:
+Result = TypeVar("Result", covariant=True)
+
+
+class Walk(Protocol[Result]):
     """One message that is being decoded, in slices."""
+
+    def advance(self) -> Result | None:
+        """Decodes one slice, which takes some milliseconds at most; None if the message is not complete
+        yet. DecodeError if the bytes are no such message."""
+
+
+class _MessageWalk:
+    """A walk through a message to a value of `Result`."""
 
     __slots__ = ("_body", "_data", "_order", "_reader", "_scan")
 
-    def __init__(self, reader: "FieldReader", data: bytes) -> None:
+    def __init__(self, reader: "_Program", data: bytes) -> None:
         self._reader = reader
         self._data = data
         self._scan: Scan | None = None
 
+    def scanned(self) -> Scan | None:
+        """Scans one slice; returns the scan when it is complete."""
+        if self._scan is None:
+            self._body, self._order = split_header(self._data)
+            self._scan = Scan(
+                self._reader.ops, self._body, self._order, self._reader.readers[self._order]
+            )
+        if not self._scan.advance():
+            return None
+        check_end(self._body, self._scan.at)
+        return self._scan
+
+    def value_at(self, mark: Mark, at: int) -> Any:
+        """The value of a field that begins at an offset."""
+        reader = self._reader.readers[self._order]
+        if mark.type.container == "one" and is_number(mark.type):
+            return reader(mark.type)(self._body, at)[0]
+        return TruncatedReader(reader, self._reader.make, self._body).read(mark.type, at)
+
+    def failed(self, error: Exception) -> DecodeError:
+        size = len(self._data)
+        return DecodeError(f"{size} bytes are not a {self._reader.type_name}: {error}")
+
+
+class _FieldWalk(_MessageWalk):
+    __slots__ = ()
+
     def advance(self) -> Fields | None:
-        """Decodes one slice, which takes some milliseconds at most; None if the message is not complete
-        yet. DecodeError if the bytes are no such message."""
-        reader = self._reader
         try:
-            if self._scan is None:
-                self._body, self._order = split_header(self._data)
-                read = reader.readers[self._order]
-                self._scan = Scan(reader.ops, self._body, self._order, read)
-            if not self._scan.advance():
-                return None
-            check_end(self._body, self._scan.at)
-            return reader.collect_fields(self._scan, self._body, self._order)
+            scan = self.scanned()
+            return None if scan is None else self._fields(scan)
         except Exception as error:  # no received bytes may stop the panel
-            size = len(self._data)
-            raise DecodeError(f"{size} bytes are not a {reader.type_name}: {error}") from error
+            raise self.failed(error) from error
+
+    def _fields(self, scan: Scan) -> Fields:
+        values = {}
+        for mark, at in scan.marks.items():
+            if mark.paths:
+                value = self.value_at(mark, at)
+                for path in mark.paths:
+                    values[path] = value
+        return Fields(values, scan.ambiguous)
 
 
-class FieldReader:
-    """Reads the same paths of each message of a type."""
+class _Program:
+    """What reads the same fields of each message of a type."""
 
     def __init__(self, type_name: str, ops: Sequence[Op], make: StructureFactory) -> None:
         self.type_name = type_name
         self.ops = ops
-        self._make = make
+        self.make = make
         self.readers: Mapping[ByteOrder, Callable[[Type], Read]] = {
             "<": _Readers("<").reader_for,
             ">": _Readers(">").reader_for,
         }
 
-    def walk(self, data: bytes) -> Walk:
+
+class FieldReader(_Program):
+    """Reads the same paths of each message of a type."""
+
+    def walk(self, data: bytes) -> Walk[Fields]:
         """Starts to decode a message."""
-        return Walk(self, data)
+        return _FieldWalk(self, data)
 
     def read(self, data: bytes) -> Fields:
         """Decodes a whole message; DecodeError if the bytes are no such message."""
-        walk = Walk(self, data)
+        walk = self.walk(data)
         while (fields := walk.advance()) is None:
             pass
         return fields
 
-    def collect_fields(self, going: Scan, body: "memoryview[int]", order: ByteOrder) -> Fields:
-        """The values of a message that was scanned to its end."""
-        values = {}
-        reader = self.readers[order]
-        for mark, at in going.marks.items():
-            if not mark.paths:
-                continue
-            if mark.type.container == "one" and is_number(mark.type):
-                value = reader(mark.type)(body, at)[0]
-            else:
-                value = TruncatedReader(reader, self._make, body).read(mark.type, at)
-            for path in mark.paths:
-                values[path] = value
-        return Fields(values, going.ambiguous)
+
+class Rows(NamedTuple):
+    """The values of the fields of a list's elements, in the fields' order; `total` is the number of all
+    elements, also of those beyond the most that are read."""
+
+    values: list[tuple[Any, ...]]
+    total: int
+
+
+class _RowWalk(_MessageWalk):
+    __slots__ = ("_count", "_rows")
+
+    def __init__(self, reader: "RowReader", data: bytes) -> None:
+        super().__init__(reader, data)
+        self._rows: list[tuple[Any, ...]] = []
+        self._count = 0
+
+    def advance(self) -> Rows | None:
+        try:
+            scan = self.scanned()
+            self._take(scan or self._scan)
+        except Exception as error:  # no received bytes may stop the panel
+            raise self.failed(error) from error
+        return None if scan is None else Rows(self._rows, self._count)
+
+    def _take(self, scan: Scan | None) -> None:
+        """Reads the values of the elements of this slice."""
+        assert scan is not None
+        assert isinstance(self._reader, RowReader)
+        fields, most = self._reader.fields, self._reader.most
+        for marks in scan.rows:
+            self._count += 1
+            if self._count <= most:
+                found = {path: self.value_at(m, at) for m, at in marks.items() for path in m.paths}
+                self._rows.append(tuple(found.get(name or "") for name in fields))
+        scan.rows.clear()
+
+
+class RowReader(_Program):
+    """Reads the same fields of each element of a list, up to `most` elements."""
+
+    def __init__(
+        self,
+        type_name: str,
+        ops: Sequence[Op],
+        make: StructureFactory,
+        fields: Sequence[str | None],
+        most: int,
+    ) -> None:
+        super().__init__(type_name, ops, make)
+        self.fields = fields
+        self.most = most
+
+    def walk(self, data: bytes) -> Walk[Rows]:
+        """Starts to decode a message."""
+        return _RowWalk(self, data)
 
 
 class _Readers:

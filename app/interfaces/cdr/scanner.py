@@ -57,7 +57,7 @@ class Scan:
 
     __slots__ = (
         "_body", "_counts", "_hits", "_loops", "_ops", "_reader", "_step", "_words", "ambiguous", "at",
-        "marks",
+        "marks", "rows",
     )  # fmt: skip
 
     def __init__(
@@ -73,6 +73,7 @@ class Scan:
         self._step = 0
         self.at = 0
         self.marks: dict[Mark, int] = {}
+        self.rows: list[dict[Mark, int]] = []  # the marks of each element since they were taken
         self.ambiguous: set[str] = set()
 
     def advance(self) -> bool:
@@ -151,6 +152,13 @@ class Scan:
 
     def _mark(self, at: int, step: int, mark: Mark) -> Position:
         self.marks[mark] = at
+        return at, step
+
+    def _end_row(self, at: int, step: int, _: None) -> Position:
+        self.rows.append(self.marks)
+        self.marks = {}
+        self._hits.clear()
+        self._counts.clear()
         return at, step
 
     # Elements of lists.
@@ -254,6 +262,7 @@ HANDLERS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Position]]] = {
     Step.ALIKE: Scan._skip_fixed_size,
     Step.TIMES: Scan._begin_array,
     Step.NOTE: Scan._mark,
+    Step.ROW: Scan._end_row,
     Step.COMPARE: Scan._compare,
     Step.CHOOSE: Scan._choose,
     Step.BESIDE: Scan._choose_by_sibling,

@@ -45,6 +45,7 @@ class Selection:
     by_field: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
     by_sibling: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
     lookup: Lookup | None = None  # if it is a key itself
+    each: "Selection | None" = None  # of every element of a list
 
     def all_paths(self) -> Iterable[str]:
         """The paths that end here or below."""
@@ -66,6 +67,20 @@ class Resolver:
         root = Selection()
         for path in paths:
             self._add_path(root, Type(type_name), path)
+        return root
+
+    def select_rows(self, type_name: str, path: str, fields: Iterable[str | None]) -> Selection:
+        """The tree of the fields of each element of the list at a path; None is the element itself."""
+        root, element = Selection(), self.type_at(type_name, path).element
+        node, each = root, Selection()
+        for step in path_steps(path):
+            node = node.fields.setdefault(str(step), Selection())
+        node.each = each
+        for name in fields:
+            if name is None:
+                each.paths.append("")
+            else:
+                self._add_path(each, element, name)
         return root
 
     def type_at(self, type_name: str, path: str) -> Type:

@@ -32,6 +32,7 @@ class Step(IntEnum):
     CHOSEN = auto()  # the end of a scanned element of a Choice
     DONE = auto()  # the end of a chosen element
     BESIDE = auto()  # a Choice, of elements of a list that was skipped before
+    ROW = auto()  # the end of an element of which selected fields are kept
     END = auto()
 
 
@@ -143,7 +144,9 @@ class _ProgramBuilder:
             wanted.lookup.type = kind
             wanted.lookup.prepare()
             self.add(Step.COMPARE, wanted.lookup)
-        if key is not None or (wanted is not None and (wanted.by_index or wanted.by_field)):
+        if wanted is not None and wanted.each is not None:
+            self._add_elements(kind, wanted.each)
+        elif key is not None or (wanted is not None and (wanted.by_index or wanted.by_field)):
             self._select_elements(kind, wanted or Selection(), key)
         elif wanted is not None and wanted.fields:
             self.add_structure(kind.name, wanted, in_list)
@@ -170,10 +173,16 @@ class _ProgramBuilder:
             self.add(Step.TEXT if kind.name == "string" else Step.WIDE_TEXT)
 
     def _skip_elements(self, kind: Type) -> None:
+        self._add_elements(kind, None)
+
+    def _add_elements(self, kind: Type, wanted: Selection | None) -> None:
+        """Adds a list whose elements are all scanned; those `wanted` are rows."""
         at = self._next_step
         self.add(Step.EACH if kind.container == "sequence" else Step.TIMES, kind.size)
         body = self._next_step
-        self._skip(kind.element, in_list=True)
+        self._add_field(kind.element, wanted, in_list=True)
+        if wanted is not None:
+            self.add(Step.ROW)
         self.add(Step.NEXT, body)
         if kind.container == "sequence":
             self.steps[at] = (Step.EACH, self._next_step, min_size(kind.element))

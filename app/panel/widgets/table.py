@@ -25,7 +25,8 @@ from app.panel.widgets.numbers import Unit
 
 MAX_COLUMNS: Final = 8
 MAX_ROWS: Final = 20
-MAX_ENTRIES: Final = 200
+MAX_ENTRIES: Final = 10_000
+READ_BY_DEFAULT: Final = 2_000
 
 ListPath = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
 
@@ -63,8 +64,8 @@ class ColumnField(NamedTuple):
 
 
 class Table(TopicWidget, DisplayWidget):
-    """Shows the first `rows_shown` entries of a list. With a `key`, the latest entry for each of its
-    values is kept, as several messages bring them."""
+    """Shows the first `rows_shown` of all entries of a list. With a `key`, the latest entry for each of
+    its values is kept, as several messages bring them."""
 
     kind: Literal["table"]
     field: ListPath
@@ -74,7 +75,7 @@ class Table(TopicWidget, DisplayWidget):
         AfterValidator(non_empty),
     ]
     rows_shown: Annotated[int, Field(ge=1, le=MAX_ROWS)] = 5
-    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = 50
+    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = READ_BY_DEFAULT
     sort: Sort | None = None
     key: FieldPath | None = None
     max_age_s: Seconds | None = None
@@ -92,12 +93,6 @@ class Table(TopicWidget, DisplayWidget):
         return tuple(dict.fromkeys([*(column.field for column in self.columns), *others]))
 
     @property
-    def paths(self) -> tuple[str, ...]:
-        """The paths of these fields of all entries that are read."""
-        entries = range(self.entries_read)
-        return tuple(self.path(entry, field) for entry in entries for field in self.own_fields)
-
-    @property
     def widths(self) -> list[float]:
         """The widths of the columns, in percent."""
         whole = sum(column.width for column in self.columns)
@@ -110,7 +105,7 @@ class Table(TopicWidget, DisplayWidget):
         return ColumnField(self.type, path, *keys)
 
     def sources(self) -> Iterator[TopicSource]:
-        yield TopicSource(self.topic, self.type, self.qos, () if self.key else self.paths)
+        yield TopicSource(self.topic, self.type, self.qos, ())  # its list is read by itself
 
     def with_constants(self, interfaces: Interfaces) -> Self:
         columns = tuple(self._resolved(column, interfaces) for column in self.columns)
@@ -139,7 +134,7 @@ class Table(TopicWidget, DisplayWidget):
             what = f'"{self.field}" is {kind}: a table is for a list of any length'
             yield Fault(f"{place}.field", what)
             return
-        if kind.size and self.entries_read > kind.size:
+        if kind.size and self.entries_read > kind.size and "entries_read" in self.model_fields_set:
             what = f'"{self.field}" has {kind.size} entries at most: read no more'
             yield Fault(f"{place}.entries_read", what)
             return

@@ -11,7 +11,6 @@ from app.interfaces.field_path import field_name
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
-from app.panel.widgets.table import Table
 from app.simulator.interlocks import offset_of, permitting
 from app.simulator.kinds import Shown
 from app.simulator.values.guesses import Span, guessed, moving, span_of
@@ -40,11 +39,8 @@ class PanelFields:
         self.panel = panel
         self.interfaces = interfaces
         self.phase = phase
-        # A list that is a table has as many entries as its type makes.
-        tables = {path for w in panel.displays if isinstance(w, Table) for path in w.paths}
         self.paths = {
-            topic: [path for path in dict.fromkeys(paths) if path not in tables]
-            for topic, paths in panel.subscribed_fields().items()
+            topic: list(dict.fromkeys(paths)) for topic, paths in panel.subscribed_fields().items()
         }
         self.confirmed = {(one.topic, one.field) for one in panel.confirmations()}
         locked = dict.fromkeys((one.topic, one.field) for one in panel.interlocks)
