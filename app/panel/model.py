@@ -160,6 +160,16 @@ class Panel(Description):
         return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
+    def uniform_buttons(self) -> Mapping[tuple[str, ...], tuple[PublishPress, ...]]:
+        """Buttons that publish, by their interlocks: these and the graph decide whether they lock, and
+        the lock is all that is shown of them. So many of them are judged and shown as one."""
+        groups: dict[tuple[str, ...], tuple[PublishPress, ...]] = {}
+        for widget in self.commands:
+            if isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time):
+                groups[widget.interlocks] = (*groups.get(widget.interlocks, ()), widget)
+        return groups
+
+    @cached_property
     def displays(self) -> tuple[DisplayWidget, ...]:
         """The widgets that show topics."""
         return tuple(w for w in self.widgets() if isinstance(w, DisplayWidget))

@@ -18,6 +18,7 @@ from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
 from app.permission.conditions import not_finite, permits, unmet
@@ -173,6 +174,17 @@ def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
     if of.one_at_a_time and robot.command_status.get(of.id, IDLE).busy:
         return locked("busy")
     return None
+
+
+def blocked_buttons(buttons: tuple[PublishPress, ...], robot: RobotState) -> frozenset[str]:
+    """The ids of those of a panel's uniform buttons whose topic can't be used; cached until the graph
+    changes."""
+    key = blocked_buttons, id(buttons)
+    names: frozenset[str] | None = robot.graph.cache.get(key)
+    if names is None:
+        blocked = (button.id for button in buttons if topic_mismatch("MP", button, robot))
+        names = robot.graph.cache[key] = frozenset(blocked)
+    return names
 
 
 def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | None, Verdict]:

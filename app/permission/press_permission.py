@@ -13,8 +13,15 @@ from typing import Final, NamedTuple
 from app.errors import Cause
 from app.i18n import TextLike
 from app.panel.interlock import Interlock
+from app.panel.model import Panel
 from app.panel.widgets.families import Command
-from app.permission.interlocks import NO_WAY, command_blocked, interlock_verdict, link_verdict
+from app.permission.interlocks import (
+    NO_WAY,
+    blocked_buttons,
+    command_blocked,
+    interlock_verdict,
+    link_verdict,
+)
 from app.permission.principal import Principal
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.state import RobotState
@@ -51,11 +58,13 @@ class Question(NamedTuple):
 
 class Check(NamedTuple):
     """`judge` returns a verdict, or None. If a check with `alone` locks, no later check is made; else
-    their locks are listed beside it."""
+    their locks are listed beside it. `alike`: the verdict is the same for all uniform buttons with the
+    same interlocks whose topic can be used."""
 
     name: str
     judge: Callable[[Question], Verdict | None]
     alone: bool = True
+    alike: bool = False
 
 
 def _ending(of: Question) -> Verdict | None:
@@ -68,12 +77,12 @@ def _log(of: Question) -> Verdict | None:
 
 
 CHECKS: Final = (
-    Check("link", lambda of: of.link),
-    Check("ending", _ending),
-    Check("log", _log),
-    Check("control", lambda of: of.grounds.control),
-    Check("command", lambda of: command_blocked(of.widget, of.robot, of.now), alone=False),
-    Check("interlocks", lambda of: combined(of.interlocks), alone=False),
+    Check("link", lambda of: of.link, alike=True),
+    Check("ending", _ending, alike=True),
+    Check("log", _log, alike=True),
+    Check("control", lambda of: of.grounds.control, alike=True),
+    Check("command", lambda of: command_blocked(of.widget, of.robot, of.now), alone=False, alike=True),
+    Check("interlocks", lambda of: combined(of.interlocks), alone=False, alike=True),
 )
 
 # Why a receipt says that it was refused, by a verdict's code; "interlock" for all others.
@@ -86,14 +95,42 @@ CAUSES: Final[Mapping[str, Cause]] = {
 def permission(question: Question) -> Verdict:
     """The verdict of all checks, in their order."""
     verdicts = []
-    for _, judge, alone in CHECKS:
-        verdict = judge(question)
+    for check in CHECKS:
+        verdict = check.judge(question)
         if verdict is None or verdict is PERMITTED:
             continue
         verdicts.append(verdict)
-        if alone and not verdict.permitted:
+        if check.alone and not verdict.permitted:
             break
     return combined(verdicts)
+
+
+def permissions(
+    panel: Panel,
+    robot: RobotState,
+    now: float,
+    link: Verdict,
+    interlocks: Mapping[str, Verdict],
+    grounds: Grounds = NO_GROUNDS,
+) -> dict[str, Verdict]:
+    """The verdicts of all commands of a panel, by their ids. Uniform buttons with the same interlocks
+    are judged once, and get one object."""
+
+    def judge(widget: Command) -> Verdict:
+        own = [interlocks[name] for name in widget.interlocks]
+        return permission(Question(widget, robot, now, link, own, grounds))
+
+    verdicts: dict[str, Verdict] = {}
+    groups = panel.uniform_buttons.values() if all(check.alike for check in CHECKS) else ()
+    for buttons in groups:
+        blocked = blocked_buttons(buttons, robot)
+        usable = [button for button in buttons if button.id not in blocked] if blocked else buttons
+        if usable:
+            verdicts.update(dict.fromkeys([button.id for button in usable], judge(usable[0])))
+    for widget in panel.commands:
+        if widget.id not in verdicts:
+            verdicts[widget.id] = judge(widget)
+    return verdicts
 
 
 def judged(

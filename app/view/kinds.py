@@ -3,6 +3,7 @@ kind."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Final, TypedDict
 
 from app.i18n import TextLike, joined, say
@@ -62,9 +63,14 @@ def enabled(verdict: Verdict) -> Enabled:
 
 
 def lock(widget: Command, verdict: Verdict) -> Attributes:
-    """Attributes of a control; one with several interlocks has all reasons."""
-    several = all_reasons(verdict.reasons) if len(widget.interlocks) > 1 else {}
-    return {**enabled(verdict), **several}
+    """Attributes of a control; one with several interlocks has all reasons. The same object for the
+    same lock: what is alike is compared and encoded once. It must not be changed."""
+    return _lock(verdict, len(widget.interlocks) > 1)
+
+
+@lru_cache(maxsize=256)
+def _lock(verdict: Verdict, has_several: bool) -> Attributes:
+    return {**enabled(verdict), **(all_reasons(verdict.reasons) if has_several else {})}
 
 
 def all_reasons(reasons: Sequence[TextLike]) -> dict[str, TextLike]:

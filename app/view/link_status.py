@@ -155,10 +155,13 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
 
 def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[TextLike]:
     """The labels of the controls that are locked for one of these codes."""
-    locked = {
-        name for name, verdict in verdicts.items() if any(one.code in codes for one in _all(verdict))
-    }
-    return [w.label for w in panel.commands if w.id in locked]
+    by_verdict: dict[int, bool] = {}  # many commands have one verdict
+    for verdict in verdicts.values():
+        if id(verdict) not in by_verdict:
+            by_verdict[id(verdict)] = any(one.code in codes for one in _all(verdict))
+    if not any(by_verdict.values()):
+        return []
+    return [w.label for w in panel.commands if w.id in verdicts and by_verdict[id(verdicts[w.id])]]
 
 
 def locks(names: Sequence[TextLike]) -> Text:

@@ -152,7 +152,7 @@ class ViewPublisher:
             events = self._latest_events if latest else difference(view, self.for_role(role))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, reader.language)
-                if name == "update"
+                if name in ("update", "updates")
                 else self._shared_event(name, data, reader.language)
                 for name, data in self._shown(events, reader.page).items()
             )
@@ -162,8 +162,7 @@ class ViewPublisher:
         """The events that a page gets, in their order: keys lock before the rest is shown."""
         if not page:
             return events
-        own = self._of_page(events.get("update", NOTHING), page)
-        shown: Events = {"update": own} if own else {}
+        shown = by_change(self._of_page(events.get("update", NOTHING), page))
         for name, data in events.items():
             if name != "update" and not name.endswith(PERMISSION_EVENT):
                 shown[name] = data
@@ -187,6 +186,22 @@ class ViewPublisher:
     def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
         lines = (name.encode(), encoded(data, language), self.id.encode())
         return b"event: %b\ndata: %b\nid: %b\n\n" % lines
+
+
+def by_change(widgets: Mapping[str, Attributes]) -> Events:
+    """The events of a page for the attributes that changed: `updates` has those that several widgets
+    have in common, each once, as the lock of an interlock; `update` all others by the widget's id."""
+    names: dict[int, list[str]] = {}
+    for name, changes in widgets.items():
+        names.setdefault(id(changes), []).append(name)
+    groups = [
+        {"widgets": alike, "attributes": widgets[alike[0]]}
+        for alike in names.values()
+        if len(alike) > 1
+    ]
+    single = {alike[0]: widgets[alike[0]] for alike in names.values() if len(alike) == 1}
+    events: Events = {"updates": {"groups": groups}} if groups else {}
+    return events | {"update": single} if single else events
 
 
 def client_id_event(browser: str) -> bytes:

@@ -5,6 +5,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 Events = dict[str, Mapping[str, Any]]  # event name → its data, in the order of sending
 
+NOTHING: Final[Mapping[str, Any]] = {}
 PERMISSION_EVENT: Final = "-enabled-updated"  # appended to an interlock's id; for programs
 
 
@@ -32,12 +33,20 @@ def _interlocks(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Event
 
 
 def _widgets(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
-    """One event with the attributes that changed, of the widgets that did."""
-    changed = {
-        name: _changed(known, attributes)
-        for name, attributes in new.items()
-        if (known := old.get(name, {})) != attributes
-    }
+    """One event with the attributes that changed, of the widgets that did. Widgets whose attributes are
+    the same objects, such as those of one lock, get the same changes as one object."""
+    alike: dict[tuple[int, int], dict[str, Any]] = {}
+    changed = {}
+    for name, attributes in new.items():
+        known = old.get(name, NOTHING)
+        if known is attributes:
+            continue
+        pair = id(known), id(attributes)
+        changes = alike.get(pair)
+        if changes is None:
+            changes = alike[pair] = _changed(known, attributes)
+        if changes:
+            changed[name] = changes
     return {"update": changed} if changed else {}
 
 

@@ -15,7 +15,7 @@ from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import for_role as control_for_role
 from app.permission.interlocks import interlock_verdict, link_verdict
-from app.permission.press_permission import NO_GROUNDS, Grounds, Question, permission
+from app.permission.press_permission import NO_GROUNDS, Grounds, permissions
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
 from app.view.kinds import Attributes, Enabled, Shown, enabled, show
@@ -101,14 +101,12 @@ def build_view(
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
     grounds = Grounds(log_lock=context.log_lock) if context.log_lock else NO_GROUNDS
-    questions = [
-        Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
-        for w in panel.commands
-    ]
-    verdicts = {question.widget.id: permission(question) for question in questions}
+    verdicts = permissions(panel, robot, now, passable, interlocks, grounds)
     failures: dict[str, Exception] = {}
+    uniform = _uniform(panel, robot, now, verdicts, failures)
     widgets = {
-        w.id: _show(w, robot, now, verdicts.get(w.id, PERMITTED), failures) for w in panel.widgets()
+        w.id: uniform.get(w.id) or _show(w, robot, now, verdicts.get(w.id, PERMITTED), failures)
+        for w in panel.widgets()
     }
     link, until = link_statuses(panel, robot, passable, verdicts, now)
     banner = say("simulated") if context.simulated or robot.graph.is_simulated else ""
@@ -125,9 +123,33 @@ def build_view(
     others = (at for name, (_, at) in widgets.items() if name not in untils)
     judged = (passable, *interlocks.values(), *verdicts.values())
     rest = min(until, context.control_until, *others, *(verdict.until for verdict in judged))
-    lock = context.control_lock
-    without = {} if lock.permitted else _without_control(questions, lock, failures)
+    without: dict[str, Attributes] = {}
+    if not context.control_lock.permitted:
+        grounds = replace(grounds, control=context.control_lock)
+        locks = permissions(panel, robot, now, passable, interlocks, grounds)
+        without = {w.id: _show(w, robot, now, locks[w.id], failures)[0] for w in panel.commands}
     return ViewWithDeadlines(view, summary(robot.title, link), rest, untils, without, failures)
+
+
+def _uniform(
+    panel: Panel,
+    robot: RobotState,
+    now: float,
+    verdicts: Mapping[str, Verdict],
+    failures: dict[str, Exception],
+) -> dict[str, Shown]:
+    """The attributes of the uniform buttons: one object for all with the same verdict."""
+    shown: dict[str, Shown] = {}
+    for buttons in panel.uniform_buttons.values():
+        by_verdict: dict[int, Shown] = {}
+        for button in buttons:
+            verdict = verdicts[button.id]
+            attributes = by_verdict.get(id(verdict))
+            if attributes is None:
+                attributes = _show(button, robot, now, verdict, failures)
+                by_verdict[id(verdict)] = attributes
+            shown[button.id] = attributes
+    return shown
 
 
 def _show(
@@ -140,17 +162,6 @@ def _show(
     except Exception as error:
         failures[widget.id] = error
         return FAILED_COMMAND if isinstance(widget, Command) else FAILED, now + RETRY_S
-
-
-def _without_control(
-    questions: Iterable[Question], lock: Verdict, failures: dict[str, Exception]
-) -> dict[str, Attributes]:
-    """The attributes of these commands for a client without control."""
-    others = (ask._replace(grounds=replace(ask.grounds, control=lock)) for ask in questions)
-    return {
-        ask.widget.id: _show(ask.widget, ask.robot, ask.now, permission(ask), failures)[0]
-        for ask in others
-    }
 
 
 def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:

@@ -119,6 +119,10 @@ const source = new Source({
     for (const [name, show] of Object.entries(SECTIONS)) show(all[name]);
   },
   update: showWidgets,
+  // What changed in several widgets at once, such as the lock of an interlock.
+  updates({ groups }) {
+    for (const { widgets: alike, attributes } of groups) for (const id of alike) showWidget(id, attributes);
+  },
   ...SECTIONS,
   browser: noop, // this client's id: for programs
   beat(now) {

@@ -14,7 +14,7 @@ from app.printable import printable
 from app.robot.state import RobotState
 from app.view.publisher import ViewPublisher
 from app.view.view import View, ViewContext, build_view
-from tests.support.builders import NOW, permits, robot_there, says, small_panel
+from tests.support.builders import GUARDED, NOW, panel_of, permits, robot_there, says, small_panel
 from tests.support.parts import events_in
 from tests.support.words import english
 
@@ -296,3 +296,29 @@ def test_the_board_knows_when_a_lock_has_last_turned(
     permits(robot, False)
     publisher.post(view_of(robot))
     assert (publisher.lock_changed_at("guarded"), publisher.lock_changed_at("free")) == (4, 0)
+
+
+def test_a_lock_of_many_buttons_is_sent_once_to_a_page() -> None:
+    """Whatever their number; programs that name no page get each of them."""
+    sizes = {}
+    for count in (3, 300):
+        buttons = [{**GUARDED, "id": f"b{number}", "label": f"B{number}"} for number in range(count)]
+        panel = panel_of(*buttons)
+        robot = robot_there(panel)
+        mine = ViewPublisher(build_view(panel, robot, NOW).view, "r1", {}, panel.widgets_by_page)
+        old = mine.view
+        permits(robot)
+        mine.post(build_view(panel, robot, NOW).view)
+        chunk = mine.events_since(1, old, mine.reader(ENGLISH, panel.pages[0].id))
+        lock = {"enabled": True, "reason": None}
+        sent = events(chunk)
+        assert sent["updates"] == {
+            "groups": [{"widgets": [one["id"] for one in buttons], "attributes": lock}]
+        }
+        assert "update" not in sent
+        everything = events(mine.events_since(1, old))
+        assert everything["update"] == {one["id"]: lock for one in buttons}
+        assert "updates" not in everything
+        assert all(mine.lock_changed_at(one["id"]) == 2 for one in buttons)
+        sizes[count] = len(chunk)
+    assert sizes[300] < sizes[3] + 300 * len('"b299",')
