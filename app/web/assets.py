@@ -22,7 +22,7 @@ from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.parameter import Parameter
 
-LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys", "floor")
+LAYERS: Final = ("guard", "tokens", "base", "layout", "widgets", "keys", "floor")
 # Which kinds and families of widgets need a stylesheet.
 OF_FAMILIES: Final[Mapping[str, tuple[type[BaseWidget], ...]]] = {
     "entries": (Input, Parameter),

@@ -17,6 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.panel.rules import EmbedRules
 from app.printable import printable
 from app.web.embedding import from_frame, only_shows
+from app.web.page_guard import PAGE_GUARD_HASH
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
@@ -32,7 +33,8 @@ OWN_SITE: Final = frozenset({"same-origin", "none"})
 def content_security_policy(ancestors: str = "'none'", forms: str = "'self'") -> str:
     """The policy of a page; `ancestors` may show it in a frame."""
     return (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+        f"default-src 'none'; script-src 'self' {PAGE_GUARD_HASH}; style-src 'self'; "
+        "img-src 'self' data:; "
         f"connect-src 'self'; form-action {forms}; base-uri 'none'; frame-ancestors {ancestors}"
     )
 

@@ -1,7 +1,24 @@
-// The connection to the server's events: one EventSource. A browser opens six connections to one server over
-// HTTP/1.1, so a hidden page closes its own (source.js).
+// The connection to the server: requests, and its events by one EventSource. A browser opens six connections to one
+// server over HTTP/1.1, so a hidden page closes its own (source.js).
 const OPEN_LATER_MS = 700;
 const { base: BASE, page: PAGE } = document.body.dataset; // the robot and the widgets that this page shows
+
+// Posts JSON; given up after a time, by a timer, as some browsers have no `AbortSignal.timeout`.
+export function post(url, body, timeoutMs, options) {
+  const request = new AbortController();
+  setTimeout(() => request.abort(), timeoutMs);
+  return fetch(url, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+    signal: request.signal,
+    ...options,
+  });
+}
+
+export function newId() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
 
 export class Connection {
   #names;

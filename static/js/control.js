@@ -1,6 +1,7 @@
 // Control of the robot: the bar that shows its holder, and the holder's keep-alive. The server locks the
 // buttons of a client without control. Loaded only where the panel requires control.
-import { newId, TAP_AGAIN_MS } from "./press.js";
+import { newId, post } from "./connection.js";
+import { TAP_AGAIN_MS } from "./press.js";
 import { setText } from "./show.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
@@ -83,12 +84,6 @@ export class Control {
   }
 
   #post(act, body, keepalive = false) {
-    return fetch(`${document.body.dataset.base}/control/${act}`, {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(body),
-      signal: AbortSignal.timeout(RESPONSE_TIMEOUT_MS),
-      keepalive,
-    });
+    return post(`${document.body.dataset.base}/control/${act}`, body, RESPONSE_TIMEOUT_MS, { keepalive });
   }
 }

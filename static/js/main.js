@@ -108,10 +108,10 @@ const SECTIONS = {
 
 const source = new Source({
   snapshot(all) {
-    if (!source.isComplete || all.revision !== body.dataset.revision) {
+    if (all.revision !== body.dataset.revision) {
       lockAll();
       source.stop();
-      location.reload();
+      pageGuard.reload(true);
       return;
     }
     reconnected = "cut" in body.dataset;
@@ -146,17 +146,17 @@ for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
 }
 if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});
 source.load("./full-text.js", () => {});
-// What is not there when these fail to load is the browser's own.
-const absent = () => {};
+// The stream does not wait for these.
 const coarse = matchMedia("(pointer: coarse)");
-const openEntry = () => import("./entry/touch-entry.js").catch(absent);
+const openEntry = () => import("./entry/touch-entry.js").catch(pageGuard.fail);
 if (document.querySelector("template:is(#keypad, #keyboard)")) {
   if (body.dataset.keyboard === "on" || coarse.matches) openEntry();
   else coarse.addEventListener("change", openEntry, { once: true });
 }
-if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(absent);
-if (body.dataset.sounds === "on") import("./sound.js").catch(absent);
-import("./floor/floor.js").catch(absent);
-const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
+if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(pageGuard.fail);
+if (body.dataset.sounds === "on") import("./sound.js").catch(pageGuard.fail);
+import("./floor/floor.js").catch(pageGuard.fail);
+const presser = new Presser(widgets, source, body.dataset);
 window.operatorPanel = { eventAgeMs: () => source.ageMs }; // for the watcher of a kiosk's screen
-source.start();
+pageGuard.onFail = () => source.stop();
+if (!pageGuard.isBroken) source.start();

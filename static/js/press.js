@@ -1,4 +1,5 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
+import { newId, post } from "./connection.js";
 import { enteredValues, forgetRobotValue } from "./entries.js";
 import { showReceipt } from "./show.js";
 
@@ -7,25 +8,7 @@ const RESPONSE_TIMEOUT_MS = 5000;
 export const TAP_AGAIN_MS = 700;
 // The socket of a page that is not touched for so long is closed.
 const UNTOUCHED_MS = 60_000;
-
-export function newId() {
-  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
-}
-
-// A key that is held down is one press.
-function ignoreRepeat(event) {
-  if (event.repeat && event.target.closest?.("button")) event.preventDefault();
-}
-
-async function post(url, press, timeoutMs) {
-  const response = await fetch(url, {
-    method: "POST",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(press),
-    signal: AbortSignal.timeout(timeoutMs),
-  });
-  return { ...(await response.json()), status: response.status };
-}
+const read = async (response) => ({ ...(await response.json()), status: response.status });
 
 export class Presser {
   #socket = null;
@@ -47,7 +30,8 @@ export class Presser {
     this.#source = source;
     if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
-    addEventListener("keydown", ignoreRepeat, true);
+    // A key that is held down is one press.
+    addEventListener("keydown", (event) => event.repeat && event.target.closest?.("button") && event.preventDefault(), true);
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
     }
@@ -72,11 +56,25 @@ export class Presser {
     else if (this.#buttons.has(button)) this.#pressed(event, button);
   }
 
-  // By a pointer, a key or a program. Only a pointer has a "down" before.
+  // What fails before a press is sent is said.
   #pressed(event, button) {
     event.preventDefault();
     const root = this.#buttons.get(button);
     if (!root || button.disabled) return;
+    try {
+      this.#begin(event, root, button);
+    } catch (error) {
+      showReceipt(this.#widgets.values(), root, this.#unsent(error));
+    }
+  }
+
+  #unsent(error) {
+    console.error(error);
+    return { outcome: "refused", reason: this.#sentences.unsent };
+  }
+
+  // By a pointer, a key or a program. Only a pointer has a "down" before.
+  #begin(event, root, button) {
     // The robot's response arrives as an event.
     if (button.matches(".read")) return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
     const byPointer = event.detail > 0;
@@ -137,12 +135,14 @@ export class Presser {
 
   // Sent once, never repeated: without a response the outcome is unknown.
   async #send(widget, socket, url, press, timeoutMs) {
+    let response = null;
     try {
-      const response = socket?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs);
+      response = socket?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs).then(read);
       const { status, error, ...receipt } = await response;
       if (receipt.outcome) return receipt;
       if (status < 500 && error) return { outcome: "refused", reason: error };
-    } catch {
+    } catch (error) {
+      if (!response) return this.#unsent(error);
       if (socket && socket === this.#socket) this.close();
     }
     return { outcome: "unknown", reason: this.#sentences.unsure };

@@ -13,8 +13,9 @@ export class Source {
   // The page is as old as the server's response, not as its script.
   #aliveAt = performance.getEntriesByType("navigation")[0]?.responseStart ?? 0;
   #fresh = true; // the page itself is a snapshot, for as long as any other
-  #isComplete = true;
-  #loading = 0; // modules that are not there yet
+  #isStopped = false;
+  #loads = []; // of further modules
+  #loading = 0; // those that are not there yet
   #seen = document.body.dataset.seen;
   // The server's time is at least performance.now() plus this. A delay makes a measured offset smaller, so
   // the largest counts.
@@ -28,11 +29,6 @@ export class Source {
       event: (name, text, id) => this.#receive(name, text, id),
       lost: () => this.#lose(),
     });
-  }
-
-  // Whether no module of this page failed to load.
-  get isComplete() {
-    return this.#isComplete;
   }
 
   // The id of the last event: the view that the operator sees.
@@ -57,33 +53,29 @@ export class Source {
     setTimeout(() => this.#watch(), CHECK_MS);
     if (document.hidden) this.#suspend();
     else this.#open();
+    Promise.all(this.#loads).then(pageGuard.started, pageGuard.fail);
   }
 
-  // Loads a further module. The stream opens after that, since the module may show attributes of the snapshot. If it
-  // fails the page is locked and reloads.
+  // Loads a further module. The stream opens after that, since the module may show attributes of the snapshot.
   load(name, use) {
     this.#loading += 1;
     const begin = (module) => {
-      this.#loading -= 1;
       use(module);
+      this.#loading -= 1;
       if (!document.hidden) this.#open();
     };
-    import(name).then(begin, () => {
-      this.#loading -= 1;
-      this.#isComplete = false;
-      this.#lose();
-      this.#connection.openLater();
-    });
+    this.#loads.push(import(name).then(begin));
   }
 
-  // For good: the page is about to reload.
+  // For good: the page is locked, or about to reload.
   stop() {
+    this.#isStopped = true;
     this.#connection.close();
     this.#handlers = Object.fromEntries(Object.keys(this.#handlers).map((name) => [name, () => {}]));
   }
 
   #open() {
-    if (!this.#loading) this.#connection.open();
+    if (!this.#loading && !this.#isStopped) this.#connection.open();
   }
 
   // A hidden page releases its stream. When it shows again it is locked until a new snapshot.
@@ -98,7 +90,7 @@ export class Source {
       const data = JSON.parse(text);
       if (!this.#isLate(name === "beat" ? data.now : Infinity)) return this.#show(name, data, id);
       this.#lose();
-      this.#connection.open();
+      this.#open();
     } catch (error) {
       this.#lose(); // a page that is half updated is locked
       throw error;

@@ -172,24 +172,6 @@ def test_a_button_that_opens_under_a_resting_finger_is_not_pressed(shown: Page) 
     assert len(shown.evaluate("left")) == 1
 
 
-def test_where_the_script_did_not_come_a_press_is_a_form(demo: Server, page: Page) -> None:
-    page.route("**/press.js", lambda route: route.abort())
-
-    def sent() -> bool:
-        """Not where the robot took its permission back, or the machine stood still, in between."""
-        page.goto(demo.url)
-        expect(publish(page)).to_be_enabled()
-        page.wait_for_timeout(TAP_AGAIN_MS)  # a form that comes sooner is a second tap
-        page.get_by_label("Message").fill("by form")
-        with page.expect_navigation():
-            publish(page).click()
-        return "Sent on /operation at" in receipt(page).inner_text()
-
-    until(sent, "it is sent")
-    expect(page.get_by_label("Message")).to_have_value("by form")
-    until(lambda: "by form" in demo.widget("last_heard")["text"], "the robot has it")
-
-
 HEAD: Final = """
 title = "Cell"
 mode = "demo"

@@ -19,6 +19,7 @@ import pytest
 import zenoh
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from app.web.page_guard import script_hash
 from tests.support.parts import (
     ENOUGH_S,
     ROOT,
@@ -248,14 +249,16 @@ def test_other_sites_are_shut_out(demo: Server, path: str, headers: dict[str, st
     assert answer.status_code == 403
 
 
-def test_pages_have_a_policy_without_inline_script_or_style(demo: Server) -> None:
+def test_pages_have_a_policy_for_their_one_inline_script_and_no_inline_style(demo: Server) -> None:
     answer = demo.http.get("/")
     policy = answer.headers["content-security-policy"]
     assert "unsafe-inline" not in policy
     assert "default-src 'none'" in policy
     assert "<style" not in answer.text
     assert " style=" not in answer.text
-    assert not re.search(r"<script(?![^>]*\bsrc=)", answer.text)
+    inline = re.findall(r"<script(?![^>]* src=)[^>]*>(.*?)</script>", answer.text, re.DOTALL)
+    assert len(inline) == 1
+    assert f"script-src 'self' {script_hash(inline[0])};" in policy
     assert not re.search(r"\bon\w+=", answer.text)
     assert answer.headers["cache-control"] == "no-store"
 

@@ -62,6 +62,10 @@ class PageContext(TypedDict):
     unknown: Text
     unsure: Text
     broken: Text
+    unsent: Text
+    faulty: Text
+    too_old: Text
+    state_unknown: Text
     refresh_s: int
     now: int
     since: float | None
@@ -121,6 +125,10 @@ def page_context(
         unknown=say("unknown"),
         unsure=say("server_unsure"),
         broken=say("widget_failed"),
+        unsent=say("page_unsent"),
+        faulty=say("page_faulty"),
+        too_old=say("browser_too_old"),
+        state_unknown=say("state_unknown"),
         refresh_s=refresh_s,
         now=round(now * 1000),
         since=None if RELOADED in request.query_params else round(now, 3),

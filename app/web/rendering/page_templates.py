@@ -21,6 +21,7 @@ from app.panel.layout import Page
 from app.panel.number_range import decimal_text
 from app.panel.screen import CLEANING_S
 from app.panel.widgets.families import BaseWidget
+from app.web.page_guard import PAGE_GUARD
 
 log = logging.getLogger("kiosk.web")
 
@@ -43,6 +44,7 @@ class PageTemplates:
         self._base.globals["icon"] = icon
         self._base.globals["cleaning_s"] = CLEANING_S
         self._base.globals["failure"] = FAILURE
+        self._base.globals["page_guard"] = PAGE_GUARD
         self._environments: dict[str, Environment] = {}
         self._failing: set[str] = set()  # ids of widgets whose failure was logged
         self._own: dict[Path, Template] = {}

@@ -25,7 +25,7 @@ export class Sheet {
   #input = null;
   #shapes;
   #gone; // called when the input is not there any more
-  #watch = new ResizeObserver(() => (this.#input.checkVisibility() ? this.#place() : this.#gone()));
+  #watch = new ResizeObserver(() => (this.#input.getClientRects().length ? this.#place() : this.#gone()));
   #placed = () => this.#place();
 
   // `shapes`: how it may look, the best one first.

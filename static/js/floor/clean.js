@@ -13,13 +13,13 @@ export class Cleaning {
   #endsAt = 0; // by performance.now(): a clock that is set changes nothing
 
   constructor() {
-    const left = Number(sessionStorage.getItem(UNTIL)) - Date.now();
+    const left = Number(pageGuard.recall(UNTIL)) - Date.now();
     if (left > 0 && left <= totalMs()) this.#begin(left);
   }
 
   start() {
     if (over.matches(":popover-open")) return;
-    sessionStorage.setItem(UNTIL, Date.now() + totalMs());
+    pageGuard.keep(UNTIL, Date.now() + totalMs());
     this.#begin(totalMs());
   }
 
@@ -42,7 +42,7 @@ export class Cleaning {
   }
 
   #end() {
-    sessionStorage.removeItem(UNTIL);
+    pageGuard.keep(UNTIL, null);
     over.hidePopover();
     for (const hold of document.querySelectorAll(HOLDS)) unlockLocally(hold);
     shield.lower();

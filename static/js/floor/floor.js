@@ -19,14 +19,15 @@ refuse("wheel", ({ ctrlKey }) => ctrlKey);
 refuse("keydown", ({ key, ctrlKey, metaKey }) => (ctrlKey || metaKey) && ZOOM_KEYS.includes(key));
 
 const afterMs = 1000 * (document.body.dataset.dimAfterS ?? 0);
-if (afterMs) import("./dim.js").then(({ Dimming }) => new Dimming(afterMs));
+if (afterMs) import("./dim.js").then(({ Dimming }) => new Dimming(afterMs)).catch(pageGuard.fail);
 
 // Loaded with the menu, and where the page was loaded again while it was cleaned.
 let cleaning = null;
-const loaded = () => (cleaning ??= import("./clean.js").then(({ Cleaning }) => new Cleaning()));
-if (sessionStorage.getItem("cleaning-until")) loaded();
+const begin = () => import("./clean.js").then(({ Cleaning }) => new Cleaning()).catch(pageGuard.fail);
+const loaded = () => (cleaning ??= begin());
+if (pageGuard.recall("cleaning-until")) loaded();
 document.getElementById("menu").addEventListener("toggle", loaded, { once: true });
 const key = document.querySelector(".menu .clean");
 key.hidden = false;
-key.addEventListener("click", () => loaded().then((one) => one.start()));
+key.addEventListener("click", () => loaded().then((one) => one?.start()));
 document.documentElement.dataset.floor = ""; // all of this is in force
