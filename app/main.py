@@ -44,6 +44,7 @@ from app.web.root_path import RootPath, root_path_of
 from app.web.routes import audit_log as log_routes
 from app.web.routes import (
     control,
+    description,
     display,
     events,
     frames,
@@ -94,6 +95,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=partial(_lifespan, settings, panel, repeated),
         docs_url=None,  # these pages load scripts from other servers
         redoc_url=None,
+        openapi_url=None,  # routes.description has it
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
     )
@@ -120,7 +122,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    for routes in (*ROBOT_ROUTES, static, health, display):
+    for routes in (*ROBOT_ROUTES, static, health, display, description):
         app.include_router(routes.router)
     if dev:
         from app.web.routes import gallery

@@ -91,8 +91,10 @@ class Turns:
             if lane is None:
                 await self._wait(pause_s)
             else:
-                self._queue.take(lane).set_result(None)
-                await self._round(lane)
+                turn = self._queue.take(lane)
+                if not turn.done():  # its request may have been cancelled
+                    turn.set_result(None)
+                    await self._round(lane)
         self._giving = None
 
     async def _round(self, lane: Lane) -> None:
