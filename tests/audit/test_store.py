@@ -17,7 +17,7 @@ from app.audit.database import NAME, Head, set_aside
 from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, clean_text, new_entry
 from app.audit.opening import Opening
 from app.audit.queries import Filter, rows
-from app.audit.store import DAY_MS, REMOVED_AT_ONCE, Store
+from app.audit.store import COLUMNS, DAY_MS, REMOVED_AT_ONCE, Store
 from app.audit.verify import verify
 from app.audit.writer_thread import HOUR_S, ClockSteadiness
 from app.cli.log import main
@@ -125,6 +125,14 @@ def changes_hash_too(db: sqlite3.Connection) -> None:
     db.execute("UPDATE entry SET hash = 'f' WHERE seq = 5")
 
 
+def changes_and_seals_again(db: sqlite3.Connection) -> None:
+    """One entry, with a right hash of its own: only the entry after it shows that."""
+    entry = Entry(*db.execute(f"SELECT {COLUMNS} FROM entry WHERE seq = 5").fetchone())
+    forged = entry._replace(address="10.0.0.8")
+    changed = (forged.address, forged.computed_hash())
+    db.execute("UPDATE entry SET address = ?, hash = ? WHERE seq = 5", changed)
+
+
 def removes(db: sqlite3.Connection) -> None:
     db.execute("DELETE FROM entry WHERE seq = 5")
 
@@ -190,6 +198,7 @@ def writes_no_unicode(db: sqlite3.Connection) -> None:
     [
         (changes, "entry 5 was changed"),
         (changes_hash_too, "entry 5 was changed"),
+        (changes_and_seals_again, "entry 6 does not follow the one before it"),
         (removes, "entry 5 is missing"),
         (removes_two, "entries 5 to 6 are missing"),
         (removes_the_first, "what stood before entry 5 was removed"),

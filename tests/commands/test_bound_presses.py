@@ -15,10 +15,15 @@ from playwright.sync_api import Browser, Page, expect
 from app import clock
 from app.audit import NullLog
 from app.commands.press_context import PressGuard
+from app.i18n import Text
 from app.panel.model import Panel
+from app.permission.clients import anonymous
 from app.permission.control_authority import ControlAuthority
+from app.permission.principal import Principal
+from app.view.publisher import ViewPublisher
 from app.view.refresh import NoOtherRobots, ViewRefresher, ViewSources
-from tests.support.builders import NOW, Table, robot_there, small_panel
+from app.view.view import build_view
+from tests.support.builders import NOW, Table, permits, robot_there, small_panel
 from tests.support.parts import (
     ROOT,
     TAP_AGAIN_MS,
@@ -153,6 +158,32 @@ def test_the_limits_of_the_time_of_a_press(
     why = english(guard.late(NOW + later_s))
     assert words in why
     assert bool(why) == bool(words)
+
+
+def test_a_press_of_a_page_that_showed_the_lock_before_it_changed_is_stale() -> None:
+    """The button was locked and opened again after the page: what the operator saw is no longer true.
+    A change that is none of the button's does not matter."""
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    publisher = ViewPublisher(build_view(panel, robot, NOW).view, "r1")
+    control = ControlAuthority(panel.control, "", log_line=lambda *_: None)
+    guard = PressGuard(publisher, control, NullLog(), 3.0, lambda: ())
+    who = Principal(anonymous("10.0.0.1"))
+
+    def reason(widget: str, seen: str) -> str:
+        stale = guard.context_for(widget, who, seen).stale_reason()
+        return stale.code if isinstance(stale, Text) else ""
+
+    seen = publisher.id
+    assert reason("guarded", seen) == ""
+    for permitted in (False, True):
+        permits(robot, permitted)
+        publisher.post(build_view(panel, robot, NOW).view)
+    assert publisher.view["widgets"]["guarded"]["enabled"]
+    assert reason("guarded", seen) == "changed_meanwhile"
+    assert reason("free", seen) == ""
+    assert reason("guarded", publisher.id) == ""
 
 
 def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server, way: str) -> None:
