@@ -19,6 +19,7 @@ from app import ros_logging
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
+from app.panel.checks.page_templates import page_parts
 from app.panel.rules import EmbedRules
 from app.panel.widgets.kinds import KINDS
 from app.process import listen_sockets
@@ -192,7 +193,7 @@ async def _app_state(
         limits = PressLimits(partial(oplog.suppress, limited=True))
         async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
             metrics = Metrics(fleet, lambda: oplog.left_out, lambda: limits.refused)
-            made = PageTemplates(templates, panel.templates)
+            made = PageTemplates(templates, page_parts(panel))
             yield AppState(fleet, assets, made, metrics, oplog, limits)
 
 

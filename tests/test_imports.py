@@ -54,6 +54,7 @@ COMMON = {
     "app.i18n.typed_numbers",
     "app.i18n.values",
     "app.icons",
+    "app.page_process",
     "app.pictures",
     "app.printable",
     "app.rate_limit",

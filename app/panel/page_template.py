@@ -1,35 +1,37 @@
-"""A page's own template: Jinja in a sandbox, which places the widgets of its page and pictures.
+"""A page's own template, compiled and rendered in a process with limits (`app.page_process`).
 
-It has `title` (the page's), `language` (the reader's), `widget(id)`, `picture(name, alt)` and
-`icon(name)`, and knows nothing of the robot. What it places in a language is the same in every request,
-and is tried once when the panel is loaded.
+It knows nothing of the robot: what it makes in a language is the same in every request, but for the
+widgets in it. So it runs once, when the panel is loaded, and a page puts its widgets in between.
 """
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+import json
+import os
+import re
+import secrets
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from jinja2 import StrictUndefined, Template, TemplateError
-from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
 from app.i18n import ENGLISH, render
-from app.icons import icon, icons
+from app.icons import icons
+from app.page_process import NAME, SECONDS, Answer, Request
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.layout import Page
+from app.settings import PACKAGE
 
-PICTURE: Final = Markup('<img class="picture" src="{}/{}" alt="{}" draggable="false">')
-
-
-class PlacementError(ValueError):
-    """A template places an unknown name, or a widget twice. `cause` is as in a Fault."""
-
-    def __init__(self, message: str, cause: str = "") -> None:
-        super().__init__(message)
-        self.cause = cause
+COMMAND: Final = (sys.executable, "-P", "-c", "from app.page_process import run; run()")
+WITHIN_S: Final = 30.0  # on a machine that is busy; its own time is limited by itself
+MOST_BYTES: Final = 1_000_000
+KEPT: Final = 64  # templates of a panel that are not run again
+_FRAME: Final = re.compile(rf'File "{NAME}", line (\d+)')
+ENDED: Final = f"it takes more than {SECONDS:g} s in one expression"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,108 +44,123 @@ class TemplateFault:
     cause: str = ""
 
 
-@cache
-def _environment() -> ImmutableSandboxedEnvironment:
-    made = ImmutableSandboxedEnvironment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    made.globals["icon"] = _icon
-    return made
+# The parts between widgets and paths of pictures, in turn: None is the folder of pictures.
+Parts = tuple[str | None, ...]
 
 
-def _icon(name: str) -> Markup:
-    if name not in icons():
-        raise PlacementError(_unknown("icon", name, icons()))
-    return icon(name)
+@dataclass(frozen=True, slots=True)
+class PageParts:
+    """What a template makes, by language: texts at even places, between them ids of widgets, and None
+    for the folder of pictures."""
+
+    by_language: Mapping[str, Parts]
+
+    def placed(self, widget: str) -> bool:
+        """Whether the readers of each language see a widget."""
+        return all(widget in parts[1::2] for parts in self.by_language.values())
+
+    def inside(self, language: str, show: Callable[[str], Markup], folder: str) -> Markup:
+        """The inside of a page. `show` makes the widget with an id, `folder` is the path of the
+        pictures."""
+        shown = []
+        for number, part in enumerate(self.by_language[language]):
+            if number % 2:
+                shown.append(folder if part is None else show(part))
+            else:
+                shown.append(part or "")
+        return Markup("".join(shown))
 
 
-def compile_template(path: Path) -> Template:
-    """TemplateError for what is not written as Jinja has it; UnicodeDecodeError."""
-    environment = _environment()
-    source = path.read_text(encoding="utf-8")
-    code = environment.compile(source, filename=str(path))
-    return Template.from_code(environment, code, environment.make_globals(None))
+def run_template(
+    path: Path, page: Page, pictures: Collection[str], languages: Collection[str] = (ENGLISH,)
+) -> TemplateFault | PageParts:
+    """What a page's template makes for readers of these languages, or its first fault."""
+    try:
+        with path.open("rb") as file:
+            source = file.read(MOST_BYTES + 1)
+        if len(source) > MOST_BYTES:
+            return TemplateFault(0, f"has more than {MOST_BYTES:,} bytes")
+        text = source.decode()
+    except UnicodeDecodeError:
+        return TemplateFault(0, "is not UTF-8")
+    except OSError as error:
+        return TemplateFault(0, f"can't be read: {error.strerror}")
+    titles = tuple((language, render(page.title, language)) for language in languages)
+    return _run(text, titles, tuple(widget.id for widget in page.widgets), tuple(sorted(pictures)))
 
 
-def render_page(
-    template: Template,
-    page: Page,
-    pictures: Collection[str],
-    show: Callable[[str], Markup],
-    folder: str = "",
-    language: str = ENGLISH,
-) -> Markup:
-    """The inside of a page. `show` makes the widget with an id, `folder` is the path of the pictures,
-    `language` that of the reader.
-    Raises PlacementError, or what else a template may raise."""
-    known = {widget.id for widget in page.widgets}
-    placed: set[str] = set()
+@lru_cache(KEPT)
+def _run(
+    source: str,
+    titles: tuple[tuple[str, str], ...],
+    widgets: tuple[str, ...],
+    pictures: tuple[str, ...],
+) -> TemplateFault | PageParts:
+    mark = f"[{secrets.token_hex(16)}:"
+    request: Request = {
+        "source": source,
+        "titles": dict(titles),
+        "widgets": list(widgets),
+        "pictures": list(pictures),
+        "mark": mark,
+    }
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), "PYTHONUTF8": "1"}
+    try:
+        done = subprocess.run(
+            COMMAND,
+            input=json.dumps(request).encode(),
+            capture_output=True,
+            env=environment,
+            timeout=WITHIN_S,
+        )
+    except subprocess.TimeoutExpired:
+        return TemplateFault(0, ENDED)
+    except OSError as error:
+        return TemplateFault(0, f"can't be tried: {error.strerror}")
+    if done.returncode:
+        return _ended(done)
+    return _answered(json.loads(done.stdout.splitlines()[-1]), mark, request)
 
-    def widget(name: str) -> Markup:
-        if name not in known:
-            what = _unknown("widget", name, [one.id for one in page.widgets])
-            raise PlacementError(what, f"input {name}")
-        if name in placed:
-            raise PlacementError(f'the widget "{name}" is placed twice')
-        placed.add(name)
-        return show(name)
 
-    def picture(name: str, alt: str = "") -> Markup:
-        if name not in pictures:
-            raise PlacementError(_unknown("picture", name, pictures))
-        return PICTURE.format(folder, name, alt)
-
-    given = {"title": render(page.title, language), "language": language}
-    return Markup(template.render(**given, widget=widget, picture=picture))
+def _ended(done: subprocess.CompletedProcess[bytes]) -> TemplateFault:
+    """A process that could not even say what is wrong."""
+    if done.returncode != -signal.SIGVTALRM:
+        return TemplateFault(0, f"can't be tried: its process ended with status {done.returncode}")
+    at = _FRAME.search(done.stderr.decode(errors="replace"))
+    lines = json.loads((done.stdout.splitlines() or [b"[]"])[0])
+    before = [line for line, code in lines if at is not None and code <= int(at[1])]
+    return TemplateFault(before[-1] if before else 0, ENDED)
 
 
-def _unknown(what: str, name: Any, known: Collection[str]) -> str:
-    meant = closest_name(str(name), known)
+def _answered(answer: Answer, mark: str, request: Request) -> TemplateFault | PageParts:
+    if "rendered" not in answer:
+        return _fault(answer, request)
+    found = {}
+    for language, text in answer["rendered"].items():
+        parts = re.split(rf"{re.escape(mark)}(\d*)\.", text)
+        placed = [int(number) for number in parts[1::2] if number]
+        if any(mark.strip("[:") in part.lower() for part in parts[::2]) or len({*placed}) < len(placed):
+            return TemplateFault(0, "what widget() and picture() give is placed once, as it is")
+        ids = [request["widgets"][int(number)] if number else None for number in parts[1::2]]
+        found[language] = tuple(
+            part if number % 2 == 0 else ids[number // 2] for number, part in enumerate(parts)
+        )
+    return PageParts(found)
+
+
+def _fault(answer: Answer, request: Request) -> TemplateFault:
+    line, name = answer.get("line", 0), answer.get("name", "")
+    if twice := answer.get("twice"):
+        return TemplateFault(line, f'the widget "{twice}" is placed twice')
+    if what := answer.get("unknown"):
+        known = {"widget": request["widgets"], "picture": request["pictures"], "icon": icons()}[what]
+        cause = f"input {name}" if what == "widget" else ""
+        return TemplateFault(line, _unknown(what, name, known), cause)
+    return TemplateFault(line, answer.get("message", ""))
+
+
+def _unknown(what: str, name: str, known: Collection[str]) -> str:
+    meant = closest_name(name, known)
     where = " on this page" if what == "widget" else ""
     hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(known)}"
     return f'no {what} "{name}"{where}; {hint}'
-
-
-def try_template(
-    path: Path, page: Page, pictures: Collection[str], languages: Collection[str] = (ENGLISH,)
-) -> TemplateFault | list[str]:
-    """The first fault of a page's template for readers of these languages, else the ids of the widgets
-    that it does not place for all of them."""
-    placed: Counter[str] = Counter()
-
-    def show(name: str) -> Markup:
-        placed[name] += 1
-        return Markup()
-
-    try:
-        template = compile_template(path)
-        for language in languages:
-            render_page(template, page, pictures, show, language=language)
-    except UnicodeDecodeError:
-        return TemplateFault(0, "is not UTF-8")
-    except Exception as error:  # a template may raise anything: 1 / 0, None.upper()
-        return TemplateFault(_line(error, path), _message(error), getattr(error, "cause", ""))
-    return [widget.id for widget in page.widgets if placed[widget.id] < len(languages)]
-
-
-def _message(error: Exception) -> str:
-    if isinstance(error, TypeError) and "no loader" in str(error):
-        return "include, import and extends are not there: a template is one file"
-    if isinstance(error, PlacementError | TemplateError):
-        return str(error.args[0] if error.args else error)
-    return f"{type(error).__name__}: {error}"
-
-
-def _line(error: Exception, path: Path) -> int:
-    """Where in the template: Jinja gives its frames the template's name and lines."""
-    if (line := getattr(error, "lineno", None)) is not None:
-        return int(line)
-    return max(_lines(error, path), default=0)
-
-
-def _lines(error: Exception, path: Path) -> Iterator[int]:
-    step = error.__traceback__
-    while step is not None:
-        if step.tb_frame.f_code.co_filename == str(path):
-            yield step.tb_lineno
-        step = step.tb_next

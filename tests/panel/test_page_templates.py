@@ -1,13 +1,19 @@
 """A page's own template: what it may do, and each fault with its line in the template."""
 
+import re
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
+from markupsafe import Markup
 
 from app.errors import Fault, PanelError
 from app.panel import check_panel, load_panel
+from app.panel.checks.page_templates import page_parts
 from tests.support.parts import ROOT
 
 EXAMPLE: Final = ROOT / "docs/examples/plan/panel.toml"
@@ -166,3 +172,92 @@ def test_what_is_never_placed_is_a_note(write: Write) -> None:
     assert [note.message for note in notes] == [
         'plan.html never places "speed": no one sees what is not placed'
     ]
+
+
+# What takes too much, with its line: the last one of these templates.
+FOR_EVER: Final = {
+    "nested loops": "{% for a in range(99999) %}{% for b in range(99999) %}{% endfor %}{% endfor %}",
+    "a loop that calls itself": "{% for a in [[1]] recursive %}{{ loop([[1]]) }}{% endfor %}",
+    "a power": "{{ 9**(9**9) }}",
+    "a power that is not used": "{% set a = 9**(9**9) %}",
+    "a power in a condition": "{% if 7**(7**9) %}{% endif %}",
+    "a long text": '{{ "x".center(3000000000) }}',
+    "a long text by a filter": '{{ "x"|center(3000000000) }}',
+    "a text many times": '{{ "xxxxxxxx" * 99999999 }}',
+    "a list many times": "{% set a = [1] * 99999999 %}",
+    "a format": '{{ "%9999999999d" % 1 }}',
+    "a text that grows": "{% set a = namespace(x='xxxxxxxx') %}{% for b in range(99) %}"
+    "{% set a.x = a.x ~ a.x %}{% endfor %}",
+    "a long page": "{% for a in range(99999) %}{{ '<p>much text</p>' * 9 }}{% endfor %}",
+    "a sorted list": "{% for a in range(9999) %}{% set b = range(99999)|sort|list %}{% endfor %}",
+    "lorem ipsum": "{{ lipsum(99999, True, 9999, 99999) }}",
+}
+
+
+TOO_MUCH: Final = (
+    r"it takes more than (1 s|50 MB)|it makes more than 1,000,000 characters"
+    "|RecursionError|ValueError: width too big|OverflowError"
+)
+
+
+@pytest.mark.parametrize("name", FOR_EVER)
+def test_a_template_that_takes_too_much_is_stopped_and_named_with_its_line(
+    write: Write, name: str
+) -> None:
+    began = time.monotonic()
+    fault = the_fault(write(f"{BOTH}<p>more</p>\n{FOR_EVER[name]}\n"))
+    assert time.monotonic() - began < 20  # on a busy machine; of the processor it takes a second
+    assert fault.message.startswith("plan.html: line 4: ")
+    assert re.search(TOO_MUCH, fault.message), fault.message
+
+
+def test_an_expression_without_a_line_of_its_own_is_stopped(write: Write) -> None:
+    fault = the_fault(write(BOTH + "{% autoescape 9**(9**9) %}{% endautoescape %}"))
+    assert fault.message == "plan.html: line 2: it takes more than 1 s in one expression"
+
+
+@pytest.mark.parametrize(
+    "template", ['{{ widget("speed")|upper }}', '{% set w = widget("speed") %}{{ w }}{{ w }}']
+)
+def test_what_places_a_widget_is_placed_once_as_it_is(write: Write, template: str) -> None:
+    fault = the_fault(write(template))
+    assert "what widget() and picture() give is placed once, as it is" in fault.message
+
+
+def test_a_large_file_is_no_template(write: Write) -> None:
+    assert "has more than 1,000,000 bytes" in the_fault(write(BOTH + " " * 1_000_000)).message
+
+
+def test_a_template_runs_once_and_not_in_this_process(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a page shows at run time can't make it run longer: it is not run again."""
+    runs: list[object] = []
+    run = subprocess.run
+
+    def counted(*command: Any, **options: Any) -> Any:
+        runs.append(command)
+        return run(*command, **options)
+
+    monkeypatch.setattr(subprocess, "run", counted)
+    loop = '{% for c in widget("heard") %}.{% endfor %}'
+    path = write('{{ widget("speed") }}<!-- new -->{{ picture("cell.svg") }}' + loop)
+    panel = load_panel(path)
+    (parts,) = page_parts(panel).values()
+    shown = parts.inside("en", lambda name: Markup(f"<b>{name}</b>" * 1000), "/static/1/pictures")
+    assert shown.count("<b>speed</b>") == 1000
+    assert 'src="/static/1/pictures/cell.svg"' in shown
+    assert len(runs) == 1
+
+
+def test_a_panel_without_templates_needs_nothing_for_them() -> None:
+    code = "import sys, app.main; print([m for m in sys.modules if m in OWN])"
+    names = ("app.page_process", "app.panel.page_template", "jinja2.sandbox")
+    done = subprocess.run(
+        [sys.executable, "-c", code.replace("OWN", repr(names))],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "[]"

@@ -12,7 +12,7 @@ from app.commands.service_calls import with_fields, with_reply
 from app.errors import InputError
 from app.i18n import PanelText, Text, localized, render, say
 from app.i18n.catalogue import catalogues_in
-from app.panel.page_template import compile_template, render_page, try_template
+from app.panel.page_template import PageParts, run_template
 from app.panel.widgets.parameter import Parameter
 from app.robot.parameter_state import ParameterState
 from app.robot.state import RobotState
@@ -105,10 +105,13 @@ def test_a_template_of_a_page_knows_the_language_of_its_reader(tmp_path: Path) -
     path.write_text('{{ title }}: {{ "Plan" if language == "de" else "Map" }} {{ widget("free") }}')
     page = panel_of(FREE).pages[0].model_copy(update={"title": text("Cell", "Zelle")})
 
-    def shown(language: str) -> str:
-        return str(render_page(compile_template(path), page, (), Markup, language=language))
+    def parts() -> PageParts:
+        made = run_template(path, page, (), ("en", "de"))
+        assert isinstance(made, PageParts)
+        return made
 
-    assert [shown("en"), shown("de")] == ["Cell: Map free", "Zelle: Plan free"]
-    assert try_template(path, page, (), ("en", "de")) == []
+    shown = [str(parts().inside(language, Markup, "")) for language in ("en", "de")]
+    assert shown == ["Cell: Map free", "Zelle: Plan free"]
+    assert parts().placed("free")
     path.write_text('{% if language != "de" %}{{ widget("free") }}{% endif %}')
-    assert try_template(path, page, (), ("en", "de")) == ["free"]
+    assert not parts().placed("free")

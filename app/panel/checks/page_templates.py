@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from app.errors import Fault, Note
+from app.panel.layout import Page
 from app.panel.model import Panel
 
 if TYPE_CHECKING:
-    from app.panel.page_template import TemplateFault
+    from app.panel.page_template import PageParts, TemplateFault
 
 
 def page_template_faults(panel: Panel) -> Iterator[Fault]:
@@ -19,26 +20,35 @@ def page_template_faults(panel: Panel) -> Iterator[Fault]:
         if page.groups:
             yield Fault(place, "a page with a template has no groups: the template places its widgets")
             continue
-        found = _try(panel, p)
-        if not isinstance(found, list):
-            line = f"line {found.line}: " if found.line else ""
-            yield Fault(place, f"{page.template.name}: {line}{found.message}", cause=found.cause)
+        _, fault = _run(panel, page)
+        if fault is not None:
+            line = f"line {fault.line}: " if fault.line else ""
+            yield Fault(place, f"{page.template.name}: {line}{fault.message}", cause=fault.cause)
 
 
 def unplaced_notes(panel: Panel) -> Iterator[Note]:
     """Widgets that are on a page and that its template never places."""
     for p, page in enumerate(panel.pages):
-        never = _try(panel, p) if page.template is not None else []
-        if isinstance(never, list) and never and page.template is not None:
+        if page.template is None:
+            continue
+        parts, _ = _run(panel, page)
+        never = [widget.id for widget in page.widgets if parts and not parts.placed(widget.id)]
+        if never:
             named = ", ".join(f'"{name}"' for name in never)
             what = f"{page.template.name} never places {named}: no one sees what is not placed"
             yield Note(f"page[{p}].template", what)
 
 
-def _try(panel: Panel, number: int) -> "TemplateFault | list[str]":
-    """Imported only where a page has a template: the sandbox is needed by nothing else."""
-    from app.panel.page_template import try_template
+def page_parts(panel: Panel) -> "dict[str, PageParts]":
+    """What the templates of a panel without faults make, by the ids of their pages."""
+    made = {page.id: _run(panel, page)[0] for page in panel.pages if page.template is not None}
+    return {name: parts for name, parts in made.items() if parts is not None}
 
-    page = panel.pages[number]
+
+def _run(panel: Panel, page: Page) -> "tuple[PageParts | None, TemplateFault | None]":
+    """Imported only where a page has a template: its process is needed by nothing else."""
+    from app.panel.page_template import TemplateFault, run_template
+
     assert page.template is not None
-    return try_template(page.template, page, panel.picture_files, panel.readers_languages)
+    found = run_template(page.template, page, panel.picture_files, panel.readers_languages)
+    return (None, found) if isinstance(found, TemplateFault) else (found, None)

@@ -1,16 +1,16 @@
 """The templates of the pages, with their texts rendered in one language.
 
-A page with its own template is rendered in two steps: that template in its sandbox, with the widgets of
-the usual macros, then the frame around it.
+A page with its own template is what that template made when the panel was loaded, with the widgets of
+the usual macros in it, then the frame around it.
 """
 
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from app.i18n import Text, render, say
@@ -23,6 +23,9 @@ from app.panel.screen import CLEANING_S
 from app.panel.widgets.families import BaseWidget
 from app.web.page_guard import PAGE_GUARD
 
+if TYPE_CHECKING:
+    from app.panel.page_template import PageParts
+
 log = logging.getLogger("kiosk.web")
 
 FAILURE: Final = say("widget_failed")
@@ -31,8 +34,8 @@ FAILURE: Final = say("widget_failed")
 class PageTemplates:
     """An environment for each language in use; a template is compiled at its first use."""
 
-    def __init__(self, folder: Path, own: Collection[Path] = ()) -> None:
-        """`own` are the templates of the panel's pages."""
+    def __init__(self, folder: Path, own: "Mapping[str, PageParts] | None" = None) -> None:
+        """`own` is what the pages' own templates make, by the ids of the pages."""
         self._base = Environment(
             loader=FileSystemLoader(folder),
             autoescape=True,
@@ -47,11 +50,7 @@ class PageTemplates:
         self._base.globals["page_guard"] = PAGE_GUARD
         self._environments: dict[str, Environment] = {}
         self._failing: set[str] = set()  # ids of widgets whose failure was logged
-        self._own: dict[Path, Template] = {}
-        if own:
-            from app.panel.page_template import compile_template  # its sandbox is not needed otherwise
-
-            self._own = {path: compile_template(path) for path in own}
+        self._own = own or {}
 
     def environment(self, language: str) -> Environment:
         """The environment of a language that has a catalogue."""
@@ -97,23 +96,18 @@ class PageTemplates:
                 return Markup(html)
         return Markup(self.environment(language).get_template("_failed.html").render(widget=widget))
 
-    def inside(
-        self, page: Page, pictures: Collection[str], language: str, **context: Any
-    ) -> Markup | None:
+    def inside(self, page: Page, language: str, **context: Any) -> Markup | None:
         """The HTML of a page's own template; None if it has none. `context` has what a widget's macro
         takes (`_cell.html`)."""
-        if page.template is None:
+        if page.id not in self._own:
             return None
-        from app.panel.page_template import render_page
-
         widgets = {widget.id: widget for widget in page.widgets}
         cell = self.environment(language).get_template("_cell.html")
 
         def show(name: str) -> Markup:
             return Markup(cell.render(widget=widgets[name], placed="", **context))
 
-        folder = context["words"]["pictures"]
-        return render_page(self._own[page.template], page, pictures, show, folder, language)
+        return self._own[page.id].inside(language, show, context["words"]["pictures"])
 
 
 def typed_in(entry: Any, language: str) -> Any:

@@ -96,8 +96,7 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     language = language_of(request)
     context = page_context(request, state, session, page, who, refresh_s, embedded)
     widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
-    pictures = state.fleet.panel.picture_files
-    context["inside"] = state.templates.inside(page, pictures, language, **widgets)
+    context["inside"] = state.templates.inside(page, language, **widgets)
     html = state.templates.render("screen.html", language, **context)
     forms = "'none'" if only_shows(rules, embedded) else "'self'"
     policy = content_security_policy(frame_ancestors(rules, embedded), forms)
