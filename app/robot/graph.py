@@ -83,7 +83,7 @@ class LiveGraph:
         self._relevant_names = None if keys is None else frozenset(map(dialect.in_token, keys))
         self.cache: dict[Any, Any] = {}  # see `cached_until_change`
         self._namespace = namespace
-        self._bridges: set[str] = set()
+        self._bridges: dict[str, set[str]] = {}  # their own tokens, by zid
         self._namespaces: dict[str, str] = {}  # of bridges
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
         self._alive_since: dict[str, float] = {}  # of tokens
@@ -112,7 +112,7 @@ class LiveGraph:
             return None
         self.cache.clear()
         if endpoint.role is None:
-            return self._apply_bridge(endpoint.zid, alive)
+            return self._apply_bridge(endpoint.zid, token_key, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
             self._alive_since[token_key] = now
@@ -128,13 +128,22 @@ class LiveGraph:
             self._tokens.pop(key, None)
         self._alive_since.pop(token_key, None)
 
-    def _apply_bridge(self, zid: str, alive: bool) -> str:
+    def _apply_bridge(self, zid: str, token_key: str, alive: bool) -> str | None:
+        """A session may have several tokens of its own: one for each of its nodes. It appears with the
+        first of them and is lost with the last."""
         if alive:
-            self._bridges.add(zid)
+            known = zid in self._bridges
+            self._bridges.setdefault(zid, set()).add(token_key)
+            if known:
+                return None
             self._bridge_versions = None  # the new bridge has not been queried yet
-        else:
-            self._bridges.discard(zid)
-            self._namespaces.pop(zid, None)
+            return zid
+        tokens = self._bridges.get(zid, set())
+        tokens.discard(token_key)
+        if tokens or zid not in self._bridges:
+            return None
+        del self._bridges[zid]
+        self._namespaces.pop(zid, None)
         return zid
 
     def update_routes(
@@ -167,14 +176,14 @@ class LiveGraph:
         """The zids of this robot's bridges. If none has its namespace, those with an unknown
         namespace."""
         own = self._namespace
-        known = ((zid, self._namespaces[zid]) for zid in self._bridges & self._namespaces.keys())
+        known = ((zid, self._namespaces[zid]) for zid in self._bridges.keys() & self._namespaces.keys())
         matching = {zid for zid, of in known if own is None or within(own, of)}
-        return frozenset(matching or self._bridges - self._namespaces.keys())
+        return frozenset(matching or self._bridges.keys() - self._namespaces.keys())
 
     @property
     def every_bridge(self) -> Collection[str]:
         """The zids of all bridges, also of other robots'."""
-        return self._bridges
+        return self._bridges.keys()
 
     @property
     def namespaces(self) -> set[str]:

@@ -40,7 +40,7 @@ class TinyDialect:
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
         topics = (self.token(zid, one.role, one.key, one.type) for one in endpoints)
-        return [f"tiny/{zid}/node", *topics]
+        return [f"tiny/{zid}/node/web_ui", *topics]
 
     def token(self, zid: str, role: str, key: str, type_name: str) -> str:
         return f"tiny/{zid}/{role}/{key.replace('/', '%')}/{type_name.replace('/', '%')}"
@@ -54,7 +54,7 @@ class TinyDialect:
 
     def name_in(self, token: str) -> str:
         parts = token.split("/")
-        return parts[3] if len(parts) > 3 else ""
+        return "" if parts[2] == "node" else parts[3]
 
     def in_token(self, key: str) -> str:
         return key.replace("/", "%")
@@ -116,7 +116,7 @@ class TinyRobot:
         tiny, declare = TinyDialect(), self._session.liveliness().declare_token
         own = [("MP", "operation_enabled", BOOL), ("SS", "reset", TRIGGER)]
         self._declared += [declare(tiny.token(self.zid, *one)) for one in own]
-        self._declared.append(declare(f"tiny/{self.zid}/node"))
+        self.nodes_alive = [declare(f"tiny/{self.zid}/node/{name}") for name in ("arm", "gripper")]
 
     def say(self, permitted: bool) -> bool:
         payload = INTERFACES.encode(BOOL, {"data": permitted})
@@ -181,12 +181,19 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, ze
         receipt = await one.presses.press("reset", {}, "p3", FROM)
         assert receipt.outcome == "succeeded", receipt.reason
         assert robot.attachments == [b"1 of " + zid]
-        own = {f"tiny/{one.link.zid}/node", f"tiny/{one.link.zid}/MP/go/std_msgs%msg%String"}
+        own = {f"tiny/{one.link.zid}/node/web_ui", f"tiny/{one.link.zid}/MP/go/std_msgs%msg%String"}
         assert own <= await asyncio.to_thread(robot.nodes)
 
-        robot.say(False)
+        robot.nodes_alive.pop().undeclare()  # one of the two nodes of this session ends
+        robot.say(False)  # arrives after that
         await when(lambda: not shown.view["interlocks"]["operation"]["enabled"])
         assert one.robot.reading(ENABLED).value("data") is False
+        assert one.link_verdict.permitted
+        assert one.peer.said == [f"found {robot.zid}"]
+        assert shown.view["widgets"]["reset"]["enabled"]
+        robot.nodes_alive.pop().undeclare()
+        await when(lambda: one.link_verdict.code == "no_bridge")
+        assert one.peer.said == [f"found {robot.zid}", f"lost {robot.zid}"]
         await one.stop()
 
     asyncio.run(scene())
