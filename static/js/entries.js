@@ -2,6 +2,8 @@
 import { mark, sentNumber, setLimits } from "./number-inputs.js";
 import { readNumbers } from "./number-text.js";
 
+const NUMBERS = "[data-number], [data-list]";
+
 // The value with its type. What is not a number is sent as text: the server says what is wrong.
 function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
@@ -10,7 +12,7 @@ function valueOf(input) {
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
-const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)[name]")];
+export const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)[name]")];
 
 // All values on the page, by the names of the inputs.
 export function enteredValues() {
@@ -38,13 +40,13 @@ export function showEntry(root, value) {
   if (input.type === "checkbox") input.checked = value === true;
   else if (input.value !== value) {
     input.value = value;
-    if (input.matches("[data-number]")) mark(input);
+    if (input.matches(NUMBERS)) mark(input);
   }
 }
 
 export function showBounds(root, bounds) {
   const input = entryOf(root);
-  if (input.matches("[data-number]")) setLimits(input, bounds);
+  if (input.matches(NUMBERS)) setLimits(input, bounds);
 }
 
 // The value was set: the input shows the robot's value again.
@@ -60,3 +62,5 @@ export function forgetRobotValue(root) {
 }
 
 addEventListener("input", ({ target }) => target.matches?.("[data-entry]") && touched.add(target));
+
+import("./kept-entries.js").catch(() => {}); // without it a page begins with the panel's values

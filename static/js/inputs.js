@@ -70,4 +70,5 @@ function equip(input) {
 }
 
 for (const input of document.querySelectorAll("input[data-number]")) equip(input);
+for (const input of document.querySelectorAll("input[data-list]")) input.addEventListener("input", () => mark(input));
 document.documentElement.dataset.inputs = ""; // steps and the marks of numbers are in force

@@ -1,6 +1,6 @@
 // The inputs of numbers: text fields in the notation of the page's language, and sliders.
 import { isLess, isOnStep, stepped } from "./decimals.js";
-import { numberText, readNumber, readPlain } from "./number-text.js";
+import { elementsOf, numberText, readNumber, readPlain } from "./number-text.js";
 
 // Its limits as plain text, "" without one.
 export function limitsOf({ dataset: { min, max, stepSize, whole } }) {
@@ -37,9 +37,16 @@ export function judged(text, { min, max, step, isWhole }) {
   return { plain, problem: isOff ? "offStep" : null };
 }
 
+// The entered number, or those of a list, judged.
+export function entered(input) {
+  const limits = limitsOf(input);
+  const texts = input.matches("[data-list]") ? elementsOf(input.value) : [entryText(input)];
+  return texts.map((text) => judged(text, limits));
+}
+
 // Marks what can't be sent as it is; nothing yet is no mistake.
 export function mark(input) {
-  const { problem } = judged(input.value, limitsOf(input));
+  const problem = entered(input).find((number) => number.problem)?.problem ?? null;
   const isWrong = problem !== null && input.value.trim() !== "";
   input.setCustomValidity(isWrong ? problem : "");
   input.toggleAttribute("data-unread", isWrong && problem.startsWith("no"));

@@ -8,6 +8,7 @@ import { scaled } from "./decimals.js";
 const { decimal = ".", group = "," } = document.documentElement.dataset;
 export const DECIMAL = decimal;
 export const MINUS = "−";
+const SEPARATOR = DECIMAL === "," ? ";" : ",";
 
 const LONGEST = 40;
 const AROUND = /^[ \t\r\n\u00a0\u3000]+|[ \t\r\n\u00a0\u3000]+$/g;
@@ -74,11 +75,18 @@ export function readNumber(text, isWhole) {
   return isWhole && (Math.abs(value) > 2 ** 53 || BigInt(value) !== BigInt(plain)) ? plain : value;
 }
 
+// The elements of a list of numbers, as they are typed.
+export function elementsOf(text) {
+  if (!text.replace(AROUND, "")) return [];
+  if (SEPARATOR === "," && UNCLEAR.test(text)) return [text];
+  return text.split(SEPARATOR).map((element) => element.replace(AROUND, ""));
+}
+
 // The numbers of a list; an element that is not a number is its text, which the server refuses.
 export function readNumbers(text, isWhole) {
-  if (!text.replace(AROUND, "")) return [];
-  const separator = DECIMAL === "," ? ";" : ",";
-  if (separator === "," && UNCLEAR.test(text)) return [text];
-  const elements = text.split(separator).map((element) => element.replace(AROUND, ""));
-  return elements.map((element) => readNumber(element, isWhole) ?? element);
+  return elementsOf(text).map((element) => readNumber(element, isWhole) ?? element);
+}
+
+export function listText(plains) {
+  return plains.map(numberText).join(`${SEPARATOR} `);
 }
