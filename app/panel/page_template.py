@@ -104,7 +104,8 @@ def _run(
         "pictures": list(pictures),
         "mark": mark,
     }
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), "PYTHONUTF8": "1"}
+    path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": path, "PYTHONUTF8": "1"}
     try:
         done = subprocess.run(
             COMMAND,
