@@ -8,9 +8,10 @@ from app.graph.model import Server, Topic
 from app.graph.node_services import NodeParameter
 from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES
-from app.scaffold.entry import Entry
+from app.scaffold.entry import Entry, Omission
 from app.scaffold.fields import NUMBERS
-from app.scaffold.naming import label_of, page_of, words_of
+from app.scaffold.naming import label_of, place_of, words_of
+from app.scaffold.reasons import NO_MESSAGE
 
 TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 OF_EVERY_NODE: Final = (
@@ -25,7 +26,7 @@ MAX_COMMENT: Final = 200  # characters of a value, and of a description
 ROLES: Final = {"start": "start", "stop": "stop", "reset": "reset"}
 
 
-def publishers(topic: Topic, interfaces: Interfaces) -> Iterator[Entry]:
+def publishers(topic: Topic, interfaces: Interfaces) -> Iterator[Entry | Omission]:
     """Keys that publish on a topic that the robot listens to."""
     nodes = {node for one in topic.subscribers for node in one.nodes}
     about = {"label": label_of(topic.name), "topic": topic.name, "type": topic.type}
@@ -34,9 +35,11 @@ def publishers(topic: Topic, interfaces: Interfaces) -> Iterator[Entry]:
         yield _control("joystick", topic.name, nodes, keys, "Moves the robot while it is held.")
         return
     message = _message(topic.type, interfaces)
-    if message is not None:
-        keys = {**about, "message": message, **_role(topic.name)}
-        yield _control("publish", topic.name, nodes, keys)
+    if message is None:
+        yield Omission(f"{topic.name} ({topic.type})", NO_MESSAGE)
+        return
+    keys = {**about, "message": message, **_role(topic.name)}
+    yield _control("publish", topic.name, nodes, keys)
 
 
 def _message(type_name: str, interfaces: Interfaces) -> dict[str, Any] | None:
@@ -116,5 +119,14 @@ def _control(
     id_word: str = "",
 ) -> Entry:
     own_name = f"{name}/{id_word}" if id_word else name
-    page = page_of(name, nodes)
-    return Entry(kind=kind, name=own_name, keys=keys, comment=comment, control=True, page=page)
+    scope = name.rpartition("/")[0]
+    return Entry(
+        kind=kind,
+        name=own_name,
+        keys=keys,
+        comment=comment,
+        control=True,
+        place=place_of(name, nodes),
+        scope=f"/{scope.strip('/')}" if scope.strip("/") else "",
+        nodes=tuple(sorted(nodes)),
+    )

@@ -1,48 +1,57 @@
 """The widgets that show a topic."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from math import ceil, degrees, pi
 from typing import Any, Final
 
 from app.graph.model import Topic
 from app.interfaces import Interfaces
-from app.scaffold.entry import Entry
+from app.scaffold.entry import Entry, Omission
 from app.scaffold.fields import NUMBERS, Shown, range_for, shown_fields
-from app.scaffold.naming import NEGATIVE, label_of, page_of
+from app.scaffold.labels import own_labels
+from app.scaffold.naming import NEGATIVE, label_of, place_of
+from app.scaffold.reasons import NO_JOINTS, too_long, why_no_display
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
 LOG: Final = "rcl_interfaces/msg/Log"
 PICTURES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 MAX_JOINTS: Final = 24
+LONGEST_TEXT: Final = 500  # characters of a readout
 NODES_PAGE: Final = "nodes"
 LEAST_AGE_S: Final = 2
+Place = tuple[str, ...]
 MISSED: Final = 5  # messages, until a value looks old
 
 
 def displays(
     topic: Topic, interfaces: Interfaces, sample: Any = None, period_s: float | None = None
-) -> Iterator[Entry]:
-    """The widgets of a topic that the robot publishes. `sample` is one of its messages, or None;
-    `period_s` are the seconds between two, None if it is not published regularly."""
+) -> Iterator[Entry | Omission]:
+    """The widgets of a topic that the robot publishes, or why it has none. `sample` is one of its
+    messages, or None; `period_s` are the seconds between two, None if it is not published regularly."""
     nodes = {node for one in topic.publishers for node in one.nodes}
     about = {"topic": topic.name, "type": topic.type, **_qos(topic), **_max_age(topic, period_s)}
-    page = page_of(topic.name, nodes)
+    place = place_of(topic.name, nodes)
     label = label_of(topic.name)
     match topic.type:
         case t if t in PICTURES:
             keys = {"label": label, "topic": topic.name, "type": topic.type, "span": 6}
-            yield Entry(kind="camera", name=topic.name, page=page, keys=keys)
+            yield Entry(kind="camera", name=topic.name, place=place, keys=keys)
         case t if t == JOINTS:
-            yield from _joints(topic, label, page, about, sample)
+            yield from _joints(topic, label, place, about, sample)
         case t if t == DIAGNOSTICS:
             yield _diagnostics(topic, label, about)
         case t if t == LOG:
             keys = {"label": "Log of the nodes", "topic": topic.name}
-            yield Entry(kind="log", name=topic.name, page=NODES_PAGE, keys=keys)
+            yield Entry(kind="log", name=topic.name, place=(NODES_PAGE,), keys=keys)
         case _:
-            for shown in shown_fields(topic.type, interfaces):
-                yield _field(topic, page, about, shown, _value(sample, shown.field))
+            fields = list(shown_fields(topic.type, interfaces))
+            for shown in fields:
+                yield _field(topic, place, about, shown, _value(sample, shown.field))
+            if not fields:
+                why = why_no_display(topic.type, interfaces)
+                yield Omission(f"{topic.name} ({topic.type})", why)
 
 
 def _qos(topic: Topic) -> dict[str, Any]:
@@ -64,35 +73,41 @@ def _value(sample: Any, path: str) -> Any:
     return value
 
 
-def _field(topic: Topic, page: str, about: Mapping[str, Any], shown: Shown, value: Any) -> Entry:
+def _field(
+    topic: Topic, place: Place, about: Mapping[str, Any], shown: Shown, value: Any
+) -> Entry | Omission:
     label = " ".join(filter(None, (label_of(topic.name), shown.word)))
     name = topic.name if not shown.word else f"{topic.name}/{shown.field.replace('.', '_')}"
     field = {} if shown.field == "data" else {"field": shown.field}
     keys: dict[str, Any] = {"label": label, **about, **field}
     if shown.kind == "bool":
-        return _lamp(name, page, keys, label)
+        return _lamp(name, place, keys, label)
+    if shown.constants:
+        return _lamps(name, place, keys, shown.constants)
+    if isinstance(value, str) and len(value) > LONGEST_TEXT:
+        return Omission(name, too_long(len(value)))
     if shown.kind not in NUMBERS:
-        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 6})
+        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 6})
     keys |= {"unit": shown.unit} if shown.unit else {}
     keys |= {"scale": shown.scale} if shown.scale != 1.0 else {}
     keys |= {"format": shown.format} if shown.format else {}
     if shown.low is None and shown.unit:
-        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 3})
+        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 3})
     seen = float(value) * shown.scale if isinstance(value, int | float) else None
     ends = range_for(shown, (shown.field, topic.name), seen)
     if ends is None:
-        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 3})
+        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 3})
     low, high = ends
     comment = "" if shown.low is not None else "The ends of the scale are a guess."
     keys |= {"min": _whole(low), "max": _whole(high), "span": 3}
-    return Entry(kind="gauge", name=name, page=page, keys=keys, comment=comment)
+    return Entry(kind="gauge", name=name, place=place, keys=keys, comment=comment)
 
 
 def _whole(value: float) -> float:
     return int(value) if float(value).is_integer() else value
 
 
-def _lamp(name: str, page: str, keys: dict[str, Any], label: str) -> Entry:
+def _lamp(name: str, place: Place, keys: dict[str, Any], label: str) -> Entry:
     """A lamp; that of a fault is red where it is on."""
     on, off = {"value": True, "text": "On"}, {"value": False, "text": "Off"}
     if NEGATIVE.search(name):
@@ -102,21 +117,36 @@ def _lamp(name: str, page: str, keys: dict[str, Any], label: str) -> Entry:
         on |= {"shape": "circle"}
         off |= {"shape": "cross", "colour": "white"}
     keys["states"] = [on, off]
-    return Entry(kind="indicator", name=name, page=page, keys={**keys, "span": 3})
+    return Entry(kind="indicator", name=name, place=place, keys={**keys, "span": 3})
+
+
+def _lamps(name: str, place: Place, keys: dict[str, Any], constants: Sequence[str]) -> Entry:
+    """A lamp with a state for each constant; that of a fault is red."""
+    begins = zip(*(one.split("_")[:-1] for one in constants), strict=False)
+    begin = "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
+    texts = own_labels([(label_of(one.removeprefix(begin).lower()), one) for one in constants])
+    states = [
+        {"value": value, "text": text, "shape": "circle"}
+        | ({"shape": "cross", "colour": "red"} if NEGATIVE.search(value) else {})
+        for value, text in zip(constants, texts, strict=True)
+    ]
+    return Entry(kind="indicator", name=name, place=place, keys={**keys, "states": states, "span": 3})
 
 
 def _joints(
-    topic: Topic, label: str, page: str, about: Mapping[str, Any], sample: Any
-) -> Iterator[Entry]:
+    topic: Topic, label: str, place: Place, about: Mapping[str, Any], sample: Any
+) -> Iterator[Entry | Omission]:
     names = [] if sample is None else list(sample.name)[:MAX_JOINTS]
     positions = [] if sample is None else list(sample.position)
     joints = [_joint(name, at) for name, at in zip(names, positions, strict=False) if name]
-    if joints and len({one["name"] for one in joints}) == len(joints):
+    if not joints or len({one["name"] for one in joints}) < len(joints):
+        yield Omission(topic.name, NO_JOINTS)
+    else:
         keys = {"label": label, **about, "joint": joints, "span": 6}
         yield Entry(
             kind="joints",
             name=topic.name,
-            page=page,
+            place=place,
             keys=keys,
             comment='Give each joint its own limits: see its data sheet. Linear axes have unit = "mm".',
         )
@@ -153,5 +183,9 @@ def _diagnostics(topic: Topic, label: str, about: Mapping[str, Any]) -> Entry:
         ],
     }
     return Entry(
-        kind="table", name=topic.name, page=NODES_PAGE, keys=keys, comment="The worst parts come first."
+        kind="table",
+        name=topic.name,
+        place=(NODES_PAGE,),
+        keys=keys,
+        comment="The worst parts come first.",
     )

@@ -8,14 +8,30 @@ from typing import Any
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """One widget. `keys` are its keys but for its id, in their order; a list of mappings becomes one
-    inline table a line. `comment` stands above it. `control`: it acts on the robot."""
+    inline table a line. `comment` stands above it. `control`: it acts on the robot.
+
+    `place` are the parts of its namespace, or else of its node: its page. A control's `scope` is the
+    namespace whose permission it needs, `nodes` are those that it acts on, and `interlock` is the id of
+    a candidate, "" for none.
+    """
 
     kind: str
-    name: str  # of the topic, service, action or node that it is about: its id and page are made of it
+    name: str  # of the topic, service, action or node that it is about: its id is made of it
     keys: Mapping[str, Any]
     comment: str = ""
     control: bool = False
-    page: str = ""
+    place: tuple[str, ...] = ()
+    scope: str = ""
+    nodes: tuple[str, ...] = ()
+    interlock: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Omission:
+    """A topic, or a field of one, without a widget: why."""
+
+    name: str
+    why: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,9 +39,11 @@ class InterlockCandidate:
     """A topic that may permit what the robot does."""
 
     id: str
+    label: str
     topic: str
     type: str
     kept: bool  # its publisher keeps the last value for those that come late
+    owners: tuple[str, ...] = ()  # the nodes that publish it
     nodes: str = ""  # the names of its publishers' nodes, where there are several
 
 

@@ -1,23 +1,26 @@
 """Which fields of the usual types are worth showing, with units and ranges."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import copysign, floor, isfinite, log10
 from typing import Final
 
 from app.interfaces import Interfaces
-from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES
+from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES, Field, Structure
 from app.panel.widgets.numbers import MAX_EXACT_NUMBER
+from app.scaffold.reasons import is_colour
 from app.simulator.values.guesses import NAMES
 
 NUMBERS: Final = frozenset((*FLOAT_TYPES, *INTEGER_RANGES))
 MOST_FIELDS: Final = 4
-UNKNOWN_RANGE: Final = (0.0, 100.0)
+NO_VALUES: Final = re.compile(r"(?:^|_)(?:MIN|MAX|COUNT|SIZE|LENGTH|NUM)(?:_|$)")  # limits, sizes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """A field that is shown. Without a range (`low`, `high`, after `scale`) it is no gauge."""
+    """A field that is shown. Without a range (`low`, `high`, after `scale`) it is no gauge. `constants`
+    are those that its values are named by."""
 
     field: str
     kind: str  # a base type
@@ -27,6 +30,7 @@ class Shown:
     format: str = ""
     low: float | None = None
     high: float | None = None
+    constants: tuple[str, ...] = ()
 
 
 def _number(
@@ -120,7 +124,7 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
     """The fields of a type that are worth showing: the usual ones, else its first plain ones."""
     if type_name in KNOWN:
         yield from KNOWN[type_name]
-    if type_name.partition("/")[0] in FOR_PROGRAMS:
+    if type_name.partition("/")[0] in FOR_PROGRAMS or is_colour(type_name, interfaces):
         return
     plain = [
         one
@@ -131,19 +135,43 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
         word = "" if one.name == "data" and len(plain) == 1 else one.name.replace("_", " ")
         number = one.type.name in NUMBERS
         text = ".2f" if one.type.name in FLOAT_TYPES else ""
-        yield Shown(field=one.name, kind="float64" if number else one.type.name, word=word, format=text)
+        named = constants_of(interfaces.structures[type_name], one)
+        kind = "float64" if number else one.type.name
+        yield Shown(field=one.name, kind=kind, word=word, format=text, constants=named)
+
+
+def constants_of(structure: Structure, field: Field) -> tuple[str, ...]:
+    """The names of the constants that a field has as values: those that begin with the last words of
+    its name ("MODE_" of `drive_mode`), else all of a type with one whole number. () for none."""
+    if field.type.name not in INTEGER_RANGES:
+        return ()
+    numbers = {
+        name: value
+        for name, value in structure.constants.items()
+        if isinstance(value, int) and not isinstance(value, bool) and not NO_VALUES.search(name)
+    }
+    words = field.name.upper().split("_")
+    begins = [f"{'_'.join(words[n:])}_" for n in range(len(words))]
+    named = ([name for name in numbers if name.startswith(begin)] for begin in begins)
+    found = next((names for names in named if len(names) > 1), [])
+    if not found and sum(one.type.name in INTEGER_RANGES for one in structure.fields) == 1:
+        found = list(numbers)
+    values = [numbers[name] for name in found]
+    return tuple(found) if len(values) > 1 and len({*values}) == len(values) else ()
 
 
 def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float] | None:
     """The ends of a gauge's scale: the usual ones of the type, else by a word in the name, wide enough
-    for the value that was seen. None where a panel file can't have so wide a scale."""
+    for the value that was seen. None where neither says one, or a panel file can't have so wide a
+    scale."""
     low, high = shown.low, shown.high
     if low is None or high is None:
         by_name = (span for name in names for words, span in NAMES if words.search(name))
-        span = next((s for s in by_name if s.high > s.low), None)
-        low, high = (span.low, span.high) if span else UNKNOWN_RANGE
-        low = min(0.0, _round_away(low))
-        high = max(0.0, _round_away(high))
+        span = next(by_name, None)
+        if span is None or span.high <= span.low or span.shape == "count":
+            return None
+        low = min(0.0, _round_away(span.low))
+        high = max(0.0, _round_away(span.high))
     if value is not None and isfinite(value):
         low, high = min(low, _round_away(value)), max(high, _round_away(value))
     return (low, high) if max(-low, high) <= MAX_EXACT_NUMBER else None

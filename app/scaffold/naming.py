@@ -37,14 +37,11 @@ def label_of(name: str) -> str:
     return (text[0].upper() + text[1:])[:MAX_LABEL]
 
 
-def page_of(name: str, nodes: Collection[str]) -> str:
-    """The page of a topic or service: its namespace, else the node that it belongs to."""
-    parts = name.strip("/").split("/")
-    if len(parts) > 1:
-        return parts[0]
-    node = min(nodes, default="")
-    node_parts = node.strip("/").split("/")
-    return node_parts[0] or GENERAL
+def place_of(name: str, nodes: Collection[str]) -> tuple[str, ...]:
+    """The parts of the namespace of a topic or service, else of the node that it belongs to."""
+    namespace = name.strip("/").split("/")[:-1]
+    node = min(nodes, default="").strip("/").split("/")
+    return tuple(filter(None, namespace or node)) or (GENERAL,)
 
 
 def permits(name: str) -> bool:

@@ -14,7 +14,7 @@ CHECK: Final = "operator-panel check"
 
 
 def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
-    """The file. `controls`: keys that act on the robot are live, each behind the first interlock.
+    """The file. `controls`: keys that act on the robot are live, each behind its interlock.
     `trial`: all of them, to be checked."""
     lines = [*_head(draft), *_interlocks(draft)]
     taken: set[str] = set()
@@ -24,8 +24,8 @@ def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
         pages.add(own_id)
         lines += _page(page, own_id)
         for entry in entries:
-            live = trial or not entry.control or (controls and bool(draft.interlocks))
-            lines += _widget(entry, id_of(entry.name, taken), draft, live, taken)
+            live = trial or not entry.control or (controls and bool(entry.interlock))
+            lines += _widget(entry, id_of(entry.name, taken), live, taken)
     if draft.remarks:
         remarks = (f"# - {' '.join(one.split())}" for one in draft.remarks)
         lines += ["", *_comment("Not on the panel:"), *remarks]
@@ -79,7 +79,7 @@ def _interlocks(draft: Draft) -> Iterator[str]:
     for one in draft.interlocks:
         yield "[[interlock]]"
         yield f"id = {_value(one.id)}"
-        yield f"label = {_value(label_of(one.topic).lower())}"
+        yield f"label = {_value(one.label)}"
         yield f"topic = {_value(one.topic)}"
         yield f"type = {_value(one.type)}"
         if one.nodes:
@@ -100,7 +100,7 @@ def _page(page: str, own_id: str) -> Iterator[str]:
     yield f"title = {_value(label_of(page))}"
 
 
-def _widget(entry: Entry, own_id: str, draft: Draft, live: bool, taken: set[str]) -> Iterator[str]:
+def _widget(entry: Entry, own_id: str, live: bool, taken: set[str]) -> Iterator[str]:
     taken.add(own_id)
     yield ""
     if entry.comment:
@@ -110,8 +110,8 @@ def _widget(entry: Entry, own_id: str, draft: Draft, live: bool, taken: set[str]
     body = ["[[page.widget]]", f"id = {_value(own_id)}", f"kind = {_value(entry.kind)}"]
     for key, value in entry.keys.items():
         body += _key(key, value)
-    if entry.control and draft.interlocks:
-        body.append(f"interlock = {_value(draft.interlocks[0].id)}")
+    if entry.interlock:
+        body.append(f"interlock = {_value(entry.interlock)}")
     elif entry.control:
         body.append('# interlock = "…": it needs one')
     yield from body if live else (f"# {line}" for line in body)

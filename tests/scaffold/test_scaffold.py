@@ -19,7 +19,7 @@ from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.fields import Shown, range_for
-from app.scaffold.naming import id_of, label_of, page_of, permits
+from app.scaffold.naming import id_of, label_of, permits, place_of
 from app.scaffold.toml_text import toml_text
 
 INTERFACES = load_interfaces("jazzy")
@@ -47,7 +47,7 @@ def server(name: str, type_name: str, dds: str = "Cyclone DDS") -> Server:
 
 def text_of(controls: bool = False, base: Draft | None = None, **known: Any) -> str:
     draft, faults = checked_draft(
-        partial(make_draft, Known(**known), INTERFACES, base or Draft(title="Cell")),
+        partial(make_draft, Known(**known), INTERFACES, base or Draft(title="Cell"), controls),
         partial(faults_of_text, folder=Path()),
     )
     assert not faults
@@ -262,13 +262,16 @@ def test_what_is_not_for_a_panel_is_left_out(change: Callable[[Topic], Topic]) -
 
 
 def test_a_value_looks_old_where_its_topic_is_published_regularly(tmp_path: Path) -> None:
-    slow, fast = published("/slow", "std_msgs/msg/Float64"), published("/fast", "std_msgs/msg/Bool")
+    slow, fast = (
+        published("/slow_speed", "std_msgs/msg/Float64"),
+        published("/fast", "std_msgs/msg/Bool"),
+    )
     kept = published("/kept", "std_msgs/msg/Bool", transient_local=True)
     seldom = published("/seldom", "std_msgs/msg/String")
-    periods = {"/slow": 1.3, "/fast": 0.02, "/kept": 1.0}
+    periods = {"/slow_speed": 1.3, "/fast": 0.02, "/kept": 1.0}
     text = text_of(topics=[slow, fast, kept, seldom], periods=periods)
     ages = {name: one.get("max_age_s") for name, one in widgets(text).items()}
-    assert ages == {"slow": 7, "fast": 2, "kept": None, "seldom": None, "cell_io_trend": 7}
+    assert ages == {"slow_speed": 7, "fast": 2, "kept": None, "seldom": None, "cell_io_trend": 7}
     path = tmp_path / "cell.toml"
     path.write_text(text)
     check_panel(path)
@@ -369,13 +372,13 @@ def test_several_robots_have_their_entries(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "label", "page"),
     [
-        ("/arm/jointStates", "Joint states", "arm"),
-        ("/speed", "Speed", "node"),
-        ("/x/y/temp_2", "Temp 2", "x"),
+        ("/arm/jointStates", "Joint states", ("arm",)),
+        ("/speed", "Speed", ("node",)),
+        ("/x/y/temp_2", "Temp 2", ("x", "y")),
     ],
 )
-def test_labels_and_pages_are_made_from_names(name: str, label: str, page: str) -> None:
-    assert (label_of(name), page_of(name, ["/node"])) == (label, page)
+def test_labels_and_pages_are_made_from_names(name: str, label: str, page: tuple[str, ...]) -> None:
+    assert (label_of(name), place_of(name, ["/node"])) == (label, page)
 
 
 def test_ids_are_valid_and_differ() -> None:
@@ -398,15 +401,17 @@ def test_names_that_do_not(name: str) -> None:
     ("name", "value", "ends"),
     [
         ("/motor_temperature", None, (0, 100)),
-        ("/unheard_of", None, (0, 100)),
-        ("/unheard_of", 340.0, (0, 500)),
-        ("/unheard_of", -3.0, (-5, 100)),
-        ("/unheard_of", float("nan"), (0, 100)),
-        ("/unheard_of", float("inf"), (0, 100)),
+        ("/motor_temperature", 340.0, (0, 500)),
+        ("/motor_temperature", -3.0, (-5, 100)),
+        ("/motor_temperature", float("nan"), (0, 100)),
+        ("/motor_temperature", float("inf"), (0, 100)),
+        ("/unheard_of", 340.0, None),  # a readout, not a guess
+        ("/wheel_ticks_total", 12.0, None),
+        ("/error_code", 3.0, None),
         ("/battery_level", 0.9, (0, 100)),
     ],
 )
 def test_ranges_fit_the_name_and_the_value(
-    name: str, value: float | None, ends: tuple[float, float]
+    name: str, value: float | None, ends: tuple[float, float] | None
 ) -> None:
     assert range_for(Shown(field="data", kind="float64"), (name,), value) == ends

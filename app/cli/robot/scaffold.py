@@ -5,7 +5,7 @@ services (the file is written without them), 2 a mistake on the command line.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -28,10 +28,10 @@ from app.cli.robot.survey import robot_at, survey
 from app.diagnose.findings import few
 from app.errors import KioskError
 from app.graph.model import GraphSnapshot
-from app.interfaces import Interfaces, load_interfaces
+from app.interfaces import load_interfaces
 from app.panel.load import faults_of_text
-from app.scaffold.checked import checked_draft
-from app.scaffold.draft import Known, lost_names, make_draft
+from app.scaffold.checked import LeftOut, checked_draft
+from app.scaffold.draft import lost_names, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
@@ -64,9 +64,8 @@ async def _scaffold(given: Any) -> int:
         known = await survey(observer, robot, below, interfaces, given.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
         raise ScaffoldError(nothing_there([robot], f"{robot.namespace}{below}"))
-    draft = _checked(
-        known, interfaces, _base(place, graph, f"{robot.namespace}{below}", target), target
-    )
+    base = _base(place, graph, f"{robot.namespace}{below}", target)
+    draft = _checked(partial(make_draft, known, interfaces, base, given.controls), target)
     if given.controls and not draft.interlocks:
         raise ScaffoldError(
             "no topic looks like a permission of the robot, so no control is made live: leave"
@@ -81,11 +80,9 @@ async def _scaffold(given: Any) -> int:
     return report_lost(lost_names(known))
 
 
-def _checked(known: Known, interfaces: Interfaces, base: Draft, target: Path | None) -> Draft:
+def _checked(make: Callable[[LeftOut], Draft], target: Path | None) -> Draft:
     """The draft without what a panel file can't have; ScaffoldError if it has other faults."""
-    draft, faults = checked_draft(
-        partial(make_draft, known, interfaces, base), partial(faults_of_text, folder=_folder(target))
-    )
+    draft, faults = checked_draft(make, partial(faults_of_text, folder=_folder(target)))
     if faults:
         raise ScaffoldError(f"no panel can be made of this: {few([str(one) for one in faults])}")
     return draft
@@ -128,6 +125,8 @@ def _summary(target: Path, draft: Draft, live: bool) -> Iterator[str]:
         f"{target}: {len(draft.pages)} page(s), {len(widgets) - acting} display(s),"
         f" {acting} control(s), {len(draft.interlocks)} interlock candidate(s)"
     )
+    if live and (alone := sum(one.control and not one.interlock for one in widgets)):
+        yield f"{alone} of the controls are commented out: no candidate is of their namespace."
     if acting and not live:
         yield "The controls are commented out: uncomment those that you want, each with its interlock."
     yield f"Start it: {APP} run {target}"
@@ -153,7 +152,7 @@ def make_parser(prog: str) -> Parser:
     add(
         "--controls",
         action="store_true",
-        help="live controls, each behind the first interlock candidate: look at each of them first",
+        help="live controls, each behind the interlock candidate of its namespace: look at each first",
     )
     add(
         "--listen",

@@ -1,0 +1,114 @@
+"""The pages of a draft: by namespace or node, none with more widgets than a screen has room for."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
+from typing import Final
+
+from app.scaffold.displays import NODES_PAGE
+from app.scaffold.entry import Entry
+from app.scaffold.labels import with_own_labels
+from app.scaffold.naming import GENERAL
+
+MOST_WIDGETS: Final = 16  # on 1280x800: four rows of gauges, and a trend below them
+MOST_PAGES: Final = 12  # tabs on that screen
+MOST_PENS: Final = 4
+TREND_GAP_S: Final = 5  # the max_age_s of a trend that has none
+TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "format")
+CONTROLS_ONLY: Final = "The controls of this page are in the panel file, commented out"
+ORDER: Final = ("indicator", "gauge", "readout", "joints", "camera", "table", "log")
+Place = tuple[str, ...]
+
+
+def make_pages(entries: Sequence[Entry], live: bool) -> tuple[dict[str, Sequence[Entry]], list[Entry]]:
+    """Page → widgets, and the widgets beyond the most pages. Displays come first, then their trend,
+    then controls; `live`: controls take room too, as they are not comments."""
+    pages: dict[str, list[Entry]] = {}
+    by_place = _by_place(entries)
+    for place in sorted(by_place, key=lambda place: (place == (NODES_PAGE,), place)):
+        for part in _parts(by_place[place], 1, live):
+            title = " ".join(place if place == (GENERAL,) else _common(part))
+            taken = sum(page == title or page.rpartition(" ")[0] == title for page in pages)
+            pages[f"{title} {taken + 1}" if title in pages else title] = part
+    always = (GENERAL, NODES_PAGE)
+    fullest = sorted(pages, key=lambda page: (page not in always, -len(pages[page])))[:MOST_PAGES]
+    rest = [entry for page, part in pages.items() if page not in fullest for entry in part]
+    kept: dict[str, Sequence[Entry]] = {
+        page: _whole(page, part) for page, part in pages.items() if page in fullest
+    }
+    return kept or {GENERAL: []}, rest
+
+
+def _by_place(entries: Sequence[Entry]) -> dict[Place, list[Entry]]:
+    """The entries by the first part of their places. Places of one entry are put together."""
+    sizes = Counter(one.place[:1] for one in entries)
+    found: defaultdict[Place, list[Entry]] = defaultdict(list)
+    for one in entries:
+        place = one.place[:1]
+        found[place if sizes[place] > 1 or place == (NODES_PAGE,) else (GENERAL,)].append(one)
+    return found
+
+
+def _parts(entries: Sequence[Entry], depth: int, live: bool) -> list[list[Entry]]:
+    """The entries in parts with at most `MOST_WIDGETS`, those of one place together where they fit."""
+    if _room(entries, live) <= MOST_WIDGETS:
+        return [_in_order(entries)]
+    if all(len(one.place) <= depth for one in entries):
+        return _cut(entries, live)
+    by_place: defaultdict[Place, list[Entry]] = defaultdict(list)
+    for one in entries:
+        by_place[one.place[: depth + 1]].append(one)
+    parts: list[list[Entry]] = []
+    for place in sorted(by_place):
+        for part in _parts(by_place[place], depth + 1, live):
+            if parts and _room([*parts[-1], *part], live) <= MOST_WIDGETS:
+                parts[-1] = _in_order([*parts[-1], *part])
+            else:
+                parts.append(part)
+    return parts
+
+
+def _room(entries: Sequence[Entry], live: bool) -> int:
+    return sum(live or not one.control for one in entries)
+
+
+def _cut(entries: Sequence[Entry], live: bool) -> list[list[Entry]]:
+    counted = [one for one in _in_order(entries) if live or not one.control]
+    comments = [one for one in _in_order(entries) if one.control and not live]
+    first, *others = (counted[n : n + MOST_WIDGETS] for n in range(0, len(counted), MOST_WIDGETS))
+    return [[*first, *comments], *others]
+
+
+def _in_order(entries: Sequence[Entry]) -> list[Entry]:
+    shown = [one for one in entries if not one.control]
+    shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
+    acting = sorted((one for one in entries if one.control), key=lambda one: (one.kind, one.name))
+    return [*shown, *acting]
+
+
+def _common(entries: Sequence[Entry]) -> Place:
+    """The first parts of the places that all have."""
+    places = zip(*(one.place for one in entries), strict=False)
+    return tuple(parts[0] for parts in takewhile(lambda parts: len({*parts}) == 1, places))
+
+
+def _whole(page: str, entries: Sequence[Entry]) -> list[Entry]:
+    shown = with_own_labels([one for one in entries if not one.control])
+    if not shown:
+        keys = {"label": CONTROLS_ONLY, "size": "small", "span": 12}
+        shown = [Entry(kind="label", name=f"{page}/note", keys=keys)]
+    return [*shown, *_trend(shown, page), *(one for one in entries if one.control)]
+
+
+def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
+    """A trend of the gauges of the unit that most of them have."""
+    gauges = [one for one in entries if one.kind == "gauge"]
+    units = Counter(one.keys.get("unit", "") for one in gauges)
+    same = [one for one in gauges if one.keys.get("unit", "") == max(units, key=units.__getitem__)]
+    pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
+    if pens:
+        keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
+        longest = max(one.keys.get("max_age_s", 0) for one in same[:MOST_PENS])
+        keys |= {"max_age_s": longest} if longest > TREND_GAP_S else {}
+        comment = "Its history is kept in memory; disk = true keeps it over a restart."
+        yield Entry(kind="trend", name=f"{page}/trend", keys=keys, comment=comment)

@@ -1,0 +1,218 @@
+"""How a panel of a larger robot is arranged: labels that differ, permissions of the same namespace,
+pages by namespace and node, and the reasons of topics without a widget."""
+
+import tomllib
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app.graph.model import Topic
+from app.interfaces import Interfaces, load_interfaces
+from app.panel.load import faults_of_text
+from app.scaffold.checked import checked_draft
+from app.scaffold.draft import NO_ROOM, Known, make_draft
+from app.scaffold.entry import Draft
+from app.scaffold.labels import own_labels
+from app.scaffold.pages import MOST_PAGES, MOST_WIDGETS
+from app.scaffold.toml_text import toml_text
+from tests.scaffold.test_scaffold import BOOL, INTERFACES, heard, published, server, widgets
+
+TRIGGER = "std_srvs/srv/Trigger"
+# As vendors have them: an enumeration with and without a prefix, a LED, wheels.
+MESSAGES = {
+    "DriveMode": "uint8 MODE_IDLE=0\nuint8 MODE_AUTO=1\nuint8 MODE_FAULT=2\nuint8 drive_mode",
+    "Hazard": "uint8 BUMP=0\nuint8 CLIFF=1\nuint8 STALL=2\nuint8 type",
+    "Limits": "uint8 MAX_JOINTS=6\nuint8 MIN_JOINTS=1\nuint8 joints",
+    "LedColor": "uint8 red\nuint8 green\nuint8 blue",
+    "Wheels": "int32 ticks_left\nint32 ticks_right\nfloat32 current_left",
+}
+
+
+@pytest.fixture(scope="module")
+def cell_msgs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("ws")
+    (folder / "cell_msgs/msg").mkdir(parents=True)
+    for name, text in MESSAGES.items():
+        (folder / "cell_msgs/msg" / f"{name}.msg").write_text(f"{text}\n")
+    return folder
+
+
+def text_of(
+    interfaces: Interfaces = INTERFACES, folder: Path = Path(), controls: bool = False, **known: Any
+) -> str:
+    base = Draft(title="Cell", interfaces=["cell_msgs"] if folder != Path() else ())
+    draft, faults = checked_draft(
+        partial(make_draft, Known(**known), interfaces, base, controls),
+        partial(faults_of_text, folder=folder),
+    )
+    assert not faults
+    return toml_text(draft, controls)
+
+
+def of_cell_msgs(folder: Path, *topics: Topic) -> str:
+    return text_of(load_interfaces("jazzy", [folder / "cell_msgs"]), folder, topics=topics)
+
+
+def pages(text: str) -> dict[str, list[str]]:
+    """The ids of each page's widgets."""
+    return {
+        page["title"]: [one["id"] for one in page.get("widget", ())]
+        for page in tomllib.loads(text)["page"]
+    }
+
+
+@pytest.mark.parametrize(
+    ("names", "labels"),
+    [
+        (["/left/home", "/right/home"], ["Left home", "Right home"]),
+        (["/cell/left/home", "/cell/right/home"], ["Left home", "Right home"]),
+        (["/home", "/right/home"], ["Home", "Right home"]),
+        (["/left/home", "/left/gripper/home"], ["Home", "Gripper home"]),
+        (["/armLeft/home", "/arm_left/home"], ["Arm left home", "/arm_left/home"]),
+        (["/home", "/home"], ["Home", "/home"]),
+    ],
+)
+def test_labels_that_are_alike_carry_what_differs(names: list[str], labels: list[str]) -> None:
+    assert own_labels([("Home", name) for name in names]) == labels
+    assert own_labels([("Home", names[0]), ("Speed", names[1])]) == ["Home", "Speed"]
+
+
+ARMS: dict[str, Any] = {
+    "topics": [published(f"/{arm}/enabled", BOOL, f"/{arm}/io") for arm in ("left", "right")]
+    + [heard("/light", BOOL), heard("/table/turn", BOOL)],
+    "services": [server(f"/{arm}/home", TRIGGER) for arm in ("left", "right")],
+}
+
+
+def test_a_control_depends_on_the_permission_of_its_own_namespace() -> None:
+    text = text_of(controls=True, **ARMS)
+    found = widgets(text)
+    assert {name: found[name]["interlock"] for name in ("left_home", "right_home")} == {
+        "left_home": "left_enabled",
+        "right_home": "right_enabled",
+    }
+    assert {found[name]["label"] for name in ("left_home", "right_home")} == {"Left home", "Right home"}
+    labels = {one["id"]: one["label"] for one in tomllib.loads(text)["interlock"]}
+    assert labels == {"left_enabled": "left enabled", "right_enabled": "right enabled"}
+    # Neither arm's permission says anything of the light and the table.
+    assert not {"light", "table_turn"} & found.keys()
+    assert '# topic = "/light"' in text
+
+
+def test_a_permission_around_the_namespace_counts_where_it_has_none_itself() -> None:
+    own = published("/left/enabled", BOOL, "/left/io")
+    text = text_of(
+        controls=True,
+        topics=[
+            published("/cell_enabled", BOOL),
+            own,
+            heard("/left/arm/go", BOOL),
+            heard("/light", BOOL),
+        ],
+        services=[server("/right/home", TRIGGER)],
+    )
+    found = {name: one["interlock"] for name, one in widgets(text).items() if "interlock" in one}
+    assert found == {
+        "left_arm_go": "left_enabled",
+        "right_home": "cell_enabled",
+        "light": "cell_enabled",
+    }
+
+
+def test_a_single_namespace_of_permissions_counts_for_controls_without_one() -> None:
+    text = text_of(controls=True, topics=[published("/safety/ok_enabled", BOOL), heard("/start", BOOL)])
+    assert widgets(text)["start"]["interlock"] == "safety_ok_enabled"
+
+
+def test_a_permission_of_the_control_s_own_node_comes_first() -> None:
+    topics = [published("/a_enabled", BOOL, "/plc"), published("/b_enabled", BOOL, "/io")]
+    text = text_of(controls=True, topics=[*topics, heard("/start", BOOL, "/io")])
+    assert widgets(text)["start"]["interlock"] == "b_enabled"
+
+
+def test_an_enumeration_is_a_lamp_with_its_constants(cell_msgs: Path) -> None:
+    topics = [published(f"/{name.lower()}", f"cell_msgs/msg/{name}") for name in MESSAGES]
+    found = widgets(of_cell_msgs(cell_msgs, *topics))
+    modes = found["drivemode_drive_mode"]["states"]
+    assert [(one["value"], one["text"], one["shape"]) for one in modes] == [
+        ("MODE_IDLE", "Idle", "circle"),
+        ("MODE_AUTO", "Auto", "circle"),
+        ("MODE_FAULT", "Fault", "cross"),
+    ]
+    assert [one["value"] for one in found["hazard_type"]["states"]] == ["BUMP", "CLIFF", "STALL"]
+    assert found["limits_joints"]["kind"] != "indicator"  # its constants are limits
+
+
+def test_numbers_without_a_known_scale_are_no_gauges_and_colours_have_no_widget(
+    cell_msgs: Path,
+) -> None:
+    topics = [published(f"/{name.lower()}", f"cell_msgs/msg/{name}") for name in ("LedColor", "Wheels")]
+    text = of_cell_msgs(cell_msgs, *topics, published("/lamp", "std_msgs/msg/ColorRGBA"))
+    kinds = {name: one["kind"] for name, one in widgets(text).items()}
+    assert (kinds["wheels_ticks_left"], kinds["wheels_ticks_right"]) == ("readout", "readout")
+    assert not any("led" in name or "lamp" in name for name in kinds)
+    assert "# - /ledcolor (cell_msgs/msg/LedColor): no widget shows a colour" in text
+    assert "# - /lamp (std_msgs/msg/ColorRGBA): no widget shows a colour" in text
+
+
+def test_pages_are_by_namespace_then_node_and_none_has_too_many() -> None:
+    topics = [published(f"/arm/{part}/t{n}", BOOL) for part in ("base", "hand") for n in range(12)]
+    topics += [published(f"/t{n:02}", BOOL, f"/node_{n % 2}") for n in range(75)]
+    found = pages(text_of(topics=topics))
+    assert set(found) == {
+        *("Arm base", "Arm hand"),
+        *(f"Node {node}{n}" for node in (0, 1) for n in ("", " 2", " 3")),
+    }
+    assert max(map(len, found.values())) <= MOST_WIDGETS
+    assert sum(map(len, found.values())) == len(topics)
+
+
+def test_small_namespaces_share_the_page_of_the_one_around_them() -> None:
+    topics = [published("/left/enabled", BOOL)]
+    topics += [
+        published(f"/left/joint_{n}/{part}", BOOL) for n in range(1, 7) for part in ("hot", "jam", "on")
+    ]
+    found = pages(text_of(topics=topics, services=[server("/left/home", TRIGGER)]))
+    assert {title: len(ids) for title, ids in found.items()} == {"Left": 16, "Left joint 6": 3}
+    assert "left_enabled" in found["Left"]
+
+
+def test_what_has_no_room_is_named() -> None:
+    topics = [published(f"/n{n:02}/t{m}", BOOL) for n in range(MOST_PAGES + 2) for m in (1, 2)]
+    text = text_of(topics=topics)
+    assert len(pages(text)) == MOST_PAGES
+    assert text.count(NO_ROOM) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "type_name", "why"),
+    [
+        ("/tf", "tf2_msgs/msg/TFMessage", "/tf: the tree of frames is drawn by tools such as RViz"),
+        ("/map", "nav_msgs/msg/OccupancyGrid", "/map (nav_msgs/msg/OccupancyGrid): a map is drawn by"),
+        ("/scan", "sensor_msgs/msg/LaserScan", "/scan (sensor_msgs/msg/LaserScan): a laser scan is dr"),
+        (
+            "/robot_description",
+            "std_msgs/msg/String",
+            "/robot_description: the robot's model is a whole",
+        ),
+        ("/pose", "geometry_msgs/msg/Pose", "/pose (geometry_msgs/msg/Pose): no field of it is a"),
+    ],
+)
+def test_what_a_panel_can_not_show_is_named_with_the_reason(
+    name: str, type_name: str, why: str
+) -> None:
+    text = text_of(topics=[published(name, type_name)])
+    assert widgets(text) == {}
+    assert f"# - {why}" in text
+
+
+def test_a_text_of_many_characters_is_named_in_place_of_a_readout() -> None:
+    topics = [published("/urdf", "std_msgs/msg/String"), published("/mode", "std_msgs/msg/String")]
+    samples = {"/urdf": SimpleNamespace(data="x" * 200_000), "/mode": SimpleNamespace(data="auto")}
+    text = text_of(topics=topics, samples=samples)
+    assert widgets(text).keys() == {"mode"}
+    assert "# - /urdf: its text of 200,000 characters is too long for a page" in text
+    assert len(text) < 3000
