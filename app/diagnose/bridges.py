@@ -64,6 +64,11 @@ def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Br
     topics = sum(len(one.topics) for one in behind.graphs)
     nodes = behind.nodes()
     domain = few(sorted({str(bridge.domain) for bridge in bridges}))
+    # Limited to its machine and on another interface than the nodes, it learns their names at most.
+    forwarded = any(topic.announced for one in behind.graphs for topic in one.topics)
+    if any(map(_is_limited, bridges)) and not forwarded:
+        report.find("bridge_localhost", robot=behind.robot.id, domain=domain)
+        return False
     if not topics and not nodes:
         report.find("bridge_domain", robot=behind.robot.id, domain=domain)
         return False
@@ -73,3 +78,9 @@ def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Br
     if not there and (found := next(behind.elsewhere(needed), None)) is not None:
         report.find("robot_elsewhere", robot=behind.robot.id, found=found[0], namespace=found[1])
     return True
+
+
+def _is_limited(bridge: Bridge) -> bool:
+    """Whether its file limits it to its own machine."""
+    limited = bridge.config.get("ros_automatic_discovery_range") == "Localhost"
+    return limited or bridge.config.get("ros_localhost_only") is True

@@ -91,6 +91,15 @@ ERRORS: Final[Rows] = {
         'The bridge has the namespace "{theirs}", the panel "{ours}".',
         'Set namespace = "{theirs}" in the panel file, or correct `namespace` in the bridge\'s file.',
     ),
+    "bridge_localhost": (
+        "The bridge is limited to its own machine (`ros_automatic_discovery_range` is LOCALHOST), and "
+        "reaches no ROS 2 node in domain {domain}.",
+        "Name the loopback interface in the bridge's environment too: `CYCLONEDDS_URI="
+        "'<CycloneDDS><Domain><General><Interfaces>"
+        '<NetworkInterface name="lo"/></Interfaces></General></Domain></CycloneDDS>'
+        "'`. Where there is another interface, it does not find nodes on Fast DDS otherwise. Are the "
+        "nodes running, with the same ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST?",
+    ),
     "bridge_domain": (
         "The bridge sees no ROS 2 node at all in domain {domain}.",
         "Set `domain` in the bridge's file to the nodes' ROS_DOMAIN_ID, and restart the bridge. If "

@@ -12,6 +12,7 @@ import pytest
 
 from app.cli.doctor import as_text
 from app.diagnose import link
+from app.diagnose.bridges import check_bridges
 from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge, PanelRobot
@@ -203,6 +204,25 @@ def test_names_outside_of_the_namespace_and_the_nodes_log_are_found(tmp_path: Pa
     behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
     TopicChecks(report, behind, INTERFACES).check()
     assert named(report.findings) == []
+
+
+@pytest.mark.parametrize(
+    ("config", "code"),
+    [
+        ({}, "bridge_domain"),
+        ({"ros_automatic_discovery_range": "Subnet"}, "bridge_domain"),
+        ({"ros_automatic_discovery_range": "Localhost"}, "bridge_localhost"),
+        ({"ros_localhost_only": True}, "bridge_localhost"),
+    ],
+)
+def test_a_bridge_that_reaches_no_node(config: dict[str, Any], code: str, tmp_path: Path) -> None:
+    bridge = replace(BRIDGE, config={**BRIDGE.config, **config})
+    graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,)),))
+    report = Report()
+    behind = NamesBehindBridge.of(robot(tmp_path, panel_of(readout("/words"))), graph)
+    check_bridges(report, graph, behind, ["tcp/127.0.0.1:7447"])
+    assert [one.code for one in report.findings] == [code]
+    assert ("CYCLONEDDS_URI" in as_text(report)) is (code == "bridge_localhost")
 
 
 @pytest.mark.parametrize(
