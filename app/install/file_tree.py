@@ -40,6 +40,9 @@ class FileTree:
     def is_file(self, path: str) -> bool:
         return self._is(path, stat.S_ISREG)
 
+    def is_folder(self, path: str) -> bool:
+        return self._is(path, stat.S_ISDIR)
+
     def exists(self, path: str) -> bool:
         return self._is(path, lambda mode: True)
 

@@ -97,6 +97,8 @@ class Release:
         if not host.is_this_machine:  # the command runs inside
             wheels = FileTree(self.wheels, confined=True)
             for name in wheels.names(""):
+                if wheels.is_folder(name):
+                    continue
                 host.files.write(f"{self.folder}/wheels/{name}", wheels.read(name))
             return ["--no-index", f"--find-links={self.folder}/wheels"]
         return ["--no-index", f"--find-links={self.wheels}"]

@@ -205,6 +205,7 @@ def test_a_release_is_made_used_and_removed_inside_of_the_root(
     wheels = tmp_path / "wheels"
     wheels.mkdir()
     (wheels / "some.whl").write_bytes(b"a wheel")
+    (wheels / "folder").mkdir()
     (wheels / "shadow.whl").symlink_to(outside / "shadow")
     release = Release(wheel=make_wheel(tmp_path), lock="", wheels=wheels)
     with pytest.raises(OSError, match="it is a link to"):
