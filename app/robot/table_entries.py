@@ -65,7 +65,7 @@ class _Entries:
 
     def _keep(self, rows: Rows, sample: Sample) -> None:
         entries: Sequence[Entry] = [
-            Entry(tuple(map(_cut, values)), sample.at) for values in rows.values
+            Entry(tuple(map(_cut, values)), sample.at, sample.wall) for values in rows.values
         ]
         unread = rows.total - len(rows.values)
         if self.table.key is not None:

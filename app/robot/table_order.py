@@ -16,10 +16,11 @@ NORMAL: Final = frozenset({"grey", "white", "black"})  # colours of states that 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry: its values in the order of `Table.own_fields`; `at` in monotonic seconds."""
+    """An entry: its values in the order of `Table.own_fields`; `at` and `wall` as in `Sample`."""
 
     values: tuple[Any, ...]
     at: float
+    wall: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

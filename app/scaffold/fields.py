@@ -8,6 +8,7 @@ from typing import Final
 
 from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES, Field, Structure
+from app.panel.times import DEFAULT_FORMATS
 from app.panel.widgets.numbers import MAX_EXACT_NUMBER
 from app.scaffold.reasons import is_colour
 from app.simulator.values.guesses import NAMES
@@ -129,7 +130,9 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
     plain = [
         one
         for one in interfaces.structures[type_name].fields
-        if not one.type.is_nested and one.type.container == "one" and one.type.name != "wstring"
+        if (not one.type.is_nested or one.type.name in DEFAULT_FORMATS)
+        and one.type.container == "one"
+        and one.type.name != "wstring"
     ]
     for one in plain[:MOST_FIELDS]:
         word = "" if one.name == "data" and len(plain) == 1 else one.name.replace("_", " ")

@@ -17,6 +17,7 @@ from app.permission.mismatches import topic_mismatch
 from app.printable import readable
 from app.robot.keyed_values import kept_s
 from app.robot.state import Reading, RobotState
+from app.view.time_values import stamp_seconds, time_style, time_text
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
 LONGEST_NUMBER: Final = 32  # a larger one has an exponent, whatever its format
@@ -126,8 +127,22 @@ def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any
 def readout(widget: Readout, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a readout: `state`, `text` and `note`; and when they change."""
     field = field_state(widget, robot, now)
+    if style := time_style(widget.format, field.value):
+        reading = robot.reading(widget.topic).of_field(widget.field, math.inf)
+        wall = reading.wall + now - reading.at
+        text, changes_in = shown_time(widget, style, field.value, wall)
+        until = min(field.until, now + changes_in)
+        return {"state": field.state, "text": text, "note": field.note}, until
     text = NOTHING if field.value is None else _value(widget, field.value, robot)
     return {"state": field.state, "text": text, "note": field.note}, field.until
+
+
+def shown_time(widget: WrittenNumber, style: str, value: Any, wall: float) -> tuple[TextLike, float]:
+    """A value as a time, and the seconds after which its text changes."""
+    seconds = stamp_seconds(value)
+    if seconds is None and is_number(value):
+        seconds = float(scaled(widget, value))
+    return (NOTHING, math.inf) if seconds is None else time_text(style, seconds, wall)
 
 
 def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:

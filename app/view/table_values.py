@@ -9,7 +9,8 @@ from app.i18n import TextLike, say
 from app.panel.widgets.table import Column, ColumnField, Table
 from app.robot.state import RobotState
 from app.robot.table_order import Entry, TableRows, states_of
-from app.view.display_values import NOTHING, cell_text, lamp_of, topic_state
+from app.view.display_values import NOTHING, cell_text, lamp_of, shown_time, topic_state
+from app.view.time_values import time_style
 
 
 def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
@@ -22,16 +23,16 @@ def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any],
     rows = robot.table_entries.rows(widget.id)
     constants = _constants(widget, robot)
     ages = [_age(widget, entry, now) for entry in rows.first]
+    cells = [_cells(widget, entry, constants, now) for entry in rows.first]
     attributes = {
         "state": whole.state,
         "note": whole.note,
         "said": _said(widget, rows),
         "table_rows": [
-            {"age": age, "cells": _cells(widget, entry, constants)}
-            for entry, (age, _) in zip(rows.first, ages, strict=True)
+            {"age": age, "cells": shown} for (age, _), (shown, _) in zip(ages, cells, strict=True)
         ],
     }
-    return attributes, min([whole.until, *(at for _, at in ages)])
+    return attributes, min([whole.until, *(at for _, at in (*ages, *cells))])
 
 
 def _said(widget: Table, rows: TableRows) -> TextLike:
@@ -75,17 +76,23 @@ def _constants(widget: Table, robot: RobotState) -> list[tuple[Column, ColumnFie
 
 
 def _cells(
-    widget: Table, entry: Entry, columns: list[tuple[Column, ColumnField, Mapping[str, Any]]]
-) -> list[dict[str, TextLike]]:
-    cells = []
+    widget: Table,
+    entry: Entry,
+    columns: list[tuple[Column, ColumnField, Mapping[str, Any]]],
+    now: float,
+) -> tuple[list[dict[str, TextLike]], float]:
+    """The cells of a row, and when they change."""
+    cells: list[dict[str, TextLike]] = []
+    until = math.inf
     for column, of, constants in columns:
         value = entry.values[widget.own_fields.index(column.field)]
-        text, shape, colour = (
-            (NOTHING, "", "")
-            if value is None
-            else lamp_of(of.states, value)
-            if of.states
-            else (cell_text(of, value, constants), "", "")
-        )
-        cells.append({"text": text, "shape": shape, "colour": colour})
-    return cells
+        cell: tuple[TextLike, str, str] = (NOTHING, "", "")
+        if value is not None and of.states:
+            cell = lamp_of(of.states, value)
+        elif style := time_style(of.format, value):
+            text, changes_in = shown_time(of, style, value, entry.wall + now - entry.at)
+            cell, until = (text, "", ""), min(until, now + changes_in)
+        elif value is not None:
+            cell = (cell_text(of, value, constants), "", "")
+        cells.append(dict(zip(("text", "shape", "colour"), cell, strict=True)))
+    return cells, until

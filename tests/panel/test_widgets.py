@@ -1,7 +1,7 @@
 """Inputs, displays and QoS in a panel file: typed templates and the faults of a wrong one."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import pytest
 from pydantic import ValidationError
@@ -10,6 +10,7 @@ from app.errors import Fault
 from app.interfaces import DISTROS, load_interfaces
 from app.panel.base import TopicQos
 from app.panel.checks.panel import find_faults
+from app.panel.times import DURATION, TIME
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET
 from tests.support.builders import ENABLED, FREE, GUARDED, HEARD, INTERFACES, MESSAGE, TEXT, panel_of
 
@@ -397,3 +398,39 @@ def test_a_bar_code_goes_to_one_input_of_a_page() -> None:
     assert faults(first, second) == [
         'page[0].widget[1].scan: "order" has it already: a bar code goes to one input of a page'
     ]
+
+
+TIMES: Final = {
+    TIME: ("std_msgs/msg/Header", "stamp"),
+    DURATION: ("visualization_msgs/msg/Marker", "lifetime"),
+    "string": ("std_msgs/msg/String", "data"),
+    "float64": ("std_msgs/msg/Float64", "data"),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "key"),
+    [
+        (TIME, {"format": ".1f"}, "format"),
+        (TIME, {"unit": "s"}, "unit"),
+        (TIME, {"scale": 2}, "scale"),
+        (DURATION, {"format": "age"}, "format"),
+        ("string", {"format": "time"}, "format"),
+        ("float64", {"format": "age", "unit": "s"}, "unit"),
+        (TIME, {}, ""),
+        (TIME, {"format": "age"}, ""),
+        (TIME, {"format": "duration"}, ""),
+        (DURATION, {"format": "duration"}, ""),
+        ("float64", {"format": "time", "scale": 1e-9}, ""),
+    ],
+)
+def test_a_time_has_formats_of_its_own(kind: str, more: dict[str, Any], key: str) -> None:
+    type_name, field = TIMES[kind]
+    found = faults({**HEARD, "type": type_name, "field": field, **more})
+    assert [one.partition(": ")[0] for one in found] == ([f"page[0].widget[0].{key}"] if key else [])
+
+
+def test_a_lamp_of_a_time_is_refused() -> None:
+    states = [{"value": 0, "text": "Zero", "shape": "circle"}]
+    lamp = {**HEARD, "kind": "indicator", "type": "std_msgs/msg/Header", "field": "stamp"}
+    assert "shows one value of it, not all" in faults({**lamp, "states": states})[0]

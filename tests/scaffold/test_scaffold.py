@@ -18,7 +18,7 @@ from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
 from app.scaffold.entry import Draft
-from app.scaffold.fields import Shown, range_for
+from app.scaffold.fields import Shown, range_for, shown_fields
 from app.scaffold.naming import id_of, label_of, permits, place_of
 from app.scaffold.toml_text import toml_text
 
@@ -415,3 +415,14 @@ def test_ranges_fit_the_name_and_the_value(
     name: str, value: float | None, ends: tuple[float, float] | None
 ) -> None:
     assert range_for(Shown(field="data", kind="float64"), (name,), value) == ends
+
+
+def test_times_and_durations_are_shown_as_such(tmp_path: Path) -> None:
+    job = tmp_path / "cell_msgs/msg/Job.msg"
+    job.parent.mkdir(parents=True)
+    job.write_text("builtin_interfaces/Time began\nbuiltin_interfaces/Duration took\n")
+    fields = shown_fields("cell_msgs/msg/Job", load_interfaces("jazzy", [tmp_path]))
+    assert [(one.field, one.kind) for one in fields] == [
+        ("began", "builtin_interfaces/msg/Time"),
+        ("took", "builtin_interfaces/msg/Duration"),
+    ]

@@ -1,7 +1,7 @@
 """The descriptions of displays: readouts and lamps."""
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Final, Literal, Protocol, Self
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Final, Literal, Protocol, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -13,29 +13,35 @@ from app.interfaces.validation import fitting_constants, format_value, unknown_c
 from app.panel.base import Description, Label, Span, non_empty
 from app.panel.constants import NUMBERS, HasField, parent_type, value_mismatch
 from app.panel.faults.wording import list_names
+from app.panel.times import DEFAULT_FORMATS, time_faults
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
 
 # [+] [,] [.digits] [f, e, g, % or d]: the part of Python's format language that can't fail.
 FORMAT: Final = r"^\+?,?(\.[0-9]{1,2}[feg%]|[feg%d])$"
 CONSTANTS: Final = r"^([A-Z][A-Z0-9_]*)?$"  # what names begin with; "" for all
+# The same, or a time: see `app.panel.times`.
+FORMAT_OR_TIME: Final = rf"{FORMAT}|^(time|age|duration)$"
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
 Factor = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Readout(Display):
-    """Shows a field as `value * scale + offset` in a format, or as the name of a constant."""
+    """Shows a field as `value * scale + offset` in a format, as a time, or as a constant's name."""
+
+    whole_types: ClassVar[Collection[str]] = DEFAULT_FORMATS.keys()
 
     kind: Literal["readout"]
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
     unit: Unit = ""
     scale: Factor = 1.0
     offset: Factor = 0.0
     constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        yield from _number_faults(place, self, field_type)
+        times = list(time_faults(place, self.format, field_type, self.unit))
+        yield from times or _number_faults(place, self, field_type)
         yield from constant_faults(place, self, interfaces)
 
 
@@ -89,7 +95,8 @@ def _same_look(one: tuple[str, TextLike], other: tuple[str, TextLike]) -> bool:
 
 def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
     scaled = (readout.scale, readout.offset) != (1.0, 0.0)
-    for key, given in (("format", readout.format), ("scale", scaled), ("unit", readout.unit)):
+    style = None if kind in DEFAULT_FORMATS else readout.format
+    for key, given in (("format", style), ("scale", scaled), ("unit", readout.unit)):
         if given and kind not in NUMBERS:
             what = f'is for numbers; "{readout.field}" is {kind}'
             yield Fault(f"{place}.{key}", what, cause=f"number {place}")

@@ -178,6 +178,7 @@ class DisplayWidget(BaseWidget):
 class Display(TopicWidget, DisplayWidget):
     """A field of a topic that is shown; a value older than `max_age_s` is marked as old."""
 
+    whole_types: ClassVar[Collection[str]] = ()  # of several fields, shown as one value
     field: FieldPath = "data"
     max_age_s: Seconds | None = None
 
@@ -191,7 +192,8 @@ class Display(TopicWidget, DisplayWidget):
         if faults:
             return
         field_type = interfaces.type_at(self.type, self.field)
-        if field_type.is_nested or field_type.container != "one":
+        is_several = field_type.is_nested and str(field_type) not in self.whole_types
+        if is_several or field_type.container != "one":
             who = f"an {self.kind}" if self.kind[0] in "aeiou" else f"a {self.kind}"
             what = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
             yield Fault(f"{place}.field", what)

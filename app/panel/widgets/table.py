@@ -1,6 +1,6 @@
 """A table of the entries of a list: diagnostics, a queue."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field
@@ -11,9 +11,10 @@ from app.interfaces import Interfaces
 from app.panel.base import Description, FieldPath, Label, Seconds, Span, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS, parent_type
+from app.panel.times import DEFAULT_FORMATS, time_faults
 from app.panel.widgets.displays import (
     CONSTANTS,
-    FORMAT,
+    FORMAT_OR_TIME,
     LampState,
     constant_faults,
     format_fault,
@@ -36,7 +37,7 @@ class Column(Description):
 
     label: Label
     field: FieldPath | None = None
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
     unit: Unit = ""
     constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
     states: Annotated[tuple[LampState, ...], Field(strict=False)] = ()
@@ -144,7 +145,8 @@ class Table(TopicWidget, DisplayWidget):
 
     def _column_faults(self, place: str, column: Column, interfaces: Interfaces) -> Iterator[Fault]:
         of = self.column_field(column)
-        faults = list(self._entry_faults(f"{place}.field", column.field, interfaces))
+        whole = () if column.states else DEFAULT_FORMATS.keys()
+        faults = list(self._entry_faults(f"{place}.field", column.field, interfaces, whole))
         yield from faults
         if faults:
             return
@@ -155,7 +157,10 @@ class Table(TopicWidget, DisplayWidget):
                 if key in column.model_fields_set:
                     yield Fault(f"{place}.{key}", "is not for a column with states: they are its texts")
             return
-        for key in ("format", "unit"):
+        if times := list(time_faults(place, column.format, kind, column.unit)):
+            yield from times
+            return
+        for key in ("format", "unit") if kind not in DEFAULT_FORMATS else ():
             if getattr(column, key) and kind not in NUMBERS:
                 yield Fault(
                     f"{place}.{key}", f'is for numbers; "{column.field or self.field}" is {kind}'
@@ -164,14 +169,16 @@ class Table(TopicWidget, DisplayWidget):
         yield from format_fault(place, of, kind)
         yield from constant_faults(place, of, interfaces)
 
-    def _entry_faults(self, place: str, field: str | None, interfaces: Interfaces) -> Iterator[Fault]:
-        """Faults of a field of each entry, which must be a single value."""
+    def _entry_faults(
+        self, place: str, field: str | None, interfaces: Interfaces, whole: Collection[str] = ()
+    ) -> Iterator[Fault]:
+        """Faults of a field of each entry, which must be a single value, or of a type in `whole`."""
         path = self.path(0, field)
         for fault in field_faults("", self.type, path, interfaces):
             yield Fault(place, fault.message)
             return
         kind = interfaces.type_at(self.type, path)
-        if kind.is_nested or kind.container != "one":
+        if (kind.is_nested and str(kind) not in whole) or kind.container != "one":
             named = f'"{field}" of an entry' if field else "an entry"
             yield Fault(place, f"{named} is {kind}: a cell shows one value of it, not all")
 

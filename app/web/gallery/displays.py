@@ -11,8 +11,11 @@ from app.web.gallery.examples import AT, NOT_LIVE, TOPIC, Example, Table
 VALUE: Final[Table] = TOPIC | {"label": texts.VACUUM.table, "unit": "kPa"}
 MEASURED: Final = number("-71", "kPa")
 LONG_NUMBER: Final = number("-1234567890.123456", "kPa")
+DURATION: Final[Table] = TOPIC | {"label": texts.VACUUM.table, "format": "duration"}
+FOR: Final = say("duration_hours", hours=12, minutes="05")
 READOUTS: Final = (
     Example("live", "readout", VALUE, {"state": "live", "text": MEASURED, "note": ""}),
+    Example("a duration", "readout", DURATION, {"state": "live", "text": FOR, "note": ""}),
     Example("long", "readout", VALUE, {"state": "live", "text": LONG_NUMBER, "note": ""}),
     *(
         Example(

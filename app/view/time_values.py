@@ -1,0 +1,75 @@
+"""Times, ages and durations as text: pure, total over all numbers."""
+
+import math
+from typing import Any, Final
+
+from app.clock import format_age, format_datetime
+from app.i18n import TextLike, number, say
+from app.panel.times import DEFAULT_FORMATS, TIME_FORMATS
+
+# 1000-01-02 to 9999-12-29: every language and time zone can write these.
+EARLIEST: Final = -30_610_137_600.0
+LATEST: Final = 253_402_041_600.0
+FUTURE_S: Final = 1.0  # a stamp that is so far ahead is one of the future, not of another clock
+DAY_S: Final = 86_400
+AGE_DAYS_S: Final = 2 * DAY_S  # from here on an age is in days
+LONGEST_S: Final = 1e13  # a longer duration is written as a number
+
+
+def time_style(style: str | None, value: Any) -> str:
+    """How a value is written as a time: "time", "age" or "duration"; "" where it is none."""
+    if style in TIME_FORMATS:
+        return style or ""
+    return DEFAULT_FORMATS.get(getattr(type(value), "__msgtype__", ""), "")
+
+
+def stamp_seconds(value: Any) -> float | None:
+    """The seconds of a `builtin_interfaces` Time or Duration; None for any other value."""
+    if getattr(type(value), "__msgtype__", "") in DEFAULT_FORMATS:
+        return float(value.sec + value.nanosec / 1e9)
+    return None
+
+
+def time_text(style: str, seconds: float, wall: float) -> tuple[TextLike, float]:
+    """The text, and the seconds after which it changes; `wall` is the server's clock, in seconds since
+    the epoch, as is a time."""
+    if style == "duration":
+        return _duration(seconds), math.inf
+    if seconds == 0:
+        return say("time_unset"), math.inf
+    if not EARLIEST <= seconds <= LATEST:  # NaN neither
+        return say("time_beyond"), math.inf
+    if style == "time":
+        return format_datetime(seconds), math.inf
+    return _age(wall - seconds), _age_changes_in(wall - seconds)
+
+
+def _age(age: float) -> TextLike:
+    if age < -FUTURE_S:
+        return say("age_future", age=_age(-age))
+    if age >= AGE_DAYS_S:
+        return say("age_days", number=int(age // DAY_S))
+    return format_age(max(age, 0.0))
+
+
+def _age_changes_in(age: float) -> float:
+    step = 1 if abs(age) < 60 else 60
+    return (step - age % step) or step
+
+
+def _duration(seconds: float) -> TextLike:
+    if seconds < 0:
+        return say("duration_negative", duration=_duration(-seconds))
+    if not seconds < LONGEST_S:
+        text = "NaN" if math.isnan(seconds) else f"{seconds:.6g}"
+        return say("duration_seconds", number=number("Infinity" if text == "inf" else text))
+    if seconds < 60:
+        return say("duration_seconds", number=number(f"{seconds:.3g}"))
+    minutes, rest = divmod(int(seconds), 60)
+    if minutes < 60:
+        return say("duration_minutes", minutes=minutes, seconds=f"{rest:02}")
+    hours, minutes = divmod(minutes, 60)
+    if hours < 24:
+        return say("duration_hours", hours=hours, minutes=f"{minutes:02}")
+    days, hours = divmod(hours, 24)
+    return say("duration_days", days=days, hours=hours)
