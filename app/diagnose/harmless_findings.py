@@ -23,6 +23,7 @@ _SCREEN: Final = re.compile(r"(?:HDMI|DP|eDP|DVI|VGA|DSI|LVDS)(?:-[A-Z0-9]{1,3})
 _ABOUT: Final = (ENDPOINT, ROS_NAME, HEX, PLACE, _PORT, _SCREEN, words(" ".join(files())))
 # The place of a fault in the panel file: "page[0].widget[2].topic (line 5)".
 _PART: Final = re.compile(r"([A-Za-z0-9_\-]+)((?:\[\d{1,6}\])?)")
+_MORE: Final = re.compile(r" and \d{1,9} more")
 _LINE: Final = re.compile(r" \(line \d{1,7}\)")
 OF_THE_FILE: Final = ("panel_fault", "type_unknown")
 
@@ -32,8 +33,9 @@ def harmless_report(found: Diagnosis, version: str) -> dict[str, Any]:
     return {
         "version": version,
         "well": report.is_well,
-        "passed": len(report.facts),
+        "passed": len(report.facts) + report.more_facts,
         "findings": [_finding(one) for one in report.findings],
+        "more": dict(report.more),
     }
 
 
@@ -50,11 +52,12 @@ def _finding(one: Finding) -> dict[str, str]:
 
 def _names(text: str, *expected: re.Pattern[str]) -> str:
     """Each of the names if one of the rules expects it."""
+    more = _MORE.search(text)
     shown = []
-    for name in text.split(", "):
+    for name in text[: more.start() if more else None].split(", "):
         kept = (harmless(name, rule) for rule in expected)
         shown.append(next((one for one in kept if one != LEFT_OUT), LEFT_OUT))
-    return ", ".join(shown)
+    return ", ".join(shown) + (more[0] if more else "")
 
 
 def _place(text: str) -> str:

@@ -164,7 +164,7 @@ DETAILS: Final = rules(
     ("count domain free_mb limit needed_mb number panel real_mm screen seconds times window", NUMBER),
     ("found wanted type", ROS_TYPE),
     ("ours theirs tested", re.compile(rf"{VERSION.pattern}|{ROS_NAME.pattern}", re.ASCII)),
-    ("namespace", ROS_NAME),
+    ("namespace nodes", ROS_NAME),
     ("vendor", _VENDOR),
     ("direction", words("ahead behind")),
     ("package", re.compile(r"fonts-[a-z0-9\-]{1,40}")),
