@@ -24,7 +24,7 @@ from app.cli.robot.link import (
     report_lost,
 )
 from app.cli.robot.settled_graph import settled_graph
-from app.cli.robot.survey import robot_at, survey
+from app.cli.robot.survey import robot_at, survey, usable
 from app.diagnose.findings import few
 from app.errors import KioskError
 from app.graph.model import GraphSnapshot
@@ -33,6 +33,7 @@ from app.panel.load import faults_of_text
 from app.scaffold.checked import LeftOut, checked_draft
 from app.scaffold.draft import lost_names, make_draft
 from app.scaffold.entry import Draft
+from app.scaffold.labels import own_labels
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
 from app.settings import APP
@@ -60,6 +61,9 @@ async def _scaffold(given: Any) -> int:
     async with opened(place) as (observer, graph):
         graph = await settled_graph(observer, graph, place)
         check_namespace(graph, place.namespace)
+        graph = usable(graph)
+        if not graph.robots:
+            raise ScaffoldError("no bridge has a namespace of ROS 2: correct `namespace` in its file")
         robot, below = robot_at(graph, place.namespace)
         known = await survey(observer, robot, below, interfaces, given.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
@@ -97,9 +101,12 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
     others = [one.namespace for one in graph.robots if one.topics] if not place.namespace else []
     names = others if len(others) > 1 else [namespace]
     robots = []
-    for number, name in enumerate(names, 1):
-        own_id = f"robot{number}" if len(names) > 1 else "robot"
-        entry: dict[str, Any] = {"id": own_id, "name": label_of(name or own_id)}
+    ids = [f"robot{number}" for number in range(1, len(names) + 1)] if len(names) > 1 else ["robot"]
+    labels = own_labels(
+        [(label_of(name or own_id), name) for name, own_id in zip(names, ids, strict=True)]
+    )
+    for name, own_id, label in zip(names, ids, labels, strict=True):
+        entry: dict[str, Any] = {"id": own_id, "name": label}
         entry |= {"namespace": name} if name else {}
         robots.append(entry | ({"connect": list(place.connect)} if place.connect else {}))
     folder = _folder(target)

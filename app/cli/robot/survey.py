@@ -13,7 +13,7 @@ from app.graph.forwarding import lost_servers, lost_topics, topic_forwarding
 from app.graph.model import GraphSnapshot, RobotGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces
-from app.interfaces.names import SHARED_TOPICS
+from app.interfaces.names import NAMESPACE, SHARED_TOPICS
 from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, shown
 from app.scaffold.fields import shown_fields
@@ -21,6 +21,7 @@ from app.transport.bridge_observer import BridgeObserver
 
 ARRIVALS: Final = 3  # of a topic, by which it is known how often it is published
 IRREGULAR: Final = 3.0  # the longest period of a regular topic, in its shortest one
+MOST_ROBOTS: Final = 16
 PARAMETERS_WITHIN_S: Final = 30.0  # of all nodes: one that does not answer takes 2 s
 JITTER_S: Final = 0.2
 
@@ -31,6 +32,15 @@ def robot_at(graph: GraphSnapshot, namespace: str) -> tuple[RobotGraph, str]:
         if f"{namespace}/".startswith(f"{robot.namespace}/") and (namespace or not robot.namespace):
             return robot, namespace.removeprefix(robot.namespace)
     return max(graph.robots, key=lambda one: len(one.topics)), ""
+
+
+def usable(graph: GraphSnapshot) -> GraphSnapshot:
+    """The graph without the robots that a panel can't have: those with a namespace that is none of
+    ROS 2, and those beyond the `MOST_ROBOTS` with the most topics."""
+    robots = [one for one in graph.robots if NAMESPACE.fullmatch(one.namespace)]
+    robots = [one for one in robots if "__" not in one.namespace]
+    fullest = sorted(robots, key=lambda one: -len(one.topics))[:MOST_ROBOTS]
+    return replace(graph, robots=tuple(one for one in graph.robots if one in fullest))
 
 
 async def survey(

@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 
-from app.cli.robot.survey import Heard, survey
-from app.graph.model import Bridge, EndpointQos, RobotGraph, Topic, TopicEndpoint
+from app.cli.robot.scaffold import _base
+from app.cli.robot.survey import MOST_ROBOTS, Heard, survey, usable
+from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from tests.cli.robot.test_link import place_below
 from tests.support.builders import INTERFACES
 
 
@@ -50,3 +52,24 @@ def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
     known = asyncio.run(survey(observer, robot, "/amr", INTERFACES, 0))
     assert [one.name for one in known.topics] == ["/speed", "//diagnostics", "/rosout"]
     assert [one.key for one in known.topics] == ["amr/speed", "diagnostics", "rosout"]
+
+
+def graph_of(*namespaces: str) -> GraphSnapshot:
+    end = TopicEndpoint(type="std_msgs/msg/Bool", qos=EndpointQos(), bridge="a")
+    topic = Topic(name="/enabled", key="enabled", publishers=(end,))
+    return GraphSnapshot(robots=tuple(RobotGraph(namespace=one, topics=(topic,)) for one in namespaces))
+
+
+def test_robots_that_a_panel_can_not_have_do_not_keep_it_from_being_made() -> None:
+    graph = usable(graph_of("", "/r1", "/r1\\u000a[[page]]", "/a__b", "no namespace", "/r2"))
+    assert [one.namespace for one in graph.robots] == ["", "/r1", "/r2"]
+    many = usable(graph_of(*(f"/r{number}" for number in range(1000))))
+    assert len(many.robots) == MOST_ROBOTS
+
+
+def test_robots_of_alike_namespaces_have_names_of_their_own() -> None:
+    draft = _base(place_below(""), graph_of("/cell1/arm", "/cell2/arm"), "/cell1/arm", None)
+    assert [(one["id"], one["name"]) for one in draft.robots] == [
+        ("robot1", "Cell1 arm"),
+        ("robot2", "Cell2 arm"),
+    ]
