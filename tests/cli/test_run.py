@@ -82,9 +82,10 @@ def test_a_port_in_use_is_one_sentence() -> None:
 def test_a_faulty_panel_file_is_told_with_its_places(tmp_path: Path) -> None:
     panel = tmp_path / "bad.toml"
     panel.write_text(SHIPPED.read_text().replace('kind = "text"', 'kind = "txt"'))
+    line = panel.read_text().splitlines().index('kind = "txt"') + 1
     text = said(str(panel), "--port", str(free_port()), status=1)
     assert text.splitlines()[0] == f"{panel} can't be used:"
-    assert 'page[0].group[0].widget[2].kind "message", line 51: unknown kind "txt"' in text
+    assert f'page[0].group[0].widget[2].kind "message", line {line}: unknown kind "txt"' in text
     missing = said(str(tmp_path / "none.toml"), "--port", str(free_port()), status=1)
     assert missing == f"{tmp_path / 'none.toml'} can't be used:\n  No such file or directory\n"
 

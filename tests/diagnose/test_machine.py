@@ -239,7 +239,7 @@ def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.Captur
     assert main(command(setup, "--json")) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["well"] is False
-    assert set(found) == {"version", "panel", "well", "findings", "facts"}
+    assert set(found) == {"version", "panel", "well", "findings", "facts", "more"}
     first, second = found["findings"]
     assert second["code"] == "demo_mode"
     assert first == {
