@@ -14,7 +14,7 @@ from app.errors import DecodeError
 from app.interfaces import FieldReader, Fields, Walk
 from app.robot.keyed_values import NO_VALUES, KeyedValues, updated, without_source
 from app.robot.sample import Sample
-from app.robot.slices import Slices
+from app.robot.slices import SMALL_BYTES, Slices
 
 # Undecoded messages of a lossless topic; of other topics only the newest is kept.
 MAX_UNREAD: Final = 16
@@ -144,6 +144,7 @@ class Topic:
 
     def _read(self) -> bool:
         """Decodes as much as this turn allows; returns whether that was all."""
+        self._skip_parts()
         while (walked := self._next_read()) is not None:
             reading = self._read_one(walked, lambda: self._slices.read(walked.walk, walked.size))
             if reading is None:
@@ -161,6 +162,21 @@ class Topic:
         else:
             self._deferred = False
         return not self._deferred
+
+    def _skip_parts(self) -> None:
+        """Passes over messages before the newest, if that has every element: there is one publisher."""
+        if not self._keyed or self._lossless or self._walk is not None or len(self._unread) < 2:
+            return
+        newest = self._unread[-1]
+        if len(newest.payload) > SMALL_BYTES:
+            return
+        try:
+            fields = self._reader.read(bytes(newest.payload))
+        except DecodeError:
+            return
+        if all(fields.get(path) is not None for path in self._keyed):
+            self._unread.clear()
+            self._unread.add(newest, len(newest.payload))
 
     def _next_read(self) -> "_PendingRead | None":
         """The message to be decoded now; None without one."""

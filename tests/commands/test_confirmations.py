@@ -132,6 +132,28 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
     assert outcomes == ["unknown", "confirmed"]
 
 
+def test_an_older_entry_does_not_confirm_with_a_message_of_another_node() -> None:
+    """Each entry of a list with keys has the time of the last message that had it."""
+    state, lift = "sensor_msgs/msg/JointState", "position[name=lift]"
+    confirm = {**CONFIRM, "type": state, "field": lift, "equals": 0.5}
+
+    async def pressed() -> Receipt:
+        desk = Desk(panel_with(MESSAGE, {**FREE, "confirm": confirm}))
+
+        def says(name: str, at: float) -> None:
+            payload = INTERFACES.encode(state, {"name": [name], "position": [0.5]})
+            desk.robot.update("heard", Sample(payload, int(at * 10), at, at, BRIDGE))
+            desk.confirmations.update("heard", desk.robot.reading("/heard"))
+
+        says("lift", 99.0)
+        press = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        says("finger", 100.1)
+        return await press
+
+    assert asyncio.run(pressed()).outcome == "unknown"
+
+
 def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
     async def pressed() -> tuple[Receipt, Receipt | None, str]:
         desk = Desk(panel_of())

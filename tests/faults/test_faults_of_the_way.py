@@ -81,7 +81,9 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
 
     def moved_back() -> None:
         until(server.ready, "the bridge of the other domain is joined")
-        until(lambda: "Waiting for a new /kept" in server.widget("guarded")["reason"], "it waits")
+        until(
+            lambda: "Waiting for a new /kept" in (server.widget("guarded")["reason"] or ""), "it waits"
+        )
         until(
             lambda: server.press("free", "no subscriber").json()["outcome"] == "unknown", "it is sent"
         )

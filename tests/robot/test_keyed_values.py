@@ -4,6 +4,7 @@ from typing import Any, Final
 
 import pytest
 
+from app.interfaces import FieldReader, Fields, Walk
 from app.permission.interlocks import interlock_verdict
 from app.robot.keyed_values import KEPT_S
 from app.robot.state import RobotState, Sample
@@ -154,3 +155,34 @@ def test_with_one_publisher_each_message_is_the_whole_list() -> None:
     assert cell.code(NOW) == "permitted"
     cell.says(NOW + 0.1, finger=0.1)
     assert cell.code(NOW + 0.1) == "missing"
+
+
+def test_where_the_newest_message_has_all_the_others_are_not_decoded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of one publisher a display needs the newest only, however many come between two frames."""
+    shown = {**SHOWN, "topic": "/joints"}
+    cell = Cell(shown, {**shown, "id": "other", "field": "position[name=finger]"})
+    decoded: list[int] = []
+    walk = FieldReader.walk
+
+    def counted(reader: FieldReader, data: bytes) -> Walk[Fields]:
+        decoded.append(len(data))
+        return walk(reader, data)
+
+    monkeypatch.setattr(FieldReader, "walk", counted)
+
+    def says(seq: int, **joints: float) -> None:
+        message = {"name": list(joints), "position": list(joints.values())}
+        payload = INTERFACES.encode(STATE, message)
+        cell.robot.update("joints", Sample(payload, seq, NOW, NOW, BRIDGE))
+
+    for seq in range(50):
+        says(seq, lift=0.25, finger=seq / 100)
+    assert [cell.shown(NOW, one)["text"] for one in ("heard", "other")] == ["0.25", "0.49"]
+    assert len(decoded) == 2
+    decoded.clear()
+    for seq in range(50):
+        says(seq, **({"lift": 0.5} if seq % 2 else {"finger": 0.25}))
+    assert [cell.shown(NOW, one)["text"] for one in ("heard", "other")] == ["0.5", "0.25"]
+    assert len(decoded) == 51
