@@ -18,6 +18,7 @@ from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
 from tests.support import checkout, domains, holds
 from tests.support.browser.browsers import BROWSERS, FAILED, Browsers, ReusedPage
+from tests.support.browser.drivers import OTHER_BROWSERS
 from tests.support.operator_log import wait_for_the_disk
 from tests.support.parts import (
     BRIDGE,
@@ -83,7 +84,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """No test is skipped: if a real part is missing that a test needs, the run ends."""
-    missing = [str(p) for p in (BRIDGE, ROS_PYTHON, CHROMIUM, HEADLESS) if not Path(p).exists()]
+    missing = [
+        str(p)
+        for p in (BRIDGE, ROS_PYTHON, CHROMIUM, HEADLESS, *OTHER_BROWSERS)
+        if not Path(p).exists()
+    ]
     if missing and needs_parts(session) and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
 

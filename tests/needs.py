@@ -15,6 +15,7 @@ PARTS = {
     "robots",
     "ros",
     "chromium",
+    "other_browser",
     "screen",
     "screens",
     "sway",

@@ -26,6 +26,9 @@ need build-essential cc --version
 need cmake cmake --version
 need chromium chromium --version
 need chromium-headless-shell test -e /usr/bin/chromium-headless-shell
+need firefox-esr firefox-esr --version
+need webkit2gtk-driver test -e /usr/bin/WebKitWebDriver
+need xvfb test -e /usr/bin/Xvfb
 need libclang-dev has_libclang
 need faketime has_faketime
 # The kiosk's compositor, what takes its picture, types into it and reports idleness.
