@@ -67,7 +67,8 @@ class TopicChecks:
             return
         self._check_types(topic, wanted, publishers)
         qos = self._panel.qos(topic).wire_qos
-        if qos.reliable and any(one.qos.reliable is False for one in publishers):
+        adapts = topic in self._panel.adaptive_topics
+        if qos.reliable and not adapts and any(one.qos.reliable is False for one in publishers):
             self._find("topic_qos", topic, detail=BEST_EFFORT)
         if qos.transient_local and not all(one.qos.transient_local for one in publishers):
             self._find("topic_qos", topic, detail=VOLATILE)

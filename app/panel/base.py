@@ -260,15 +260,16 @@ class Description(BaseModel):
 
 class TopicQos(Description):
     """A topic's QoS. Without `durability`, a publisher is volatile and a subscription uses the
+    publisher's. Without `reliability` it is reliable; a topic that is only shown uses the
     publisher's."""
 
-    reliability: Literal["reliable", "best_effort"] = "reliable"
+    reliability: Literal["reliable", "best_effort"] | None = None
     durability: Literal["volatile", "transient_local"] | None = None
     depth: Annotated[int, Field(ge=1, le=10_000)] = 10
 
     @cached_property
     def wire_qos(self) -> Qos:
-        return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)
+        return Qos(self.reliability != "best_effort", self.durability == "transient_local", self.depth)
 
 
 class HasTopic(Protocol):

@@ -243,6 +243,16 @@ class Panel(Description):
         """Topic → type of all topics that the panel publishes."""
         return {w.topic: w.type for w in self.widgets() if isinstance(w, PublishCommand)}
 
+    @cached_property
+    def adaptive_topics(self) -> frozenset[str]:
+        """The topics that are only shown, and whose reliability the panel file leaves to the
+        publisher."""
+        needed = [source for command in self.commands for source in command.sources()]
+        given = [source for source in self.monitored() if source.qos.reliability is not None]
+        strict = {interlock.topic for interlock in self.interlocks}
+        strict |= {source.topic for source in (*needed, *given)}
+        return frozenset(source.topic for source in self.monitored()) - strict
+
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same in all places of the panel file."""
         named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}

@@ -17,14 +17,12 @@ def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict 
     """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
     not route it, another definition. `role` is what the panel does with it: publish ("MP") or
     subscribe ("MS")."""
-    return _misfit(
-        robot.graph,
-        role,
-        robot.key(of.topic),
-        of.topic,
-        of.type,
-        of.qos.wire_qos,
-    ) or definition_mismatch(_COUNTERPART[role], of.topic, robot)
+    key, qos = robot.key(of.topic), of.qos.wire_qos
+    if role == "MS" and robot.adapts_reliability(key):
+        qos = qos._replace(reliable=False)
+    return _misfit(robot.graph, role, key, of.topic, of.type, qos) or definition_mismatch(
+        _COUNTERPART[role], of.topic, robot
+    )
 
 
 def definition_mismatch(role: Role, name: str, robot: RobotState) -> Verdict | None:

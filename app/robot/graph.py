@@ -21,6 +21,7 @@ from app.dialect.endpoint import (
     within,
 )
 from app.interfaces.names import Qos
+from app.robot.qos_mismatch import reader_mismatch, writer_mismatch
 
 # The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of the bridge
 # has one type: that of the endpoint that created it, of the robot or of another panel.
@@ -237,7 +238,7 @@ class LiveGraph:
         return next((e.type for e in self._endpoints(role, key)), None)
 
     @cached_until_change
-    def since(self, role: Role, key: str) -> float:
+    def since(self, role: Role | None, key: str) -> float:
         """When the newest endpoint of this name appeared (monotonic seconds); -inf without one."""
         tokens = self._tokens.get(key, {}).items()
         times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
@@ -246,6 +247,12 @@ class LiveGraph:
     def is_transient_local(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None without a publisher."""
         return next((e.transient_local for e in self._endpoints("MP", key)), None)
+
+    def is_reliable(self, key: str) -> bool | None:
+        """Whether no publisher of the robot is best effort; None without a publisher."""
+        if not self.has_endpoint("MP", key):
+            return None
+        return all(e.reliable is not False for e in self.described_endpoints("MP", key))
 
     def is_volatile(self, key: str) -> bool:
         """Whether the robot's publishers are known, and none is TRANSIENT_LOCAL."""
@@ -284,26 +291,8 @@ class LiveGraph:
         """
         theirs = self.described_endpoints(_COUNTERPARTS[role][0], key)
         mismatches = [
-            _reader_mismatch(e, qos) if role == "MS" else _writer_mismatch(e, qos) for e in theirs
+            reader_mismatch(e, qos) if role == "MS" else writer_mismatch(e, qos) for e in theirs
         ]
         if role == "MP" and None in mismatches:
             return None
         return next(filter(None, mismatches), None)
-
-
-def _reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
-    """Why a subscription with this QoS does not match a publisher."""
-    if qos.reliable and publisher.reliable is False:
-        return "publishes_best_effort"
-    if qos.transient_local and not publisher.transient_local:
-        return "publishes_volatile"
-    return None
-
-
-def _writer_mismatch(subscriber: Endpoint, qos: Qos) -> str | None:
-    """Why a subscriber does not match a publisher with this QoS."""
-    if not qos.reliable and subscriber.reliable:
-        return "asks_for_reliable"
-    if not qos.transient_local and subscriber.transient_local:
-        return "asks_for_transient_local"
-    return None

@@ -81,6 +81,8 @@ class RobotState:
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.topic_publishers = TopicPublishers()
         self.replayed = ReplayedMessages()
+        self._adaptive_keys = frozenset(map(self.key, panel.adaptive_topics))
+        self.reliable_readers: set[str] = set()  # keys of subscriptions that began as reliable
         self.command_status: dict[str, CommandStatus] = {}  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
@@ -145,6 +147,11 @@ class RobotState:
         graph."""
         for topic, keys in self._shared.items():
             self._keys[topic] = present_key(self.graph, topic, keys)
+
+    def adapts_reliability(self, key: str) -> bool:
+        """Whether a topic is read as its publisher offers it, best effort too. Not while the bridge
+        reads it as reliable for an earlier publisher."""
+        return key in self._adaptive_keys and key not in self.reliable_readers
 
     def difference(self, role: Role, key: str) -> Difference | None:
         """How the definition of an endpoint of the robot differs from the panel's; None if it is not

@@ -56,7 +56,9 @@ class BridgeAdmin:
         began = time.monotonic()
         nodes = await ask_json(self._link, bridge_dialect.NODES)
         own = {zid: namespaces.get(zid, self._robot.namespace) for zid in graph.bridges}
-        endpoints = await self._participants.endpoints(nodes, own, self._robot.required_keys)
+        endpoints = await self._participants.endpoints(
+            nodes, own, self._robot.required_keys, lambda one: graph.since(one.role, one.key)
+        )
         graph.update_routes(routes, endpoints, began)
 
     async def _namespaces(self) -> dict[str, str]:

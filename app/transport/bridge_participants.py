@@ -2,12 +2,12 @@
 
 A liveliness token has those of a topic's first publisher or subscriber only, and of services none. The
 bridge's admin space has all. A participant is queried when it appears with an endpoint that the panel
-needs, and again when these endpoints have changed: what it has announced does not change otherwise.
+needs, and again when these endpoints or their tokens have changed.
 """
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from app.dialect import bridge_entities as entities
@@ -20,6 +20,7 @@ AT_ONCE: Final = 32  # participants that are queried together
 EVERY_NODES: Final = frozenset({ROSOUT_TOPIC, "/parameter_events"})  # their types are ROS 2's own
 
 Place = tuple[str, str]  # a bridge's zid, a participant
+Asked = frozenset[tuple[Endpoint, float]]  # with the time of each endpoint's newest token
 
 
 class BridgeParticipants:
@@ -27,15 +28,23 @@ class BridgeParticipants:
 
     def __init__(self, link: AdminSpace) -> None:
         self._link = link
-        self._announced: dict[Place, tuple[frozenset[Endpoint], list[DdsEntity]]] = {}
+        self._announced: dict[Place, tuple[Asked, list[DdsEntity]]] = {}
 
     async def endpoints(
-        self, answers: Iterable[tuple[str, Any]], namespaces: Mapping[str, str], keys: Collection[str]
+        self,
+        answers: Iterable[tuple[str, Any]],
+        namespaces: Mapping[str, str],
+        keys: Collection[str],
+        since: Callable[[Endpoint], float],
     ) -> list[Endpoint]:
         """The endpoints of these keys in the bridges' answers about nodes, with QoS and hashes.
-        LinkError without a link. `namespaces` are the bridges' by zid; others are left out."""
+        LinkError without a link. `namespaces` are the bridges' by zid; others are left out. `since` is
+        when the newest token of such an endpoint appeared."""
         found = _by_participant(answers, namespaces, keys)
-        asked = {place: frozenset(filter(_is_described, ends)) for place, ends in found.items()}
+        asked = {
+            place: frozenset((one, since(one)) for one in ends if _is_described(one))
+            for place, ends in found.items()
+        }
         stale = [
             place
             for place, ends in asked.items()

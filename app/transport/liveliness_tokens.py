@@ -3,13 +3,14 @@
 The first to create a route of the bridge fixes its type and QoS for all. So a topic with another type
 on the robot gets no token. A subscription gets one when its publisher is first seen, with that
 publisher's durability: held from the start, the token would make a VOLATILE reader, which misses the
-earlier messages of a TRANSIENT_LOCAL publisher. If the panel file gives a durability, the token has it
-and is held from the start. It stays when the publisher ends: a route that ends and begins again
-delivers each sample twice (#700).
+earlier messages of a TRANSIENT_LOCAL publisher. A topic that is only shown takes its publisher's
+reliability too: a reader that asks for reliable gets nothing of a best-effort publisher. If the panel
+file gives a durability, the token has it and is held from the start. It stays when the publisher ends:
+a route that ends and begins again delivers each sample twice (#700).
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from app.dialect.endpoint import OwnEndpoint, TopicRole
 from app.interfaces import Interfaces
@@ -30,14 +31,17 @@ class LivelinessTokens:
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._wrongly_held: set[str] = set()
         self._reported: set[tuple[str, str]] = set()
         self._subscribed: set[str] = set()  # keys of subscriptions whose token was held
-        self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
+        self._durabilities = FromPublisher(lambda held, offered: held == offered)
+        # A best-effort reader takes what is published as reliable.
+        self._reliabilities = FromPublisher(lambda held, offered: offered or not held)
 
     def forget(self) -> None:
         """Call it when the tokens have ended."""
-        self._held_as.clear()
+        self._durabilities.forget()
+        self._reliabilities.forget()
+        self._robot.reliable_readers.clear()
         self._subscribed.clear()
 
     def wanted(self, zid: str) -> list[str]:
@@ -76,33 +80,62 @@ class LivelinessTokens:
         return self._panel.qos(topic).wire_qos
 
     def _subscription_qos(self, topic: str) -> Qos | None:
-        """The QoS of a subscription's token: the panel's, with the publisher's durability if the panel
-        file gives none; None for no token yet.
+        """The QoS of a subscription's token: the panel's, with what it takes from the publisher; None
+        for no token yet.
 
         A route that a publisher created with another QoS than the panel's ends with that publisher, if
         no token keeps it. So a token that is not held yet waits for that.
         """
         key, qos = self._robot.key(topic), self._qos(topic)
         if self._panel.qos(topic).durability is None:
-            transient_local = self._durability(key)
+            offered = self._robot.graph.is_transient_local(key)
+            transient_local = self._durabilities.held(key, offered)
             if transient_local is None:
                 return None
             qos = qos._replace(transient_local=transient_local)
+        if topic in self._panel.adaptive_topics:
+            reliable = self._reliability(key)
+            if reliable is None:
+                return None
+            qos = qos._replace(reliable=reliable)
         if key not in self._subscribed and self._robot.graph.mismatched_qos("MS", key, qos):
             return None
         self._subscribed.add(key)
         return qos
 
-    def _durability(self, key: str) -> bool | None:
-        """Whether the token of a subscription is TRANSIENT_LOCAL; None for no token yet.
+    def _reliability(self, key: str) -> bool | None:
+        """Whether the token of a topic that is only shown is reliable; None for no token yet."""
+        reliable = self._reliabilities.held(key, self._robot.graph.is_reliable(key))
+        if reliable:
+            self._robot.reliable_readers.add(key)
+        else:
+            self._robot.reliable_readers.discard(key)
+        return reliable
 
-        If a publisher appeared with another durability, its route is wrong while that publisher exists.
-        The token ends with it, and the next publisher decides.
-        """
-        now = self._robot.graph.is_transient_local(key)
-        if now is None and key in self._wrongly_held:
-            self._wrongly_held.discard(key)
-            self._held_as.pop(key, None)
-        elif now is not None and self._held_as.setdefault(key, now) != now:
-            self._wrongly_held.add(key)
-        return self._held_as.get(key)
+
+class FromPublisher:
+    """A QoS policy of tokens that is taken from a topic's publisher.
+
+    If a publisher appears whose policy does not fit, its route is wrong while that publisher exists.
+    The token ends with it, and the next publisher decides.
+    """
+
+    def __init__(self, fits: Callable[[bool, bool], bool]) -> None:
+        """`fits(held, offered)`: whether a token with `held` gets what is published with `offered`."""
+        self._fits = fits
+        self._held: dict[str, bool] = {}  # by key
+        self._wrong: set[str] = set()
+
+    def held(self, key: str, offered: bool | None) -> bool | None:
+        """The policy of the token of a topic; None for no token yet. `offered` is that of its
+        publishers, None without one."""
+        if offered is None and key in self._wrong:
+            self._wrong.discard(key)
+            self._held.pop(key, None)
+        elif offered is not None and not self._fits(self._held.setdefault(key, offered), offered):
+            self._wrong.add(key)
+        return self._held.get(key)
+
+    def forget(self) -> None:
+        self._held.clear()
+        self._wrong.clear()

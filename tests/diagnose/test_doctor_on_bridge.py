@@ -108,7 +108,7 @@ def announced(client: Client, *names: str) -> bool:
     return all(any(f"{name}/" in token for token in tokens) for name in names)
 
 
-WELL = panel_of(interlock("/permission"), readout("/words"), button("/heard"))
+WELL = panel_of(interlock("/permission"), readout("/words"), readout("/lossy"), button("/heard"))
 # What is broken, and what is said of it: (code, name) of each finding.
 BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
     (
@@ -148,7 +148,7 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
     ),
     (
         "another QoS",
-        panel_of(readout("/lossy")),
+        panel_of(readout("/lossy", qos={"reliability": "reliable"})),
         [("topic_qos", "/lossy")],
     ),
     (

@@ -119,6 +119,26 @@ def test_services_and_who_serves_them() -> None:
     assert [(a.name, a.nodes) for a in robot.actions] == [("/walk", ("/plc",))]
 
 
+@pytest.mark.parametrize(
+    ("role", "name", "part"), [("SS", "/reset", ""), ("AS", "/walk", "/_action/send_goal")]
+)
+def test_a_server_has_the_hashes_of_what_it_exchanges(role: str, name: str, part: str) -> None:
+    given = f"RIHS01_{'1' * 64}"
+    place = f"rq{name}{part}Request"
+    answer = {
+        "topic_name": place,
+        "type_name": "x::srv::dds_::Y_Request_",
+        "qos": {"user_data": list(f"serviceid= 1.2;typehash={given};".encode())},
+    }
+    robot = read(
+        tokens=["@/a/@ros2_lv", token("a", role, name[1:], "x/srv/Y")],
+        entities=[(f"@/a/ros2/dds/{CYCLONE}/reader/{CYCLONE[:30]}03/{place}", answer)],
+    )
+    (server,) = (*robot.services, *robot.actions)
+    assert server.hashes == (("x/srv/Y_Request", given),)
+    assert robot.topics == ()
+
+
 def test_each_namespace_is_a_robot_and_a_silent_bridge_is_in_the_graph() -> None:
     graph = ros_graph(
         GraphAnswers(

@@ -259,6 +259,6 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
             continue
         if isinstance(one, Confirm) or isinstance(first, Confirm):
             continue  # it has no QoS of its own
-        if one.qos != first.qos:
+        if (one.qos.wire_qos, one.qos.durability) != (first.qos.wire_qos, first.qos.durability):
             what = f"{one.topic} has another QoS at {above}: a topic has one"
             yield Fault(f"{place}.qos", what, cause=f"topic {one.topic}")
