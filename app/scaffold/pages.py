@@ -10,8 +10,8 @@ from app.scaffold.entry import Entry
 from app.scaffold.labels import with_own_labels
 from app.scaffold.naming import GENERAL
 
-MOST_WIDGETS: Final = 16  # on 1280x800: four rows of gauges, and a trend below them
-MOST_PAGES: Final = 12  # tabs on that screen
+MOST_WIDGETS: Final = 16  # four rows of gauges, which 1280x800 has above a trend
+MOST_PAGES: Final = 8  # tabs on that screen
 MOST_PENS: Final = 4
 TREND_GAP_S: Final = 5  # the max_age_s of a trend that has none
 TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "format")
@@ -23,15 +23,12 @@ Place = tuple[str, ...]
 def make_pages(entries: Sequence[Entry], live: bool) -> tuple[dict[str, Sequence[Entry]], list[Entry]]:
     """Page → widgets, and the widgets beyond the most pages. Displays come first, then their trend,
     then controls; `live`: controls take room too, as they are not comments."""
+    arranged = (_arranged(entries, own, live) for own in range(MOST_PAGES, -1, -1))
     pages: dict[str, list[Entry]] = {}
-    by_place = _by_place(entries)
-    for place in sorted(by_place, key=lambda place: (place == (NODES_PAGE,), place)):
-        for part in _parts(by_place[place], 1, live):
-            title = " ".join(place if place == (GENERAL,) else _common(part))
-            taken = sum(page == title or page.rpartition(" ")[0] == title for page in pages)
-            pages[f"{title} {taken + 1}" if title in pages else title] = part
-    always = (GENERAL, NODES_PAGE)
-    fullest = sorted(pages, key=lambda page: (page not in always, -len(pages[page])))[:MOST_PAGES]
+    for pages in arranged:
+        if len(pages) <= MOST_PAGES:
+            break
+    fullest = sorted(pages, key=lambda page: (page != NODES_PAGE, -len(pages[page])))[:MOST_PAGES]
     rest = [entry for page, part in pages.items() if page not in fullest for entry in part]
     kept: dict[str, Sequence[Entry]] = {
         page: _whole(page, part) for page, part in pages.items() if page in fullest
@@ -39,13 +36,27 @@ def make_pages(entries: Sequence[Entry], live: bool) -> tuple[dict[str, Sequence
     return kept or {GENERAL: []}, rest
 
 
-def _by_place(entries: Sequence[Entry]) -> dict[Place, list[Entry]]:
-    """The entries by the first part of their places. Places of one entry are put together."""
+def _arranged(entries: Sequence[Entry], own: int, live: bool) -> dict[str, list[Entry]]:
+    """The entries by the titles of pages: the `own` largest places have pages of their own."""
+    pages: dict[str, list[Entry]] = {}
+    by_place = _by_place(entries, own)
+    for place in sorted(by_place, key=lambda place: (place == (NODES_PAGE,), place)):
+        is_general = place == (GENERAL,)
+        for part in _parts(by_place[place], 0 if is_general else 1, live):
+            title = " ".join(place if is_general else _common(part))
+            taken = sum(page == title or page.rpartition(" ")[0] == title for page in pages)
+            pages[f"{title} {taken + 1}" if title in pages else title] = part
+    return pages
+
+
+def _by_place(entries: Sequence[Entry], own: int) -> dict[Place, list[Entry]]:
+    """The entries by the first part of their places. Small places are put together."""
     sizes = Counter(one.place[:1] for one in entries)
+    kept = {place for place, size in sizes.most_common(own) if size > 1} | {(NODES_PAGE,)}
     found: defaultdict[Place, list[Entry]] = defaultdict(list)
     for one in entries:
         place = one.place[:1]
-        found[place if sizes[place] > 1 or place == (NODES_PAGE,) else (GENERAL,)].append(one)
+        found[place if place in kept else (GENERAL,)].append(one)
     return found
 
 

@@ -180,11 +180,21 @@ def test_small_namespaces_share_the_page_of_the_one_around_them() -> None:
     assert "left_enabled" in found["Left"]
 
 
-def test_what_has_no_room_is_named() -> None:
-    topics = [published(f"/n{n:02}/t{m}", BOOL) for n in range(MOST_PAGES + 2) for m in (1, 2)]
+def test_many_small_nodes_share_pages() -> None:
+    topics = [published(f"/t{n:02}_{m}", BOOL, f"/node_{n:02}") for n in range(20) for m in range(3)]
     text = text_of(topics=topics)
-    assert len(pages(text)) == MOST_PAGES
-    assert text.count(NO_ROOM) == 4
+    assert NO_ROOM not in text
+    found = pages(text)
+    assert (len(found), sum(map(len, found.values()))) == (MOST_PAGES, 60)
+    assert {title for title in found if title.startswith("Robot")} == {"Robot", "Robot 2", "Robot 3"}
+
+
+def test_what_has_no_room_is_named() -> None:
+    topics = [published(f"/t{n:03}", BOOL) for n in range(MOST_PAGES * MOST_WIDGETS + 2)]
+    text = text_of(topics=topics)
+    found = pages(text)
+    assert (len(found), max(map(len, found.values()))) == (MOST_PAGES, MOST_WIDGETS)
+    assert text.count(NO_ROOM) == 2
 
 
 @pytest.mark.parametrize(
