@@ -30,6 +30,7 @@ KIOSK: Final = "127.0.0.1"
 OTHER: Final = "127.0.0.2"
 ANOTHER: Final = "127.0.0.3"
 ATTACK_S: Final = 3.0
+CONNECTIONS: Final = 100
 # As many widgets as a large page has, and a camera.
 LARGE: Final = (
     PANEL
@@ -71,12 +72,11 @@ def client(server: Server, address: str) -> httpx.Client:
 
 
 @contextmanager
-def flooding(
-    server: Server, address: str, path: str, connections: int = 20
-) -> Iterator[dict[str, int]]:
-    """A client asks as fast as it can for `ATTACK_S`; the answers by status are there at the end."""
+def flooding(server: Server, address: str, path: str, connections: int) -> Iterator[dict[str, int]]:
+    """A client asks as fast as it can for `ATTACK_S`; the answers by status are there at the end. It
+    takes no processor from the server and the hold, as another machine does not."""
     words = ["-m", "tests.support.flood", str(server.port), address, path, str(connections)]
-    command = [sys.executable, *words, str(ATTACK_S)]
+    command = ["nice", "-n", "19", sys.executable, *words, str(ATTACK_S)]
     answers: dict[str, int] = {}
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as attacker:
         yield answers
@@ -125,27 +125,25 @@ def page_s(server: Server, address: str = KIOSK) -> float:
     return time.monotonic() - began
 
 
-FLOODS: Final = [
-    "/",
-    "/log",
-    "/events?once=1",
-    "/openapi.json",
-    "/metrics",
-    "/none",
-    "POST /widgets/none",
-]
-
-
 @pytest.mark.real_time
-@pytest.mark.parametrize("path", FLOODS)
-@pytest.mark.parametrize("address", [KIOSK, OTHER], ids=["at the kiosk", "elsewhere"])
-def test_a_hold_lives_through_twenty_connections_that_ask_without_a_pause(
+@pytest.mark.parametrize(
+    ("address", "path"),
+    [
+        pytest.param(KIOSK, "/", id="pages at the kiosk"),
+        pytest.param(KIOSK, "/log", id="the log at the kiosk"),
+        pytest.param(OTHER, "/", id="pages elsewhere"),
+        pytest.param(OTHER, "/openapi.json", id="the description elsewhere"),
+        pytest.param(OTHER, "POST /widgets/none", id="presses elsewhere"),
+    ],
+)
+def test_a_hold_lives_through_many_connections_that_ask_without_a_pause(
     cell: Server, address: str, path: str
 ) -> None:
-    with a_hold_that_lasts(cell), flooding(cell, address, path) as answers:
+    """A page takes 15 ms of the event loop or more: all of them in a row, longer than a lease."""
+    with a_hold_that_lasts(cell), flooding(cell, address, path, CONNECTIONS) as answers:
         time.sleep(ATTACK_S / 4)
-        assert page_s(cell) < 2
-        assert page_s(cell, ANOTHER) < 2
+        assert page_s(cell) < 5
+        assert page_s(cell, ANOTHER) < 10
     assert sum(answers.values()) > 10, answers
 
 
