@@ -47,7 +47,7 @@ class Simulator:
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
         keys: set[str] = set()
-        self._played = [
+        self.robots = [
             PlayedRobot(self._session, namespace, robot, interfaces, self._lock, keys)
             for namespace, robot in robots.items()
         ]
@@ -78,7 +78,7 @@ class Simulator:
         config = json.dumps({"namespace": namespace or "/"})
         yield _admin_value(self._session, bridge_dialect.version(zid), DEMO_VERSION)
         yield _admin_value(self._session, bridge_dialect.config(zid), config)
-        for played in self._played:
+        for played in self.robots:
             for token in played.tokens(zid):
                 yield self._session.liveliness().declare_token(token)
         yield self._session.liveliness().declare_token(bridge_dialect.bridge_token(zid))
@@ -87,7 +87,7 @@ class Simulator:
         while not self._ends.wait(self._step_s):
             moment = Moment(time.monotonic(), time.time_ns())
             try:
-                for played in self._played:
+                for played in self.robots:
                     played.step(moment)
             except KioskError as error:
                 self._failed(error)

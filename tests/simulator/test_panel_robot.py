@@ -16,12 +16,14 @@ from app.panel.widgets.kinds import KINDS, find_row
 from app.panel.widgets.publish import SinglePublish
 from app.permission.conditions import permits
 from app.robot.parameter_state import EMPTY_VALUE
+from app.simulator.in_process import robots_of
 from app.simulator.interlocks import APART_S
 from app.simulator.kinds import SIMULATED, Published, Shown, needs_of
 from app.simulator.panel_robot import PanelRobot
 from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
 from app.simulator.values.known_types import Moment
+from app.simulator.zenoh_peer import ANY_PORT, Simulator
 from tests.support.builders import INTERFACES
 from tests.support.parts import TESTS
 
@@ -315,6 +317,39 @@ equals = "WARN"
 [demo."/is"]
 values = ["STALE", "ERROR"]
 """
+
+
+SHARED: Final = """
+robot = [{ id = "a", name = "A", namespace = "/a" }, { id = "b", name = "B", namespace = "/b" }]
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "door"
+kind = "readout"
+label = "Door"
+topic = "//cell/door"
+type = "std_msgs/msg/Bool"
+[[page.widget]]
+id = "speed"
+kind = "readout"
+label = "Speed"
+topic = "/speed"
+type = "std_msgs/msg/Float64"
+[[page.widget]]
+id = "open"
+kind = "call"
+label = "Open"
+service = "//cell/open"
+type = "std_srvs/srv/Trigger"
+"""
+
+
+def test_what_several_robots_share_is_simulated_once(loaded: Loaded) -> None:
+    with Simulator(ANY_PORT, robots_of(loaded(SHARED)), INTERFACES) as played:
+        tokens = [token for robot in played.robots for token in robot.tokens("z")]
+    names = [token.split("/")[4] for token in tokens if "/MP/" in token or "/SS/" in token]
+    assert [names.count(name) for name in ("a§speed", "b§speed", "cell§door", "cell§open")] == [1] * 4
 
 
 def test_names_of_constants_confirm_and_are_simulated(loaded: Loaded) -> None:
