@@ -21,6 +21,7 @@ from app.panel.layout import Page
 from app.panel.number_range import decimal_text
 from app.panel.screen import CLEANING_S
 from app.panel.widgets.families import BaseWidget
+from app.printable import printable
 from app.web.page_guard import PAGE_GUARD
 
 if TYPE_CHECKING:
@@ -112,6 +113,8 @@ class PageTemplates:
 
 def typed_in(entry: Any, language: str) -> Any:
     """An entry of a form as it is shown again: numbers in the reader's notation, others as they are."""
+    if isinstance(entry, str):
+        return printable(entry)
     if isinstance(entry, list | tuple):
         between = f"{list_separator(language)} "
         return between.join(str(typed_in(element, language)) for element in entry)
