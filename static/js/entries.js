@@ -1,14 +1,13 @@
 // The values entered on the page, and the inputs of parameters.
-import { mark, sentNumber, setLimits } from "./number-inputs.js";
-import { readNumbers } from "./number-text.js";
 
 const NUMBERS = "[data-number], [data-list]";
+// What pages without numbers do not need.
+const { mark, sentNumber, setLimits } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
 
 // The value with its type. What is not a number is sent as text: the server says what is wrong.
 function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
-  if (input.matches("[data-number]")) return sentNumber(input);
-  return input.matches("[data-list]") ? readNumbers(input.value, input.matches("[data-whole]")) : input.value;
+  return input.matches(NUMBERS) ? sentNumber(input) : input.value;
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
@@ -61,6 +60,25 @@ export function forgetRobotValue(root) {
   robotValues.delete(entryOf(root));
 }
 
-addEventListener("input", ({ target }) => target.matches?.("[data-entry]") && touched.add(target));
+// The inputs that were changed here, by hand or by a script.
+export const changed = new Set();
+addEventListener("input", ({ target }) => {
+  changed.add(target);
+  if (target.matches?.("[data-entry]")) touched.add(target);
+});
 
-import("./kept-entries.js").catch(() => {}); // without it a page begins with the panel's values
+// What was entered here before is entered again, and what is entered now is kept: by a script that a page without
+// entries does not need. Where the browser keeps nothing, a page begins with the panel's values.
+export const KEPT = "operator-panel.entries";
+
+function hasKept() {
+  try {
+    return sessionStorage.getItem(KEPT) !== null;
+  } catch {
+    return false;
+  }
+}
+
+const keep = () => import("./kept-entries.js").catch(() => {});
+if (hasKept()) keep();
+else addEventListener("input", keep, { once: true });

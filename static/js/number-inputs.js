@@ -1,6 +1,6 @@
 // The inputs of numbers: text fields in the notation of the page's language, and sliders.
 import { isLess, isOnStep, stepped } from "./decimals.js";
-import { elementsOf, numberText, readNumber, readPlain } from "./number-text.js";
+import { elementsOf, listText, numberText, readNumber, readNumbers, readPlain } from "./number-text.js";
 
 // Its limits as plain text, "" without one.
 export function limitsOf({ dataset: { min, max, stepSize, whole } }) {
@@ -21,8 +21,9 @@ export function enter(input, plain) {
   input.value = input.type === "range" ? plain : numberText(plain);
 }
 
-// What a press sends: a number, or the text as it is, which the server refuses.
+// What a press sends: a number, or the text as it is, which the server refuses; of a list its numbers.
 export function sentNumber(input) {
+  if (input.matches("[data-list]")) return readNumbers(input.value, limitsOf(input).isWhole);
   return input.type === "range" ? Number(input.value) : (readNumber(input.value, limitsOf(input).isWhole) ?? input.value.trim());
 }
 
@@ -41,7 +42,26 @@ export function judged(text, { min, max, step, isWhole }) {
 export function entered(input) {
   const limits = limitsOf(input);
   const texts = input.matches("[data-list]") ? elementsOf(input.value) : [entryText(input)];
-  return texts.map((text) => judged(text, limits));
+  return texts?.map((text) => judged(text, limits)) ?? [{ plain: null, problem: limits.isWhole ? "noWhole" : "noNumber" }];
+}
+
+// Independent of the language: plain text, or that of each number of a list; null if it can't be sent as it is.
+export function portable(input) {
+  const numbers = entered(input);
+  if (numbers.some(({ problem }) => problem)) return null;
+  return input.matches("[data-list]") ? numbers.map(({ plain }) => plain) : numbers[0].plain;
+}
+
+const isPermitted = (plain, limits) => typeof plain === "string" && judged(numberText(plain), limits).problem === null;
+
+// Enters what was portable, if the limits permit it.
+export function enterPortable(input, value) {
+  const isList = input.matches("[data-list]");
+  const limits = limitsOf(input);
+  if (isList ? !Array.isArray(value) || !value.every((plain) => isPermitted(plain, limits)) : !isPermitted(value, limits)) return false;
+  if (isList) input.value = listText(value);
+  else enter(input, value);
+  return true;
 }
 
 // Marks what can't be sent as it is; nothing yet is no mistake.

@@ -75,16 +75,16 @@ export function readNumber(text, isWhole) {
   return isWhole && (Math.abs(value) > 2 ** 53 || BigInt(value) !== BigInt(plain)) ? plain : value;
 }
 
-// The elements of a list of numbers, as they are typed.
+// The elements of a list of numbers, as they are typed; null where it is not clear what a comma separates.
 export function elementsOf(text) {
   if (!text.replace(AROUND, "")) return [];
-  if (SEPARATOR === "," && UNCLEAR.test(text)) return [text];
+  if (SEPARATOR === "," && UNCLEAR.test(text)) return null;
   return text.split(SEPARATOR).map((element) => element.replace(AROUND, ""));
 }
 
 // The numbers of a list; an element that is not a number is its text, which the server refuses.
 export function readNumbers(text, isWhole) {
-  return elementsOf(text).map((element) => readNumber(element, isWhole) ?? element);
+  return elementsOf(text)?.map((element) => readNumber(element, isWhole) ?? element) ?? [text];
 }
 
 export function listText(plains) {
