@@ -135,7 +135,7 @@ def differs(kiosk: Server, widget: str) -> str:
     """Why a widget is locked, or shows nothing, where it is for a definition that differs."""
     shown = kiosk.widget(widget)
     said = str(shown.get("reason") or shown.get("note"))
-    return said if "differs from this panel's" in said else ""
+    return said if said.startswith("Definitions differ") else ""
 
 
 def is_on_fast_dds(kiosk: Server, widget: str) -> bool:
