@@ -1,5 +1,7 @@
-// The connection to the server: requests, and its events by one EventSource. A browser opens six connections to one
-// server over HTTP/1.1, so a hidden page closes its own (source.js).
+// The connection to the server: requests, its events by one EventSource, and the lamps of the links. A browser opens
+// six connections to one server over HTTP/1.1, so a hidden page closes its own (source.js).
+import { setText } from "./show.js";
+
 const OPEN_LATER_MS = 700;
 const { base: BASE, page: PAGE } = document.body.dataset; // the robot and the widgets that this page shows
 
@@ -57,5 +59,28 @@ export class Connection {
     this.#stream?.close();
     this.#stream = null;
     clearTimeout(this.#timer);
+  }
+}
+
+export function showLink(lamps) {
+  for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
+    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to the server
+  }
+}
+
+export function showLamp(name, lamp) {
+  const light = document.querySelector(`[data-lamp="${name}"]`);
+  const row = document.querySelector(`[data-link="${name}"]`);
+  light.dataset.state = row.dataset.state = lamp.state;
+  setText(light.querySelector("b"), lamp.text);
+  for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
+}
+
+// The link status of each robot, on its tab.
+export function showRobots(robots) {
+  for (const [id, lamp] of Object.entries(robots)) {
+    const tab = document.querySelector(`[data-robot="${id}"]`);
+    tab.dataset.state = lamp.state;
+    setText(tab.querySelector("b"), lamp.text);
   }
 }

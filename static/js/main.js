@@ -1,7 +1,8 @@
 // Connects the event stream to the page: each event updates its section of the markup.
-import { Source } from "./source.js";
+import { showLamp, showLink, showRobots } from "./connection.js";
 import { Presser } from "./press.js";
 import { addShow, lockWidget, setText, showAttribute, showFailed } from "./show.js";
+import { Source } from "./source.js";
 
 const body = document.body;
 const clock = document.getElementById("clock"); // shows the time of the last heartbeat
@@ -39,29 +40,6 @@ const control = bar
 
 function showWidgets(changes) {
   for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
-}
-
-function showLink(lamps) {
-  for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
-    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to the server
-  }
-}
-
-function showLamp(name, lamp) {
-  const light = document.querySelector(`[data-lamp="${name}"]`);
-  const row = document.querySelector(`[data-link="${name}"]`);
-  light.dataset.state = row.dataset.state = lamp.state;
-  setText(light.querySelector("b"), lamp.text);
-  for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
-}
-
-// The link status of each robot, on its tab.
-function showRobots(robots) {
-  for (const [id, lamp] of Object.entries(robots)) {
-    const tab = document.querySelector(`[data-robot="${id}"]`);
-    tab.dataset.state = lamp.state;
-    setText(tab.querySelector("b"), lamp.text);
-  }
 }
 
 function showState({ state, text }) {

@@ -74,10 +74,7 @@ const LOCK = ["enabled", "reason", "reasons", "more"];
 
 // Locks the key of a widget for a reason of this page's own.
 export function lockLocally(root, reason) {
-  if (localLocks.has(root)) {
-    localLocks.get(root).times += 1;
-    return;
-  }
+  if (localLocks.has(root)) return void (localLocks.get(root).times += 1);
   const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
   const texts = { reason: text("reason"), reasons: text("reasons"), more: text("more") };
   const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), ...texts };
