@@ -200,16 +200,18 @@ $(BENCH)/pages/ready: bench/peers/package.json bench/peers/package-lock.json ben
 $(BENCH)/router: system
 	nice cargo build --quiet --release --locked --manifest-path bench/peers/router/Cargo.toml --target-dir $@
 
-# Renews the locked versions. Needs uv.
+# Renews the locked versions, then the message definitions that rosbags has. Needs uv.
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group build -o deploy/build.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group release -o deploy/release.lock
-	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --extra replay --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/rosbridge_rs/requirements.in -o bench/peers/rosbridge_rs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
+	$(MAKE) --no-print-directory .venv/test
+	.venv/bin/python -m app.interfaces.make_builtin
 
 clean:
 	rm -rf .venv .venv-ros .venv-docs .venv-release dist build .mypy_cache .ruff_cache

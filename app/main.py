@@ -27,7 +27,7 @@ from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.repeated_records import RepeatedRecords
-from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
+from app.runtime.assembly import check_zenoh, open_fleet, open_log
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
@@ -88,7 +88,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     settings = settings or Settings.from_environment()
     ros_logging.configure_logging(settings.log_level)
     repeated = limit_server_log(settings.log_level == "debug")
-    panel = load_panel(settings.panel, lambda of: settings.data_folder(mode_of(settings, of)))
+    panel = load_panel(settings.panel)
     check_zenoh(settings, panel)
     app = Application(
         title="Operator panel",

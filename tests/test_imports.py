@@ -194,8 +194,17 @@ def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) ->
     code = "import sys, app.main; print(*sys.modules)"
     read = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
     of_faults = {"app.panel.faults.shape", "app.panel.faults.toml_lines", "app.panel.preview"}
-    of_demos = {"app.simulator.panel_robot", "app.simulator.zenoh_peer", "rosbags.rosbag2"}
+    of_demos = {"app.simulator.panel_robot", "app.simulator.zenoh_peer"}
     assert {"mcap", "prometheus_client", *of_faults, *of_demos} & set(read.split()) == set()
+
+
+def test_only_a_replay_needs_what_a_kiosk_does_not_have() -> None:
+    """`make_builtin` is not in the wheel."""
+    lacking = ("rosbags", "numpy", "apsw", "ruamel")
+    need = {m for m in MODULES for name in imported()[m] if name.partition(".")[0] in lacking}
+    assert need == {"app.simulator.bag.files", "app.interfaces.make_builtin"}
+    needed_by = {m for m in MODULES if need & of_project(m)} - need
+    assert needed_by == {"app.simulator.bag.recording"}
 
 
 def test_what_a_start_makes_is_left_alone_by_the_garbage_collector(tmp_path: Path) -> None:

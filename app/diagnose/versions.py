@@ -6,7 +6,7 @@ from typing import Final
 
 from app.settings import APP
 
-PACKAGES: Final = ("eclipse-zenoh", "fastapi", "uvicorn", "starlette", "pydantic", "rosbags", "mcap")
+PACKAGES: Final = ("eclipse-zenoh", "fastapi", "uvicorn", "starlette", "pydantic", "mcap")
 CHECKOUT: Final = "(a checkout, not installed)"
 
 

@@ -1,13 +1,13 @@
 """ROS 2 interfaces without ROS: definitions, checked values, CDR and type hashes.
 
-Message definitions come from rosbags (`rosbags.typesys`). This package adds services, actions, packages
-from files, defaults, and a codec whose errors name the field.
+`builtin/` has the definitions of each distribution. Further packages come from files and from the
+robot's nodes.
 """
 
 from app.interfaces.cdr.fields import FieldReader, Fields, RowReader, Rows, Walk
 from app.interfaces.definitions import INTEGER_RANGES, PLACEHOLDER, STRING_TYPES, Field, Structure, Type
 from app.interfaces.derived_types import ActionTypes
-from app.interfaces.distributions import DISTROS, read_distribution
+from app.interfaces.distributions import DISTROS
 from app.interfaces.field_path import field_name, has_key, parent_path
 from app.interfaces.json_values import plain_text, to_plain
 from app.interfaces.registry import Interfaces, load_interfaces
@@ -32,6 +32,5 @@ __all__ = [
     "load_interfaces",
     "parent_path",
     "plain_text",
-    "read_distribution",
     "to_plain",
 ]

@@ -1,6 +1,6 @@
 """Loads a panel file and reports every fault with its place."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
 from app.i18n import ENGLISH
-from app.interfaces import Interfaces, load_interfaces, read_distribution
+from app.interfaces import Interfaces, load_interfaces
 from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_interlock
@@ -16,15 +16,10 @@ from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
 
-CacheFolder = Callable[[Panel], Path | None]
 
-
-def load_panel(path: Path, kept: CacheFolder = lambda _: None) -> Panel:
-    """The checked panel. PanelError has every fault; it is `unreadable` if the file is no TOML.
-
-    `kept` returns the folder in which the distribution's definitions may be cached.
-    """
-    return _load(read_toml(path), kept)
+def load_panel(path: Path) -> Panel:
+    """The checked panel. PanelError has every fault; it is `unreadable` if the file is no TOML."""
+    return _load(read_toml(path))
 
 
 class Checked(NamedTuple):
@@ -58,7 +53,7 @@ def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
     return ()
 
 
-def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
+def _load(file: TomlFile) -> Panel:
     tables = {key: value for key, value in file.tables.items() if key != "revision"}
     faults = [] if tables == file.tables else [Fault("revision", "unknown key")]
     try:
@@ -66,7 +61,6 @@ def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
     except ValidationError as error:
         faults += _shape_faults(error, tables, _context(file))
     else:
-        read_distribution(panel.distro, kept(panel))
         faults += _type_faults(panel)
     if faults:
         raise PanelError(str(file.path), _sorted_faults(faults, file))

@@ -144,13 +144,23 @@ def test_the_dependencies_of_the_tests_are_those_that_are_locked_for_the_panel()
     assert locked.entries(locked.LOCK).items() <= of_tests.items()
 
 
+def test_a_replay_names_the_extra_that_it_needs(machine: Machine) -> None:
+    replay = machine.run(f"{RELEASE}/bin/operator-panel simulate tcp/127.0.0.1:0 --bag cell.mcap")
+    assert replay.returncode == 2
+    assert "replaying needs the package rosbags" in replay.stderr
+    (command,) = re.findall(r'`(pip install "[^`]+)`', replay.stderr)
+    # Without an index, pip finds the installed panel, and not what its extra adds.
+    extra = machine.run(f"{RELEASE}/bin/{command} --no-index")
+    assert "No matching distribution found for rosbags" in extra.stderr
+
+
 def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: Path) -> None:
     mine = Server(tmp_path, python=machine.python)
     try:
         until(mine.ready, "ready")
         html = mine.http.get("/").text
         assert "Publish1" in html
-        files = [part for part in html.split('"') if part.startswith("/static/")]
+        files = [part for part in html.split('"') if re.match("/static/.", part)]
         assert len(files) >= 4
         assert {mine.http.get(file).status_code for file in files} == {200}
         until(lambda: sends(mine, "from a wheel"), "a press is sent")

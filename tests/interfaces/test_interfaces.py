@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from app.errors import DecodeError, FieldError, InterfaceError
 from app.interfaces import DISTROS, INTEGER_RANGES, PLACEHOLDER, load_interfaces
-from app.interfaces.bundled_messages import ALIASES
+from app.interfaces.make_builtin import ALIASES
 from app.interfaces.names import MESSAGE_TYPE
 from tests.support.builders import BOOL, INTERFACES, TEXT
 

@@ -9,14 +9,19 @@ from typing import IO, TYPE_CHECKING, Any, Final, Protocol
 from mcap.reader import make_reader
 from mcap.records import Channel, Schema
 from mcap.summary import Summary
-from rosbags.interfaces import Connection, QosDurability, QosReliability
-from rosbags.interfaces import Qos as OfferedQos
-from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
-from rosbags.rosbag2.reader import DirectoryReader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from app.errors import RecordingError
 from app.interfaces.names import Qos
+
+try:
+    from rosbags.interfaces import Connection, QosDurability, QosReliability
+    from rosbags.interfaces import Qos as OfferedQos
+    from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
+    from rosbags.rosbag2.reader import DirectoryReader
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+except ModuleNotFoundError as error:
+    helps = '`pip install "operator-panel[replay]"`, in a checkout `make .venv/test`'
+    raise RecordingError(f"replaying needs the package {error.name}: {helps}") from error
 
 if TYPE_CHECKING:
     from rosbags.rosbag2.reader import ReaderProtocol
