@@ -147,7 +147,7 @@ def test_the_dependencies_of_the_tests_are_those_that_are_locked_for_the_panel()
 def test_a_replay_names_the_extra_that_it_needs(machine: Machine) -> None:
     replay = machine.run(f"{RELEASE}/bin/operator-panel simulate tcp/127.0.0.1:0 --bag cell.mcap")
     assert replay.returncode == 2
-    assert "replaying needs the package rosbags" in replay.stderr
+    assert "replaying needs rosbags: " in replay.stderr
     (command,) = re.findall(r'`(pip install "[^`]+)`', replay.stderr)
     # Without an index, pip finds the installed panel, and not what its extra adds.
     extra = machine.run(f"{RELEASE}/bin/{command} --no-index")

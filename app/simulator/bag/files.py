@@ -21,7 +21,7 @@ try:
     from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 except ModuleNotFoundError as error:
     helps = '`pip install "operator-panel[replay]"`, in a checkout `make .venv/test`'
-    raise RecordingError(f"replaying needs the package {error.name}: {helps}") from error
+    raise RecordingError(f"replaying needs rosbags: {helps}") from error
 
 if TYPE_CHECKING:
     from rosbags.rosbag2.reader import ReaderProtocol
