@@ -83,7 +83,7 @@ WIRE_THE_BRIDGE = {
     "app.diagnose.link",
     "app.diagnose.robot",
     "app.diagnose.observation",
-    "app.runtime.robot_session",
+    "app.runtime.robot_access",
     "app.simulator.zenoh_peer",
     "app.simulator.zenoh_robot",
 }

@@ -1,9 +1,11 @@
 """The protocol of a dialect: how the names of a robot's ROS graph are written in Zenoh."""
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import Literal, Protocol
 
 from app.dialect.endpoint import Endpoint, OwnEndpoint
+
+DialectName = Literal["bridge"]
 
 
 class Dialect(Protocol):

@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
+from app.dialect.dialect import DialectName
 from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
@@ -73,6 +74,11 @@ class RobotEntry(Description):
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
 
+    @property
+    def dialect(self) -> DialectName:
+        """By which dialect the robot is reached."""
+        return "bridge"
+
 
 Kind = TypeVar("Kind", bound=BaseWidget)
 
@@ -110,6 +116,11 @@ class Panel(Description):
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
+
+    @property
+    def dialect(self) -> DialectName:
+        """By which dialect the robot is reached if it is the only one."""
+        return "bridge"
 
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:

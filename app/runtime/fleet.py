@@ -14,6 +14,7 @@ from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
+from app.runtime.robot_access import ROBOT_ACCESS
 from app.runtime.robot_session import RobotSession, ServerParts
 from app.transport.zenoh_config import Config
 from app.view.link_status import Lamp
@@ -44,8 +45,9 @@ class Fleet:
         self._sessions: dict[str | None, RobotSession] = {}
         server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated, root_path)
         for entry in panel.robots or (None,):
+            access = ROBOT_ACCESS[(entry or panel).dialect]
             self._sessions[entry.id if entry else None] = RobotSession(
-                server, config_of(entry), entry=entry, others=self
+                server, config_of(entry), access, entry=entry, others=self
             )
 
     async def start(self) -> None:

@@ -32,7 +32,6 @@ from app.runtime.log_listener import LogListener
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
-from app.transport.bridge_peer import BRIDGE
 from app.transport.declarations import declarations
 from app.transport.peer import RobotAccess, RobotContext
 from app.transport.rosout import Rosout
@@ -70,8 +69,8 @@ class RobotSession:
         self,
         server: ServerParts,
         config: Config,
+        access: RobotAccess,
         *,
-        access: RobotAccess = BRIDGE,
         entry: RobotEntry | None = None,
         others: OtherRobots = ALONE,
     ) -> None:

@@ -4,15 +4,18 @@ import asyncio
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
+import pytest
 import zenoh
 from zenoh.handlers import Callback
 
 from app.audit import NullLog
+from app.dialect.dialect import DialectName
 from app.dialect.endpoint import Endpoint, OwnEndpoint, Role
 from app.interfaces.names import Qos
-from app.runtime.robot_session import RobotSession, ServerParts
+from app.runtime.fleet import Fleet
+from app.runtime.robot_access import ROBOT_ACCESS
 from app.transport.peer import RobotAccess, RobotContext
 from app.transport.zenoh_config import config_to
 from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFACES, MESSAGE, panel_of
@@ -144,20 +147,27 @@ class TinyRobot:
             query.reply("7/reset/std_srvs::srv::Trigger/h2", answer)
 
 
+def test_each_dialect_that_a_panel_may_have_is_reached() -> None:
+    assert set(ROBOT_ACCESS) == set(get_args(DialectName))
+
+
 async def when(condition: Callable[[], object]) -> None:
     async with asyncio.timeout(20):
         while not condition():
             await asyncio.sleep(0.01)
 
 
-def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, zenoh.Session]) -> None:
+def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
+    peer: tuple[str, zenoh.Session], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Seen, joined, heard, commanded and called, with not one of the bridge's key expressions."""
     endpoint, there = peer
     robot = TinyRobot(there)
+    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, RobotAccess(TinyDialect(), TinyPeer))
 
     async def scene() -> None:
-        access = RobotAccess(TinyDialect(), TinyPeer)
-        one = RobotSession(ServerParts(PANEL, "r1", NullLog()), config_to(endpoint), access=access)
+        fleet = Fleet(PANEL, lambda _: config_to(endpoint), "r1", NullLog())
+        one = fleet.first
         await one.start()
         await when(lambda: one.robot.link_up)
         assert one.link_verdict.code == "no_bridge"

@@ -25,6 +25,7 @@ from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_session import RobotSession, ServerParts
 from app.simulator.in_process import in_process
 from app.transport import bridge_liveness
+from app.transport.bridge_peer import BRIDGE as BRIDGES
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_config import config_to
 from app.view.kinds import Enabled
@@ -79,7 +80,7 @@ def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
 
 
 def session_of(panel: Panel, endpoint: str) -> RobotSession:
-    return RobotSession(ServerParts(panel, "r1", NullLog()), config_to(endpoint))
+    return RobotSession(ServerParts(panel, "r1", NullLog()), config_to(endpoint), BRIDGES)
 
 
 def taken(steps: Iterable[Updates], page: "Page") -> Updates:

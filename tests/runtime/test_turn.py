@@ -47,7 +47,7 @@ class Cell:
         self.order: list[str] = []
         self._monkeypatch = monkeypatch
         server = ServerParts(PANEL, "r1", NullLog())
-        self.session = RobotSession(server, config_to("tcp/127.0.0.1:1"), access=ACCESS)
+        self.session = RobotSession(server, config_to("tcp/127.0.0.1:1"), ACCESS)
         self.inbox: Inbox = self.session.link._inbox
         ingest = self.session._ingest
         self.inbox.expect(ingest.immediate, ingest.lossless, ingest.recorded)

@@ -1,0 +1,9 @@
+"""How the robots of each dialect are reached: a row for each choice of a panel."""
+
+from typing import Final
+
+from app.dialect.dialect import DialectName
+from app.transport.bridge_peer import BRIDGE
+from app.transport.peer import RobotAccess
+
+ROBOT_ACCESS: Final[dict[DialectName, RobotAccess]] = {"bridge": BRIDGE}
