@@ -34,14 +34,15 @@ dev: .venv/test
 
 # All tests: WORKERS processes in parallel, then the tests of real time alone. ARGS are options of pytest:
 # `ARGS="-k robot" make test` runs these tests in one process, and builds or installs only the real parts
-# (bridge, ROS, browser) that they use. Tests without real parts need no set-up.
+# (bridge, ROS, browser) that they use. Tests without real parts need no set-up. With ARGS, Debian packages
+# are only named: `make system` installs them.
 WORKERS ?= 7
 # Bytecode of the tests is cached, even if PYTHONDONTWRITEBYTECODE is set, and is compiled once before
 # the workers start. Otherwise each worker would spend 4 s on it.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(if $(ARGS),.venv/test,test-parts)
 ifdef ARGS
-	$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS))
+	@parts=$$(.venv/bin/python -m tests.needs $(ARGS)) && $(MAKE) --no-print-directory .venv/test $$parts
 	.venv/bin/pytest $(ARGS)
 else
 	.venv/bin/pytest --collect-only -qq > /dev/null || true  # the workers report errors
@@ -96,7 +97,7 @@ test-parts: system .venv/test .venv-ros/ready bridge
 
 .PHONY: system
 system:
-	sh tests/system.sh
+	$(if $(ARGS),INSTALL=no )sh tests/system.sh
 
 bridge: system
 	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge of the tests: once, 5 to 10 minutes"

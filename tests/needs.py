@@ -1,5 +1,6 @@
 """What tests need beside Python: `python -m tests.needs [ARGUMENT OF PYTEST]…` prints the target of the
-Makefile that sets it up, or nothing where they need nothing."""
+Makefile that sets it up, or nothing where they need nothing. Tests that cannot be collected set up
+nothing: pytest's output is printed, and the exit status is 2."""
 
 import io
 import sys
@@ -33,9 +34,9 @@ def needs_parts(session: pytest.Session) -> bool:
 
 
 class Collected:
-    """A plugin: whether what was collected needs real parts; what could not be collected may."""
+    """A plugin: whether the collected tests need real parts."""
 
-    needs = True
+    needs = False
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         self.needs = needs_parts(session)
@@ -43,9 +44,13 @@ class Collected:
 
 def main(arguments: list[str]) -> None:
     collected = Collected()
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+    output = io.StringIO()
+    with redirect_stdout(output), redirect_stderr(output):
         status = pytest.main([*arguments, "--collect-only", "-q"], plugins=[collected])
-    if collected.needs or status is not pytest.ExitCode.OK:
+    if status != pytest.ExitCode.OK:
+        print(output.getvalue(), end="", file=sys.stderr)
+        sys.exit(2)
+    if collected.needs:
         print("test-parts")
 
 

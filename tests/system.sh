@@ -1,6 +1,6 @@
 #!/bin/sh
 # What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
-# `system.sh PACKAGE` looks for that one alone.
+# `system.sh PACKAGE` looks for that one alone. With INSTALL=no the packages are named only.
 set -eu
 FONTS=/usr/share/fonts/truetype
 RUST=1.89 # of what tests/bridge_crate/Cargo.lock has
@@ -68,7 +68,10 @@ if [ -z "$only" ]; then
 fi
 
 [ -n "$missing" ] || exit 0
-if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+if [ "${INSTALL:-}" = no ]; then
+    echo "missing, by Debian's names:$missing. \`make system\` installs them on Debian as root" >&2
+    exit 1
+elif [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "installing$missing (once, by apt-get)"
     # What apt-get says is of interest only where it fails: debconf complains on every small system.
     said=$(mktemp)

@@ -74,3 +74,23 @@ def test_a_kind_of_namespace_that_is_not_allowed_is_named_before_the_tests(
     assert done.returncode == 1
     assert words in done.stderr
     assert "not allowed here" in done.stderr
+
+
+def test_for_some_tests_it_only_names_what_is_missing(tmp_path: Path) -> None:
+    """`make system` with ARGS, also as root on Debian."""
+    called = tmp_path / "called"
+    commands = {"apt-get": f"touch {called}", "id": "echo 0", "cmake": "exit 1"}
+    for name, script in commands.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / name).chmod(0o755)
+    done = subprocess.run(
+        ["make", "system", "ARGS=-k clock"],
+        cwd=ROOT,
+        env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "missing, by Debian's names: cmake. `make system` installs them" in done.stderr
+    assert not called.exists()
