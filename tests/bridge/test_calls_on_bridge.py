@@ -358,7 +358,7 @@ def test_a_cancel_of_a_goal_that_is_over_stops_no_other(kiosk: Server, robot: Cy
     assert kiosk.widget("count")["press"] == "goal-2"
     late = cancel(kiosk, press="goal-1", seen="0-1", at="2020-01-01T00:00:00Z", inputs={})
     assert (late.status_code, late.json()["outcome"]) == (409, "refused")
-    assert late.json()["reason"].startswith("Nothing was canceled: that goal is over")
+    assert late.json()["reason"].startswith("Nothing was canceled. That goal has ended")
     assert cancel(kiosk, press=2).status_code == 422
     assert robot.requests("/fibonacci/_action/cancel_goal") == []
     assert cancel(kiosk, press="goal-2", seen="0-1", at="2020-01-01T00:00:00Z").status_code == 200

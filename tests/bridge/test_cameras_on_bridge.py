@@ -157,14 +157,14 @@ def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNod
         (image("32FC1", 4), "The encoding 32FC1 cannot be shown"),
         (
             image("mono8", 1, 1, 1) | {"step": 2**32 - 1, "height": 2},
-            "not a whole sensor_msgs/msg/Image",
+            "not a complete sensor_msgs/msg/Image",
         ),
         (
             image("mono8", 1, 5000, 1),
             "The picture has 5000 × 1 pixels; at most 4096 each way are shown",
         ),
         (image("rgb8", 3, 200, 100), "The picture has 600"),
-        (image("rgb8", 3) | {"height": 11}, "not a whole sensor_msgs/msg/Image"),
+        (image("rgb8", 3) | {"height": 11}, "not a complete sensor_msgs/msg/Image"),
     ],
 )
 def test_what_can_not_be_shown_says_why(

@@ -97,7 +97,7 @@ def test_a_pause_keeps_the_lines_and_the_page_stays_small(
     pause.click()
     expect(rows(page).first.locator(".text")).to_have_text(last)
     expect(rows(page)).to_have_count(20)
-    expect(widget(page, "robot").locator(".left-out")).to_contain_text("more are not shown")
+    expect(widget(page, "robot").locator(".left-out")).to_contain_text("more lines are not shown")
 
 
 def test_a_hidden_page_asks_for_nothing(kiosk: Server, node: RosNode, page: Page) -> None:

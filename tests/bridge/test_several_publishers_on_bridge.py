@@ -145,7 +145,7 @@ def test_a_second_publisher_locks_where_only_one_may_be_and_is_named(
         robot.every("/permit", {"data": False}, 0.05)
         until(lambda: not kiosk.widget("strict_go")["enabled"], "there are two")
         named = "/permit is published by /door, /robot."
-        strict = "Locked: /permit has 2 publishers, and only one may give this permission."
+        strict = "Locked: /permit has 2 publishers. Only one node may publish this permission."
         until(lambda: kiosk.widget("strict_go")["reason"] == f"{strict} {named}", "both are named")
         assert {one[0] for one in permissions(kiosk)} == {False}
         until(

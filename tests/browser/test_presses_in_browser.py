@@ -403,7 +403,7 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     until(is_sent, "it is sent")
     # The second tap is on the page that the first one brings, or still on that of the first one, whose
     # form is the same press again.
-    sent, soon = r"Sent on /operation at [\d:]+\.", "Not sent: this came so soon after the page.*"
+    sent, soon = r"Sent on /operation at [\d:]+\.", "Not sent: pressed so soon after the page.*"
     either = re.compile(f"^(Start 1: {sent} {soon}|{sent})$")
     expect(page.locator("#receipt-go1")).to_have_text(either)
     assert pressed(mine) == 1
@@ -416,11 +416,11 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
 def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: Server) -> None:
     soon = {"_since": str(time.time() + 60), "message": "typed"}
     page = demo.http.post("/widgets/operation", data=soon, follow_redirects=True)
-    assert "Not sent: this came so soon after the page" in page.text
+    assert "Not sent: pressed so soon after the page" in page.text
     assert 'value="typed"' in page.text
     before = page.url.params["receipt"]
     again = demo.http.post("/widgets/operation", data={**soon, "_last": before}, follow_redirects=True)
-    assert again.text.count("Not sent: this came so soon after the page") == 1
+    assert again.text.count("Not sent: pressed so soon after the page") == 1
     entries = [entry for entry in logged(demo) if entry["press"] == before]
     assert [(entry["kind"], entry["outcome"]) for entry in entries] == [("refused", "refused")]
 

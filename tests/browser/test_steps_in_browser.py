@@ -110,7 +110,7 @@ def test_the_value_under_the_finger_counts(cell: Server, node: RosNode, page: Pa
     is_reported(cell, node, 40.0)
     expect(down).to_have_attribute("value", "30")
     page.mouse.up()
-    expect(page.locator("#receipt-speed")).to_contain_text("Speed is 40 by now.")
+    expect(page.locator("#receipt-speed")).to_contain_text("Speed is now 40.")
     assert len(node.heard(SET)) == before
 
 

@@ -264,7 +264,7 @@ def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> N
         assert rig.bench.line.timeouts == [LATE_S]
         rig.bench.line.queries[0][2].set_result(None)
         await rig.open()
-        assert "No news of this goal from the robot for 60 s" in str(rig.bench.shown.text)
+        assert "The robot has not reported on this goal for 60 s" in str(rig.bench.shown.text)
         assert rig.lock == ""
 
     run(tmp_path, test, "timed_out")

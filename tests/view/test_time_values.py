@@ -75,9 +75,9 @@ def test_an_age_counts_from_the_clock_at_the_last_message() -> None:
         (math.nan, {"format": "duration"}, "NaN s"),
         (0.0, {"format": "time"}, "no time set"),
         (0.0, {"format": "age"}, "no time set"),
-        (1e18, {"format": "time"}, "outside of the years 1000 to 9999"),
-        (-1e18, {"format": "age"}, "outside of the years 1000 to 9999"),
-        (math.nan, {"format": "time"}, "outside of the years 1000 to 9999"),
+        (1e18, {"format": "time"}, "outside the years 1000 to 9999"),
+        (-1e18, {"format": "age"}, "outside the years 1000 to 9999"),
+        (math.nan, {"format": "time"}, "outside the years 1000 to 9999"),
         (WALL * 1e9 - 3e9, {"format": "age", "scale": 1e-9}, "3 s"),
     ],
 )
@@ -137,4 +137,4 @@ def test_the_edges_of_what_is_written_are_dates() -> None:
     for at, year in ((EARLIEST, "1000"), (LATEST, "9999")):
         assert render(time_text("time", at, WALL)[0], "de").split()[0].endswith(year)
     for beyond in (EARLIEST - 1, LATEST + 1):
-        assert render(time_text("time", beyond, WALL)[0]) == "outside of the years 1000 to 9999"
+        assert render(time_text("time", beyond, WALL)[0]) == "outside the years 1000 to 9999"

@@ -83,7 +83,7 @@ CAMERAS: Final = (
         {"state": "unreadable", "note": say("camera_encoding", encoding="32FC1")},
     ),
     Example(
-        "none reaches this screen",
+        "no new picture",
         "camera",
         CAMERA,
         {"state": "live", "note": ""},
