@@ -2,9 +2,9 @@
 process, so that they take no time from presses and holds."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Collection
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
@@ -12,9 +12,8 @@ from typing import Final, TypeVar
 from app.audit.queries import Filter, OpenPress, Row, open_presses, rows
 from app.audit.reader_main import ReadRequest, parse_rows
 from app.audit.reader_process import ReaderProcess
-from app.audit.reader_slots import ReaderSlots
-from app.errors import LogError, SearchTooLong
-from app.i18n import ENGLISH, say
+from app.errors import LogError, SearchTooLong, TooMany
+from app.i18n import ENGLISH, TextLike, say
 
 MAX_SEARCHES: Final = 2  # at a time
 THREADS: Final = MAX_SEARCHES + 1  # one for the server's own reads
@@ -23,6 +22,27 @@ SEARCH_AGAIN_S: Final = 2
 EXPORT_AGAIN_S: Final = 10
 
 Read = TypeVar("Read")
+
+
+class ReaderSlots:
+    """A semaphore that rejects instead of waiting. Used on the event loop only."""
+
+    def __init__(self, most: int, retry_after_s: int, message: TextLike) -> None:
+        """`message` and `retry_after_s` are for a client that is rejected."""
+        self._free = most
+        self._retry_after_s = retry_after_s
+        self._message = message
+
+    @contextmanager
+    def slot(self) -> Iterator[None]:
+        """Takes a slot within the block; TooMany if none is free."""
+        if not self._free:
+            raise TooMany(self._message, self._retry_after_s)
+        self._free -= 1
+        try:
+            yield
+        finally:
+            self._free += 1
 
 
 class Readers:

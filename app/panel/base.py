@@ -1,4 +1,4 @@
-"""Base class and field types of the descriptions: checked names, ids, QoS."""
+"""Base class and field types of the descriptions: checked names, ids, icons, QoS."""
 
 import re
 from collections.abc import Mapping
@@ -21,9 +21,11 @@ from pydantic import (
 
 from app.errors import InterfaceError
 from app.i18n import ENGLISH, PanelText, TextLike, render, say
+from app.icons import icons
 from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import ACTION_TYPE, GLOBAL, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import format_value
+from app.panel.faults.wording import closest_name
 from app.pictures import picture_files
 
 
@@ -281,3 +283,14 @@ class HasTopic(Protocol):
     def type(self) -> str: ...
     @property
     def qos(self) -> TopicQos: ...
+
+
+def _check_icon(name: str) -> str:
+    if name in icons():
+        return name
+    meant = closest_name(name.lower(), icons())
+    hint = f'did you mean "{meant}"?' if meant else "docs/reference/icons.md lists them"
+    raise ValueError(f"{format_value(name)} is not one of the shipped icons: {hint}")
+
+
+Icon = Annotated[str, AfterValidator(_check_icon)]

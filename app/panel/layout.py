@@ -7,8 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.interfaces.validation import format_value
-from app.panel.base import Description, File, Id, Label, Span
-from app.panel.icons import Icon
+from app.panel.base import Description, File, Icon, Id, Label, Span
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import Widget
 

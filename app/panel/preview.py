@@ -1,16 +1,20 @@
 """Previews of the messages of each press: with default values of fields that are not given, and with
-the ids of inputs in place of their values."""
+the ids of inputs in place of their values; as lines of text, similar to `ros2 topic echo`."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
-from app.errors import Remark
+from app.errors import FieldError, Remark
 from app.interfaces import Interfaces, Type
 from app.panel.constants import resolve_names
-from app.panel.message_text import Comments, message_lines
 from app.panel.model import Panel
-from app.panel.template import NOW
+from app.panel.template import NOW, placeholders
 from app.panel.widgets.families import Command, Input
+
+MAX_EQUAL_WRITTEN: Final = 9  # elements of a list of equal values
+Comments = Mapping[str, str]  # by input ids ("speed"), and by places of fields (".poses[0].x")
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
@@ -50,3 +54,57 @@ def complete_value(given: Any, kind: Type, interfaces: Interfaces) -> Any:
         }
     number = isinstance(given, int) and not isinstance(given, bool)
     return float(given) if number and kind.name.startswith("float") else given
+
+
+def message_lines(fields: Mapping[str, Any], comments: Comments, place: str = "") -> Iterator[str]:
+    """A line for each field, with comments about inputs and fields."""
+    for name, value in fields.items():
+        yield from _field_lines(name, value, comments, f"{place}.{name}")
+
+
+def _field_lines(name: str, value: Any, comments: Comments, place: str) -> Iterator[str]:
+    if isinstance(value, Mapping) and value:
+        yield f"{name}:"
+        yield from (f"  {line}" for line in message_lines(value, comments, place))
+    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        yield f"{name}:"
+        for index, item in enumerate(value):
+            yield from _item_lines(item, comments, f"{place}[{index}]")
+    else:
+        about = _comment(value, comments, place)
+        yield f"{name}: {_format(value)}{f'  # {about}' if about else ''}"
+
+
+def _item_lines(value: Any, comments: Comments, place: str) -> Iterator[str]:
+    """An element of a list of tables: its first line has a dash."""
+    if not isinstance(value, Mapping) or not value:
+        yield f"- {_format(value)}"
+        return
+    for number, line in enumerate(message_lines(value, comments, place)):
+        yield f"  {line}" if number else f"- {line}"
+
+
+def _comment(value: Any, comments: Comments, place: str) -> str:
+    try:
+        names = [name for _, name in placeholders(value)]
+    except FieldError:  # braces in a value that an input gave
+        names = []
+    about = [comments[key] for key in (place, *dict.fromkeys(names)) if key in comments]
+    return "; ".join([*about, *([f"{len(value)} of them"] if _all_equal(value) else [])])
+
+
+def _all_equal(value: Any) -> bool:
+    return (
+        isinstance(value, Sequence) and len(value) > MAX_EQUAL_WRITTEN and len({*map(str, value)}) == 1
+    )
+
+
+def _format(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    if isinstance(value, list):
+        shown = [*map(_format, value[:2]), "…"] if _all_equal(value) else map(_format, value)
+        return f"[{', '.join(shown)}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | dict) else str(value)

@@ -1,6 +1,13 @@
-"""Formats and compares values of a panel file."""
+"""Formats and compares values of a panel file; lists as text: elements separated by commas. An element
+with a comma, a quote or enclosing spaces is quoted; a quote inside is doubled."""
 
-from typing import Any
+import re
+from collections.abc import Iterable
+from typing import Any, Final
+
+# No two parts match the same text: a long text causes no backtracking.
+_ELEMENT: Final = re.compile(r'(?:\s*"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>[^",]*))(?P<end>,|\Z)')
+_PLAIN: Final = re.compile(r'[^\s",](?:[^",]*[^\s",])?')
 
 
 def number_text(number: float) -> str:
@@ -11,3 +18,28 @@ def number_text(number: float) -> str:
 def same_value(one: Any, other: Any) -> bool:
     """Whether two values are equal in TOML and JSON: 1 equals 1.0, but not true."""
     return one == other and isinstance(one, bool) == isinstance(other, bool)
+
+
+def join_list(texts: Iterable[str]) -> str:
+    """The elements joined to one text."""
+    return ", ".join(texts)
+
+
+def quote_element(text: str) -> str:
+    """A text as an element, quoted if necessary."""
+    return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'
+
+
+def split_list(text: str) -> list[str]:
+    """The elements of a text; ValueError for an empty element without quotes, or unmatched quotes."""
+    found: list[str] = []
+    at = 0
+    more = bool(text.strip())
+    while more:
+        match = _ELEMENT.match(text, at)
+        plain, given = ("", None) if match is None else match.group("plain", "quoted")
+        if match is None or (given is None and not plain.strip()):
+            raise ValueError(f"the {len(found) + 1}. of them is none")
+        found.append(plain.strip() if given is None else given.replace('""', '"'))
+        at, more = match.end(), match["end"] == ","
+    return found

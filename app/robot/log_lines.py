@@ -2,7 +2,7 @@
 their first reading."""
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from heapq import merge
 from typing import Final, NamedTuple
 
@@ -10,7 +10,7 @@ from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import Interfaces
 from app.printable import readable
-from app.robot.sample import Buffer
+from app.robot.sample import Buffer, Sample
 
 LOG_TYPE: Final = "rcl_interfaces/msg/Log"
 KEPT_BYTES: Final = 4_000_000
@@ -148,3 +148,18 @@ class LogLines:
 def _is_severe(data: bytes) -> bool:
     """Whether an encoded line is a warning or worse: its level is behind the header and the stamp."""
     return len(data) > LEVEL_AT and data[LEVEL_AT] >= SEVERE
+
+
+class LogListener:
+    """The `SampleListener` of a robot's logs: adds the samples of each to its lines."""
+
+    def __init__(self, lines: Mapping[str, LogLines]) -> None:
+        self._lines = lines  # by key
+
+    @property
+    def keys(self) -> frozenset[str]:
+        return frozenset(self._lines)
+
+    def record_sample(self, key: str, sample: Sample) -> None:
+        """A line was received."""
+        self._lines[key].add(sample.payload)

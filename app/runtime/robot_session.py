@@ -23,12 +23,12 @@ from app.panel.widgets.trend import trends_of
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import link_verdict
 from app.permission.verdict import Verdict, locked
+from app.robot.log_lines import LogListener
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.runtime.frames import Frames
 from app.runtime.ingest import Ingest
-from app.runtime.log_listener import LogListener
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
@@ -132,7 +132,7 @@ class RobotSession:
             self._commands.parameters,
             [
                 self.robot.table_entries,
-                LogListener(self.robot),
+                LogListener(self.robot.log_lines),
                 *([self._recorder] if self._recorder else []),
                 *self._trends,
             ],

@@ -13,8 +13,8 @@ from playwright.sync_api import Page, expect
 from app.commands.parameters.values import check_value
 from app.errors import InputError
 from app.i18n import ENGLISH
-from app.panel.list_text import join_list, quote_element, split_list
 from app.panel.number_range import Range
+from app.panel.values import join_list, quote_element, split_list
 from app.panel.widgets.parameter import Parameter
 from app.robot.parameter_state import ParameterState
 from app.view.parameter_values import parameter

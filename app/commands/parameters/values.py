@@ -10,7 +10,7 @@ from app.i18n.typed_numbers import read_numbers
 from app.i18n.values import each_language
 from app.interfaces import INTEGER_RANGES
 from app.interfaces.validation import format_value
-from app.panel.list_text import split_list
+from app.panel.values import split_list
 from app.panel.widgets.numbers import no_number
 from app.panel.widgets.parameter import MAX_TEXT, Parameter, Scalar, Value
 from app.robot.parameter_state import (

@@ -11,9 +11,8 @@ from app.panel.constants import NUMBERS, mismatch_at
 from app.panel.demo import DemoEntry
 from app.panel.faults.places import place_of
 from app.panel.faults.wording import closest_name, list_names
-from app.panel.list_text import join_list
 from app.panel.model import Panel
-from app.panel.values import number_text
+from app.panel.values import join_list, number_text
 from app.panel.widgets.parameter import Parameter, is_valid_value
 from app.panel.widgets.service_action import ServerCommand
 

@@ -20,6 +20,7 @@ from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
     FieldPath,
+    Icon,
     Id,
     Interlocks,
     Label,
@@ -32,7 +33,6 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults
 from app.panel.faults.wording import list_names
-from app.panel.icons import Icon
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
 
 

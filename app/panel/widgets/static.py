@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.errors import Fault
-from app.panel.base import Id
+from app.panel.base import Icon, Id
 from app.panel.faults.wording import list_names
-from app.panel.icons import Icon
 from app.panel.widgets.families import BaseWidget, CheckContext
 from app.pictures import PICTURE
 

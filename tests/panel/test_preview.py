@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from app.interfaces import Type
-from app.panel.message_text import message_lines
-from app.panel.preview import complete_value
+from app.panel.preview import complete_value, message_lines
 from tests.support.builders import INTERFACES
 
 COVARIANT = "geometry_msgs/msg/PoseWithCovariance"
