@@ -107,7 +107,7 @@ class TrendDisk:
         """Writes what is due; waits for `STOP_TIMEOUT_S` at most."""
         if self._timer is not None:
             self._timer.cancel()
-        self._submit()
+        self._submit(everything=True)
         self._queue.put(None)
         await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
         if self._thread.is_alive():
@@ -118,8 +118,9 @@ class TrendDisk:
         if not self._busy:
             self._submit()
 
-    def _submit(self) -> None:
-        """Gives the thread what is due."""
+    def _submit(self, everything: bool = False) -> None:
+        """Gives the thread what is due: of each level `MOST_ROWS`, or everything."""
+        most = None if everything else MOST_ROWS
         monotonic, wall = time.monotonic(), time.time()
         rows: dict[FieldName, dict[int, list[Bucket]]] = {}
         newest: dict[int, float] = {}
@@ -128,11 +129,11 @@ class TrendDisk:
             one.history.set_clock(monotonic, wall)
             for level in one.field.levels:
                 since = self._saved.get(id(level), one.history.start)
-                due = list(islice(level.since(since), MOST_ROWS))
+                due = list(islice(level.since(since), most))
                 if due:
                     newest[id(level)] = due[-1].at
                     rows.setdefault(one.name, {})[int(level.width)] = _by_wall_clock(due, one.history)
-                    more = more or len(due) == MOST_ROWS
+                    more = more or len(due) == most
         if rows:
             self._busy, self._more = True, more
             self._queue.put(lambda: self._write(rows, newest, wall))

@@ -72,11 +72,11 @@ export function mark(input) {
   input.toggleAttribute("data-unread", isWrong && problem.startsWith("no"));
 }
 
-// One step up or down, and never beyond a limit.
+// One step up or down, and never beyond a limit. An input without a step has those of its buttons, from 0 on.
 export function step(input, times, size) {
-  const { min, max, isWhole } = limitsOf(input);
+  const { min, max, step: own, isWhole } = limitsOf(input);
   const plain = input.type === "range" ? input.value : readPlain(input.value, isWhole);
   if (plain === null) return input.value.trim() ? undefined : enter(input, min || "0");
-  const next = stepped(plain, times, min || "0", size, isWhole);
+  const next = stepped(plain, times, (own && min) || "0", size, isWhole);
   enter(input, min && isLess(next, min) ? min : max && isLess(max, next) ? max : next);
 }

@@ -1,18 +1,19 @@
 """How a page starts: with what browsers say or lack, and locked where a part of it is missing."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Page, Request, Route, expect
+from playwright.sync_api import Browser, Error, Page, Request, Route, expect
 
 from app.i18n import render, say
 from app.i18n.catalogue import files
 from app.web.language import COOKIE
 from tests.support.browser.browsers import opened
 from tests.support.browser.pages import HIDE
-from tests.support.parts import ROOT, Server
+from tests.support.parts import ROOT, Server, until
 
 THROWS: Final = 'get() { throw new DOMException("denied", "SecurityError"); }, configurable: true'
 NO_STORAGE: Final = "".join(
@@ -131,6 +132,27 @@ def is_locked(page: Page) -> None:
         expect(widget).to_have_attribute("data-state", "old")
 
 
+# Returns false on a page that has just been loaded again, and is not locked yet.
+PRESS_ALL: Final = """async () => {
+  if (!("locked" in document.body.dataset)) return false;
+  const form = document.querySelector("form.page");
+  form.requestSubmit();
+  for (const button of form.querySelectorAll("[type=submit]")) {
+    button.disabled = false;
+    await new Promise((done) => setTimeout(done)); // as a later script does it
+    button.click();
+  }
+  return true;
+}"""
+
+
+def presses_all_buttons(page: Page) -> bool:
+    """Whether all buttons of a locked page were pressed; the page may be loaded again at any moment."""
+    with suppress(Error):
+        return bool(page.evaluate(PRESS_ALL))
+    return False
+
+
 def publish(page: Page) -> None:
     page.get_by_label("Message").fill("once")
     page.get_by_role("button", name="Publish", exact=True).click()
@@ -160,10 +182,7 @@ def test_a_page_whose_script_has_a_fault_is_locked_and_presses_nothing(
         answer(tab, script, fault)
         tab.goto(f"{demo.url}/pages/cell")
         is_locked(tab)
-        tab.evaluate("document.querySelector('form.page').requestSubmit()")
-        for button in tab.locator("form.page [type=submit]").all():
-            button.evaluate("(button) => { button.disabled = false; }")
-            button.evaluate("(button) => button.click()")
+        until(lambda: presses_all_buttons(tab), "the locked page is pressed")
         is_locked(tab)
         assert posts == []
         tab.unroute_all()
@@ -209,8 +228,8 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
         assert kept_timers(tab) == [pause_s]
         with tab.expect_navigation():
             end_timer(tab, pause_s)
-    tab.unroute_all()
     is_locked(tab)
+    tab.unroute_all()
     with tab.expect_navigation():
         end_timer(tab, PAUSES_S[-1])
     expect(tab.locator("html[data-floor]")).to_be_attached()

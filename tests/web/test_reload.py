@@ -17,7 +17,18 @@ from uvicorn.supervisors.watchfilesreload import FileFilter
 from tests.support.parts import ENOUGH_S, ROOT, Server
 
 FOLDERS = ("app", "templates", "static")
-PATTERNS = ("*.toml", "*.json5", "*.html", "*.css", "*.js", "*.po", "*.msg", "*.srv", "*.action")
+PATTERNS = (
+    "*.toml",
+    "*.json",
+    "*.json5",
+    "*.html",
+    "*.css",
+    "*.js",
+    "*.po",
+    "*.msg",
+    "*.srv",
+    "*.action",
+)
 RELOAD = ["--reload", *(f"--reload-dir={name}" for name in FOLDERS)]
 RELOAD += [f"--reload-include={pattern}" for pattern in PATTERNS]
 NO_SOURCES = {"", ".pyc", ".svg"}
@@ -132,7 +143,7 @@ def test_an_open_browser_shows_what_is_saved_or_its_fault(checkout: Checkout, pa
 
 def check_panels_fault(checkout: Checkout, page: Page) -> None:
     """The fault is a page that says where, and is asked for again until it is mended."""
-    fault = 'page[0].group[0].widget[1].kind "last_heard", line 43: unknown kind "readuot"'
+    fault = 'page[0].group[0].widget[1].kind "last_heard", line 44: unknown kind "readuot"'
     expect(page.locator("li").first).to_contain_text(fault)
     expect(page.locator("h1")).to_contain_text("panel.toml can't be used:")
     answer = checkout.server.http.get("/pages/operation")

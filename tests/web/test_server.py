@@ -423,7 +423,7 @@ def test_a_faulty_panel_stops_the_start_with_its_places(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode != 0
-    assert 'page[0].group[0].widget[2].kind "message", line 51: unknown kind "txt"' in done.stderr
+    assert 'page[0].group[0].widget[2].kind "message", line 52: unknown kind "txt"' in done.stderr
     assert "Traceback" not in done.stderr
 
 
