@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from typing import Final
 
 from fastapi import Depends, FastAPI
@@ -126,12 +127,20 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     for routes in (*ROBOT_ROUTES, static, health, display, description):
         app.include_router(routes.router)
     if dev:
-        from app.web.routes import gallery
-
-        app.include_router(gallery.router)
+        _add_gallery(app)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
     for routes in ROBOT_ROUTES:
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
+
+
+def _add_gallery(app: FastAPI) -> None:
+    """The gallery is a part of the checkout only, not of the installed package."""
+    if find_spec("app.web.routes.gallery") is None:
+        log.info("/gallery is not in the installed package: `make dev` in a checkout has it")
+        return
+    from app.web.routes import gallery
+
+    app.include_router(gallery.router)
 
 
 @asynccontextmanager

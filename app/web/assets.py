@@ -28,7 +28,8 @@ OF_FAMILIES: Final[Mapping[str, tuple[type[BaseWidget], ...]]] = {
     "entries": (Input, Parameter),
     "marks": (Gauge, Joints),
 }
-OWN_PAGES: Final = ("gallery", "log")
+OWN_PAGES: Final = ("log",)
+GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
     ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
@@ -110,6 +111,8 @@ def load_assets(
     files = {"kiosk.css": _with_styles(sheet, styles)}
     of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}
     apart = {name: static / "css" / f"{name}.css" for name in (*OWN_PAGES, LATER)}
+    if (gallery := static / "css" / f"{GALLERY}.css").exists():
+        apart[GALLERY] = gallery
     for name, file in (apart | of_kinds).items():
         files[f"{name}.css"] = asset(file.read_bytes(), ".css")
     scripts = static / "js"

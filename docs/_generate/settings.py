@@ -31,7 +31,7 @@ ABOUT: Final = {
     "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "
-        "`/gallery` shows each widget in each state.",
+        "in a checkout `/gallery` shows each widget in each state.",
         "off",
     ),
 }

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from zipfile import ZipFile
 
 import pytest
 from ruamel.yaml import YAML
@@ -171,6 +172,23 @@ def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: P
         assert "No connection to the robot" in live.widget("operation")["reason"]
     finally:
         live.end()
+
+
+def test_a_wheel_has_no_gallery_and_says_so_in_development(
+    wheel: Path, machine: Machine, tmp_path: Path
+) -> None:
+    names = ZipFile(wheel).namelist()
+    assert [name for name in names if "gallery" in name] == []
+    assert {"app/templates/log.html", "app/static/css/log.css", "app/web/routes/log_lines.py"} <= {
+        *names
+    }
+    mine = Server(tmp_path, python=machine.python, KIOSK_MODE="demo", KIOSK_DEV="1")
+    try:
+        assert mine.http.get("/").status_code == 200
+        assert mine.http.get("/gallery").status_code == 404
+        assert "/gallery is not in the installed package" in mine.process.text
+    finally:
+        mine.end()
 
 
 def test_a_panel_is_served_by_its_command_and_its_data_is_backed_up(machine: Machine) -> None:

@@ -85,7 +85,7 @@ def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
-    assert set(files) == {"kiosk.css", "gallery.css", "log.css", "keypad.css", "main.js", "press.js"}
+    assert set(files) == {"kiosk.css", "log.css", "keypad.css", "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
     assert files["log.css"].content == b"\n.log a :is(b,i){top:0;}"
 
