@@ -57,15 +57,23 @@ class RobotState:
         own_zid: str = "",
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
+        *,
+        endpoints: tuple[str, ...] = (),
+        on_late_reading: Callable[[str, Reading], None] = lambda _key, _reading: None,
+        on_entries_decoded: Callable[[str], None] = lambda _key: None,
     ) -> None:
         """`own_zid` is that of the panel's session. `entry` is this robot's entry if the panel has
-        several robots. `slices` is shared by everything that is decoded on one event loop."""
+        several robots. `slices` is shared by everything that is decoded on one event loop. `endpoints`
+        are the robot's, as Zenoh names them.
+
+        `on_late_reading` is called with (key, reading) of a message that took more than one turn to
+        decode, `on_entries_decoded` with the key of a topic of which the entries in tables changed."""
         self.dialect = dialect
         self.title: TextLike = entry.name if entry else ""
         self.name = str(self.title)  # for the server's log
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
-        self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them
+        self.endpoints = endpoints
         self.settled_at = math.inf  # monotonic seconds: then a new bridge has set up its routes
         self._keys: dict[str, str] = {}  # ROS name → key
         self._shared = {topic: possible_keys(topic, self.namespace) for topic in SHARED_TOPICS}
@@ -94,13 +102,12 @@ class RobotState:
         self.presence = EndpointPresence(needed, self.key)
         self.undecodable: Counter[str] = Counter()
         self.slices = slices or Slices()
-        # Called with (key, reading) of a message that took more than one turn to decode.
-        self.on_late_reading: Callable[[str, Reading], None] = lambda _key, _reading: None
+        self._on_late_reading = on_late_reading
         self._interfaces = interfaces
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
-        self.table_entries = TableEntries(panel, interfaces, self.key, self.slices)
+        self.table_entries = TableEntries(panel, interfaces, self.key, self.slices, on_entries_decoded)
         self.log_lines = {
             key: lines
             for topic, keep in panel.logs().items()
@@ -123,13 +130,10 @@ class RobotState:
                 self.slices,
                 lossless=topic in lossless,
                 on_unreadable=partial(self.count_unreadable, key),
-                on_late_reading=partial(self._notify_late_reading, key),
+                on_late_reading=partial(self._on_late_reading, key),
                 keyed=[path for path in dict.fromkeys(paths) if has_key(path)],
             )
             yield key, made
-
-    def _notify_late_reading(self, key: str, reading: Reading) -> None:
-        self.on_late_reading(key, reading)
 
     def key(self, topic: str) -> str:
         """The key of a topic or service of this robot, see `key_of`."""

@@ -94,12 +94,18 @@ class TableEntries:
     """The entries of one robot's tables; a `SampleListener`. Used on the event loop only."""
 
     def __init__(
-        self, panel: Panel, interfaces: Interfaces, key_of: Callable[[str], str], slices: Slices
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        key_of: Callable[[str], str],
+        slices: Slices,
+        on_decoded: Callable[[str], None],
     ) -> None:
-        """`key_of` returns the key of a topic."""
+        """`key_of` returns the key of a topic; `on_decoded` is called with it after a change of its
+        entries."""
         self._slices = slices
         self._scheduled = False
-        self.on_decoded: Callable[[str], None] = lambda _key: None  # called with the topic's key
+        self._on_decoded = on_decoded
         self._tables = {
             w.id: _Entries(w, interfaces.row_reader(w.type, w.field, w.own_fields, w.entries_read))
             for w in panel.displays
@@ -130,6 +136,6 @@ class TableEntries:
             for one in pending:
                 one.decode_one(self._slices, until)
             if before != [one.shown for one in pending]:
-                self.on_decoded(key)
+                self._on_decoded(key)
         self._scheduled = any(one.is_pending for one in self._tables.values())
         return not self._scheduled

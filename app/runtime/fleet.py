@@ -15,7 +15,8 @@ from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.runtime.robot_access import ROBOT_ACCESS
-from app.runtime.robot_session import RobotSession, ServerParts
+from app.runtime.robot_session import RobotSession
+from app.runtime.wiring import ServerParts, wire_session
 from app.transport.zenoh_config import Config
 from app.view.link_status import Lamp
 
@@ -46,7 +47,7 @@ class Fleet:
         server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated, root_path)
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]
-            self._sessions[entry.id if entry else None] = RobotSession(
+            self._sessions[entry.id if entry else None] = wire_session(
                 server, config_of(entry), access, entry=entry, others=self
             )
 

@@ -77,7 +77,7 @@ class Feed:
         self._key = context.robot.key(topic)
         self._interfaces = context.interfaces
         self._link = context.link
-        self._changed = context.changed
+        self._changed = context.signals.changed.emit
         self._update_tokens = update_tokens
         self._loop = asyncio.get_running_loop()
         self._viewers = ClientPlaces(VIEWERS)

@@ -1,7 +1,6 @@
 """Wires the commands of one robot: presses, holds and their trackers."""
 
 import asyncio
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.audit.press_record import PressLog
@@ -31,11 +30,9 @@ class RobotCommands:
         peer: Peer,
         press_log: PressLog,
         recorder: "Recorder | None",
-        ingest: Callable[[], None],
     ) -> None:
-        """`ingest` applies what has arrived from the robot, before each permission check."""
         panel, interfaces, robot, link = context.panel, context.interfaces, context.robot, context.link
-        changed = context.changed
+        changed = context.signals.changed.emit
         self.calls = ServiceCalls(interfaces, robot, link, changed)
         self.actions = GoalTracker(interfaces, robot, link, changed)
         self.confirmations = Confirmations(robot, changed)
@@ -49,7 +46,7 @@ class RobotCommands:
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             flushed=peer.flushed,
         )
-        arrivals = Arrivals(ingest, lambda: link.has_immediate)
+        arrivals = Arrivals(context.signals.judging.emit, lambda: link.has_immediate)
         judge = PressJudge(panel, robot, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(

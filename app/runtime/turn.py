@@ -32,7 +32,7 @@ class Turn:
     ) -> None:
         self._link = context.link
         self._robot = context.robot
-        self._renew = context.renew
+        self._link_lost = context.signals.link_lost
         self._peer = peer
         self._ingest = ingest
         self._commands = commands
@@ -70,7 +70,7 @@ class Turn:
         came_up = not self._robot.link_up and changes.link_up
         if self._robot.link_up and not changes.link_up:
             self._log.warning("Zenoh link lost")
-            self._renew()
+            self._link_lost.emit()
             return
         if came_up:
             self._robot.link_up = True

@@ -37,7 +37,7 @@ class GraphMembership:
     """Holds the panel's tokens while there is a bridge, and queries the bridges' admin space."""
 
     def __init__(self, context: RobotContext) -> None:
-        self._context = context
+        self._signals = context.signals
         self._panel = context.panel
         self._robot = context.robot
         self._log = RobotLog(log, self._robot.name)
@@ -115,7 +115,7 @@ class GraphMembership:
             await self._publishers.update()
         self._robot.settled_at = time.monotonic()
         self._log.info("joined the robot's topics")
-        self._context.graph_read()
+        self._signals.graph_read.emit()
 
     async def _settle(self) -> None:
         """Waits until every subscriber in the graph is matched: then the routes carry the first
@@ -146,7 +146,7 @@ class GraphMembership:
                     return
             except LinkError as error:
                 self._log.warning("%s", error)
-            self._context.changed()
+            self._signals.changed.emit()
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _ask_regularly(self) -> None:
@@ -163,7 +163,7 @@ class GraphMembership:
                         self._reopen_session()
                 except LinkError as error:
                     self._log.warning("%s", error)
-                self._context.graph_read()
+                self._signals.graph_read.emit()
 
     def _reopen_session(self) -> None:
         """Opens a new session if a bridge does not read a subscribed topic: for a new session it
@@ -174,7 +174,7 @@ class GraphMembership:
         if self._unrouted >= UNROUTED_ALLOWED:
             self._unrouted = 0
             self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
-            self._context.reopen()
+            self._signals.route_lost.emit()
 
     async def _pause(self, longest_s: float) -> None:
         """Waits until the next query is due: after `longest_s`, or shortly after a change of the

@@ -20,7 +20,7 @@ class BridgePeer:
     def __init__(self, context: RobotContext) -> None:
         self._log = RobotLog(log, context.robot.name)
         self._membership = GraphMembership(context)
-        self._liveness = BridgeLiveness(context.robot, context.link, context.changed)
+        self._liveness = BridgeLiveness(context.robot, context.link, context.signals.changed.emit)
         self._readiness = CoalescedQuery(lambda: self._membership.answered(WITHIN_S))
 
     def start(self) -> None:

@@ -32,7 +32,7 @@ class PublisherWatch:
     def __init__(self, context: RobotContext, bridges: BridgeAdmin, log: RobotLog) -> None:
         self._robot = context.robot
         self._link = context.link
-        self._changed = context.changed
+        self._changed = context.signals.changed.emit
         self._bridges = bridges
         self._log = log
         interlocks = context.panel.interlocks

@@ -8,6 +8,7 @@ from app.dialect.dialect import Dialect
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.transport.robot_signals import RobotSignals
 from app.transport.zenoh_session import ZenohSession
 
 
@@ -43,20 +44,15 @@ class Peer(Protocol):
         """Whether it answers a query now. Takes a second at most."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RobotContext:
-    """One robot of a panel and the link to it. Call `changed` after a change of what permission or the
-    view depends on, `graph_read` after the nodes of its graph were read. `renew` opens a new session
-    after the link was lost, `reopen` while it is up."""
+    """One robot of a panel, the link to it, and what its parts signal to each other."""
 
     panel: Panel
     interfaces: Interfaces
     robot: RobotState
     link: ZenohSession
-    changed: Callable[[], None]
-    graph_read: Callable[[], None]
-    renew: Callable[[], None]
-    reopen: Callable[[], None]
+    signals: RobotSignals
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from app.audit import NullLog
 from app.commands.receipts import MAX_FINAL_CHECKS, Receipt
 from app.dialect.bridge_dialect import server_token
 from app.robot.state import RobotState
-from app.runtime.robot_session import RobotSession, ServerParts
+from app.runtime.wiring import ServerParts, wire_session
 from app.transport.bridge_peer import BRIDGE as BRIDGES
 from app.transport.inbox import Inbox
 from app.transport.zenoh_config import config_to
@@ -163,7 +163,7 @@ class Recorded:
 
 async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
     """Presses as fast as it can, one after the other."""
-    kiosk = RobotSession(
+    kiosk = wire_session(
         ServerParts(small_panel(), "revision", NullLog()), config_to(endpoint), BRIDGES
     )
     await kiosk.start()

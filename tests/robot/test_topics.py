@@ -61,11 +61,13 @@ class Cell:
 
     def __init__(self, *widgets: Table, interlock: Table = LEVEL, path: str = LEVEL["field"]) -> None:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
-        self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK, None, Slices(Clock()))
+        slices, later = Slices(Clock()), self._read_later
+        self.robot = RobotState(
+            self.panel, INTERFACES, DIALECT, KIOSK, None, slices, on_late_reading=later
+        )
         self.robot.link_up, self.robot.settled_at = True, 0.0
         self.robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", True)
         self.read: list[tuple[str, Any]] = []
-        self.robot.on_late_reading = self._read_later
         self._seq = 0
         self._path = path
 

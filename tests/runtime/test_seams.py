@@ -22,7 +22,8 @@ from app.permission.principal import Principal
 from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
-from app.runtime.robot_session import RobotSession, ServerParts
+from app.runtime.robot_session import RobotSession
+from app.runtime.wiring import ServerParts, wire_session
 from app.simulator.in_process import in_process
 from app.transport import bridge_liveness
 from app.transport.bridge_peer import BRIDGE as BRIDGES
@@ -80,7 +81,7 @@ def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
 
 
 def session_of(panel: Panel, endpoint: str) -> RobotSession:
-    return RobotSession(ServerParts(panel, "r1", NullLog()), config_to(endpoint), BRIDGES)
+    return wire_session(ServerParts(panel, "r1", NullLog()), config_to(endpoint), BRIDGES)
 
 
 def taken(steps: Iterable[Updates], page: "Page") -> Updates:

@@ -13,7 +13,7 @@ from app.commands.holds.controller import HoldController
 from app.commands.holds.receipts import ActiveHold
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
-from app.runtime.robot_session import RobotSession, ServerParts
+from app.runtime.wiring import ServerParts, wire_session
 from app.transport.bridge_peer import BRIDGE as BRIDGES
 from app.transport.inbox import Inbox
 from app.transport.peer import RobotAccess
@@ -47,9 +47,9 @@ class Cell:
         self.order: list[str] = []
         self._monkeypatch = monkeypatch
         server = ServerParts(PANEL, "r1", NullLog())
-        self.session = RobotSession(server, config_to("tcp/127.0.0.1:1"), ACCESS)
+        self.session = wire_session(server, config_to("tcp/127.0.0.1:1"), ACCESS)
         self.inbox: Inbox = self.session.link._inbox
-        ingest = self.session._ingest
+        ingest = self.session.ingest
         self.inbox.expect(ingest.immediate, ingest.lossless, ingest.recorded)
         monkeypatch.setattr(self.session.link, "put", lambda *_: None)
         monkeypatch.setattr(self.session.link, "has_reader", lambda _: True)
@@ -64,7 +64,7 @@ class Cell:
         self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), None)
 
     def take(self) -> None:
-        self.session._turn.run()
+        self.session.turn.run()
 
     def hold(self, widget: str) -> None:
         inputs = HALF if widget == "jog" else {}
@@ -169,7 +169,7 @@ def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pyte
         cell = Cell(monkeypatch)
         press = asyncio.ensure_future(cell.session.presses.press("free", {"message": "on"}, "p", FROM))
         async with asyncio.timeout(20):
-            while not cell.session._commands.confirmations.is_awaited("heard"):
+            while not cell.session.commands.confirmations.is_awaited("heard"):
                 await asyncio.sleep(0.001)
         cell.note_the_order()
         cell.inbox.put("heard", INTERFACES.encode(TEXT, {"data": "on"}), None)

@@ -85,9 +85,9 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock, **more)
 
 
-def robot_there(panel: Panel) -> RobotState:
+def robot_there(panel: Panel, **callbacks: Any) -> RobotState:
     """A robot that commands can reach: link and bridge are up. It has not published yet."""
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, **callbacks)
     robot.link_up = True
     robot.settled_at = 0.0
     robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)

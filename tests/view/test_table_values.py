@@ -1,7 +1,7 @@
 """What a table shows: rows of the newest message, or the latest entry of each key; sorted, counted."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import pytest
@@ -43,9 +43,9 @@ def status(name: str, level: int = 0, **values: str) -> dict[str, Any]:
 class Robot:
     """A robot with the table, which hears messages one by one."""
 
-    def __init__(self, **more: Any) -> None:
+    def __init__(self, on_decoded: Callable[[str], None] = lambda _: None, /, **more: Any) -> None:
         self.panel: Panel = panel_of({**TABLE, **more})
-        self.state: RobotState = robot_there(self.panel)
+        self.state: RobotState = robot_there(self.panel, on_entries_decoded=on_decoded)
         self.seq = 0
 
     def says(self, *entries: Mapping[str, Any], at: float = NOW) -> None:
@@ -173,10 +173,9 @@ def test_what_is_kept_is_bounded() -> None:
 
 
 def test_messages_wait_in_a_bounded_queue_and_the_view_is_notified_when_they_are_decoded() -> None:
-    robot = Robot(key="name")
-    entries = robot.state.table_entries
     decoded: list[str] = []
-    entries.on_decoded = decoded.append
+    robot = Robot(decoded.append, key="name")
+    entries = robot.state.table_entries
 
     async def flood() -> None:
         for number in range(3 * MAX_QUEUED):

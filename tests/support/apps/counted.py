@@ -31,7 +31,7 @@ async def sizes(request: Request) -> dict[str, int]:
     text._rendered.cache_clear()  # it grows to its limit
     gc.collect()
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
-    wholes = (kiosk, kiosk._commands, kiosk.peer)
+    wholes = (kiosk, kiosk.context, kiosk.commands, kiosk.peer)
     held_by = [part for whole in wholes for part in vars(whole).values()]
     parts = [one for one in held_by if type(one).__module__.startswith("app.")]
     for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):

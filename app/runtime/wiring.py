@@ -1,0 +1,179 @@
+"""Wires a session with one robot: its signals first, then each part by its constructor."""
+
+import asyncio
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from app.audit.press_record import Log, PressLog
+from app.commands.control_acts import ControlActs
+from app.commands.press_context import PressGuard
+from app.interfaces import load_interfaces
+from app.interfaces.names import ROSOUT_TOPIC
+from app.panel.model import Panel, RobotEntry
+from app.panel.widgets.trend import trends_of
+from app.permission.control_authority import ControlAuthority
+from app.robot.log_lines import LogListener
+from app.robot.slices import Slices
+from app.robot.state import RobotState
+from app.ros_logging import RobotLog
+from app.runtime.frames import Frames
+from app.runtime.ingest import Ingest
+from app.runtime.renewal import Renewal
+from app.runtime.robot_commands import RobotCommands
+from app.runtime.robot_session import RobotSession, SessionRecorder
+from app.runtime.turn import Turn
+from app.transport.peer import RobotAccess, RobotContext
+from app.transport.robot_signals import RobotSignals
+from app.transport.rosout import Rosout
+from app.transport.zenoh_config import Config
+from app.transport.zenoh_session import ZenohSession
+from app.view.refresh import NoOtherRobots, OtherRobots, ViewRefresher, ViewSources
+
+if TYPE_CHECKING:
+    from app.recording import Recorder, Recordings
+    from app.trends.recorder import TrendRecorder
+
+log = logging.getLogger("kiosk")
+
+ALONE: Final = NoOtherRobots()
+
+
+@dataclass(frozen=True, slots=True)
+class ServerParts:
+    """The parts that all sessions share; `revision` is that of the page's files, `root_path` that below
+    which a proxy shows all pages."""
+
+    panel: Panel
+    revision: str
+    operators_log: Log
+    recordings: "Recordings | None" = None
+    slices: Slices | None = None
+    simulated: bool = False
+    root_path: str = ""
+
+
+def wire_session(
+    server: ServerParts,
+    config: Config,
+    access: RobotAccess,
+    *,
+    entry: RobotEntry | None = None,
+    others: OtherRobots = ALONE,
+) -> RobotSession:
+    """A session that has not been started. `access` is how the robot is reached. If the panel has
+    several robots, `entry` is this one and `others` gives access to all of them."""
+    panel, operators_log = server.panel, server.operators_log
+    context = _context(server, config, access, entry)
+    robot, link, signals = context.robot, context.link, context.signals
+    control = ControlAuthority(
+        panel.control,
+        robot.title,
+        log_line=RobotLog(log, robot.name).info,
+        on_hand_over=signals.handed_over.emit,
+    )
+    sources = ViewSources(control, operators_log, others, server.recordings, server.simulated)
+    refresher = ViewRefresher(panel, robot, server.revision, sources)
+    publisher = refresher.publisher
+    press_guard = PressGuard(publisher, control, operators_log, panel.press_expires_s, others.boots)
+    press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
+    peer = access.peer(context)
+    recorder = _recorder(server, context, entry)
+    recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
+    commands = RobotCommands(context, peer, press_log, recorder)
+    ingest = Ingest(
+        panel,
+        robot,
+        commands.actions,
+        commands.confirmations,
+        commands.parameters,
+        [robot.table_entries, LogListener(robot.log_lines), *recorders],
+    )
+    own_line = partial(_show_own_line, robot, refresher)
+    session = RobotSession(
+        context=context,
+        entry=entry,
+        base=server.root_path + (f"/robots/{entry.id}" if entry else ""),
+        operators_log=operators_log,
+        control=control,
+        control_acts=ControlActs(control, press_guard, press_log, robot.name, signals.changed.emit),
+        press_guard=press_guard,
+        press_log=press_log,
+        refresher=refresher,
+        peer=peer,
+        commands=commands,
+        ingest=ingest,
+        turn=Turn(context, peer, ingest, commands, refresher),
+        frames=Frames(context, partial(peer.on_graph_change, False)),
+        renewal=Renewal(link, robot),
+        rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),
+        recorders=recorders,
+    )
+    _connect(signals, session)
+    return session
+
+
+def _context(
+    server: ServerParts, config: Config, access: RobotAccess, entry: RobotEntry | None
+) -> RobotContext:
+    """The state of the robot and the link to it."""
+    panel, signals = server.panel, RobotSignals()
+    interfaces = load_interfaces(panel.distro, panel.interfaces)
+    link = ZenohSession(config, signals.arrived.emit, access.dialect)
+    robot = RobotState(
+        panel,
+        interfaces,
+        access.dialect,
+        link.zid,
+        entry,
+        server.slices,
+        endpoints=link.endpoints,
+        on_late_reading=signals.late_reading.emit,
+        on_entries_decoded=signals.entries_decoded.emit,
+    )
+    return RobotContext(panel, interfaces, robot, link, signals)
+
+
+def _connect(signals: RobotSignals, session: RobotSession) -> None:
+    turn, refresher = session.turn, session.refresher
+    signals.arrived.connect(turn.wake)
+    signals.judging.connect(turn.run)
+    signals.changed.connect(turn.changed)
+    signals.graph_read.connect(turn.on_graph_read)
+    signals.late_reading.connect(turn.run_late_reading)
+    signals.entries_decoded.connect(lambda key: refresher.refresh_values({key}))
+    signals.handed_over.connect(session.control_acts.log_hand_over)
+    signals.link_lost.connect(session.renew)
+    signals.route_lost.connect(session.reopen)
+
+
+def _recorder(
+    server: ServerParts, context: RobotContext, entry: RobotEntry | None
+) -> "Recorder | None":
+    """The recorder, if the panel file has `[record]`."""
+    panel, recordings = context.panel, server.recordings
+    if recordings is None or panel.record is None:
+        return None
+    from app.recording import Recorder
+
+    recordings.add_listener(context.signals.changed.emit)
+    name = entry.id if entry else ""
+    return Recorder(panel, panel.record, context.interfaces, context.robot, name, recordings)
+
+
+def _trend_recorders(context: RobotContext) -> "Iterator[TrendRecorder]":
+    """The recorder of what trends show, if the panel has one."""
+    if trends_of(context.panel):
+        from app.trends.recorder import TrendRecorder
+
+        yield TrendRecorder(context.panel, context.interfaces, context.robot)
+
+
+def _show_own_line(robot: RobotState, refresher: ViewRefresher, payload: bytes) -> None:
+    """The panel's own line in the robot's log: Zenoh does not bring it back."""
+    key = robot.key(ROSOUT_TOPIC)
+    if (lines := robot.log_lines.get(key)) is not None:
+        lines.add(payload)
+        refresher.refresh_values({key})

@@ -1,0 +1,55 @@
+"""A session is wired whole: each signal has a receiver before anything can be emitted."""
+
+import asyncio
+
+from app.audit import NullLog
+from app.runtime.robot_access import ROBOT_ACCESS
+from app.runtime.robot_session import RobotSession
+from app.runtime.wiring import ServerParts, wire_session
+from app.transport.robot_signals import Signal
+from app.transport.zenoh_config import config_to
+from tests.support.builders import small_panel
+
+
+def wired() -> RobotSession:
+    """A session that has not been started."""
+    panel = small_panel()
+    server = ServerParts(panel, "r1", NullLog())
+    return wire_session(server, config_to("tcp/127.0.0.1:1"), ROBOT_ACCESS[panel.dialect])
+
+
+def test_receivers_are_called_in_the_order_in_which_they_were_connected() -> None:
+    called: list[tuple[str, int]] = []
+    signal = Signal[[int]]()
+    signal.emit(1)
+    signal.connect(lambda number: called.append(("first", number)))
+    signal.connect(lambda number: called.append(("second", number)))
+    signal.emit(2)
+    assert called == [("first", 2), ("second", 2)]
+
+
+def test_each_signal_of_a_session_has_a_receiver() -> None:
+    async def scene() -> None:
+        signals = vars(wired().context.signals)
+        assert signals
+        assert [name for name, signal in signals.items() if not signal._receivers] == []
+
+    asyncio.run(scene())
+
+
+def test_a_lost_link_locks_everything_and_is_renewed() -> None:
+    """By signals alone: the graph is dropped, a new Zenoh session is opened."""
+
+    async def scene() -> None:
+        session = wired()
+        renewed: list[bool] = []
+        vars(session.link)["renew"] = lambda: renewed.append(True)
+        session.robot.link_up, session.robot.settled_at = True, 0.0
+        session.context.signals.link_lost.emit()
+        assert session.link_verdict.code == "no_link"
+        while not renewed:
+            await asyncio.sleep(0.01)
+        await session.renewal.stop()
+        assert renewed == [True]
+
+    asyncio.run(asyncio.wait_for(scene(), 20))
