@@ -39,12 +39,16 @@ class TokenBuckets:
         return bucket is None or self._refill(bucket) >= 1
 
     def take_token(self, key: Hashable) -> None:
-        """Takes a token; `has_token` must be true."""
+        """Takes a token. Without one the bucket owes it: it is refilled later."""
         bucket = self._buckets.setdefault(key, _Bucket(self._quota.burst, self._monotonic()))
         self._buckets.move_to_end(key)
         bucket.tokens = self._refill(bucket) - 1
         while len(self._buckets) > MAX_BUCKETS:
             self._buckets.popitem(last=False)
+
+    def __len__(self) -> int:
+        """The number of buckets that are kept."""
+        return len(self._buckets)
 
     def _refill(self, bucket: _Bucket) -> float:
         now, quota = self._monotonic(), self._quota

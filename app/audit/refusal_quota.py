@@ -1,36 +1,25 @@
 """Limits how many refusals get their own entries in the operator's log; the others are summarised.
 
 A client that floods the server with refused presses would otherwise push older entries out of the log,
-origin size is limited. There is a quota per browser, per address (a browser may drop its cookie) and in
+whose size is limited. There is a quota per browser, per address (a browser may drop its cookie) and in
 total. Presses that are sent do not count.
 """
 
 import time
-from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from app.audit.entry import Entry, Origin, new_entry
 from app.clock import format_time
 from app.i18n import render, say
+from app.rate_limit import Quota, TokenBuckets
 
 SUMMARY_INTERVAL_S: Final = 60.0  # from the first suppressed refusal to the summary entry
 MAX_BROWSERS: Final = 5  # with their own summary entry per interval; the others share one
-MAX_QUOTAS: Final = 500  # browsers and addresses
-
-
-@dataclass(frozen=True, slots=True)
-class Allowance:
-    """A quota: `burst` at once, then one more every `every_s` seconds."""
-
-    burst: float
-    every_s: float
-
-
-OF_BROWSER: Final = Allowance(60, 30.0)
-OF_ADDRESS: Final = Allowance(200, 15.0)
-OF_ALL: Final = Allowance(600, 10.0)
+OF_BROWSER: Final = Quota(60, per_s=1 / 30)
+OF_ADDRESS: Final = Quota(200, per_s=1 / 15)
+OF_ALL: Final = Quota(600, per_s=1 / 10)
 
 
 class HasOrigin(Protocol):
@@ -40,23 +29,6 @@ class HasOrigin(Protocol):
     def address(self) -> str: ...
     @property
     def browser(self) -> str: ...
-
-
-class _Balance:
-    """The rest of an allowance; may be negative. Times in monotonic seconds."""
-
-    def __init__(self, of: Allowance, now: float) -> None:
-        self._of = of
-        self._left = of.burst
-        self._at = now
-
-    def refill(self, now: float) -> float:
-        self._left = min(self._of.burst, self._left + (now - self._at) / self._of.every_s)
-        self._at = now
-        return self._left
-
-    def take(self, now: float) -> None:
-        self._left = self.refill(now) - 1
 
 
 @dataclass(slots=True)
@@ -77,28 +49,21 @@ class RefusalQuota:
         monotonic: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,
     ) -> None:
-        self._monotonic = monotonic
         self._wall = wall
-        self._all = _Balance(OF_ALL, monotonic())
-        self._balances: OrderedDict[tuple[str, ...], _Balance] = OrderedDict()
+        self._all = TokenBuckets(OF_ALL, monotonic)
+        self._browsers = TokenBuckets(OF_BROWSER, monotonic)
+        self._addresses = TokenBuckets(OF_ADDRESS, monotonic)
         self._suppressed: dict[tuple[str, str, bool], _Suppressed] = {}
         self.left_out = 0
 
     def allowed(self, origin: HasOrigin) -> bool:
         """Whether a refusal may have its own entry."""
-        now = self._monotonic()
-        known = (self._balances.get(key) for key in _keys(origin))
-        return all(left is None or left.refill(now) >= 1 for left in (self._all, *known))
+        return all(buckets.has_token(key) for buckets, key in self._buckets(origin))
 
     def count(self, origin: HasOrigin) -> None:
         """Counts a refusal with its own entry."""
-        now = self._monotonic()
-        self._all.take(now)
-        for key, of in zip(_keys(origin), (OF_BROWSER, OF_ADDRESS), strict=True):
-            self._balances.setdefault(key, _Balance(of, now)).take(now)
-            self._balances.move_to_end(key)
-        while len(self._balances) > MAX_QUOTAS:
-            self._balances.popitem(last=False)
+        for buckets, key in self._buckets(origin):
+            buckets.take_token(key)
 
     def suppress(self, origin: Origin, limited: bool = False) -> bool:
         """Counts a refusal without an entry; `limited`: it was over the rate limit. Returns whether it
@@ -116,9 +81,12 @@ class RefusalQuota:
         suppressed, self._suppressed = self._suppressed, {}
         return [_entry(one) for one in suppressed.values()]
 
-
-def _keys(origin: HasOrigin) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return (origin.address, origin.browser), (origin.address,)
+    def _buckets(self, origin: HasOrigin) -> tuple[tuple[TokenBuckets, Hashable], ...]:
+        return (
+            (self._all, ""),
+            (self._browsers, (origin.address, origin.browser)),
+            (self._addresses, origin.address),
+        )
 
 
 def _entry(suppressed: _Suppressed) -> Entry:

@@ -13,7 +13,6 @@ from app.audit.press_record import PressLog
 from app.audit.queries import rows
 from app.audit.refusal_quota import (
     MAX_BROWSERS,
-    MAX_QUOTAS,
     OF_ADDRESS,
     OF_ALL,
     OF_BROWSER,
@@ -25,6 +24,7 @@ from app.commands.press_context import PressContext
 from app.commands.presses import Presses
 from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
+from app.rate_limit import MAX_BUCKETS
 from app.robot.state import RobotState
 from tests.support.builders import (
     COUNT,
@@ -87,7 +87,7 @@ def counted() -> Counted:
 
 def test_a_browser_has_so_many_at_once_and_then_one_from_time_to_time(counted: Counted) -> None:
     assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
-    counted.now += 10 * OF_BROWSER.every_s
+    counted.now += 10 / OF_BROWSER.per_s
     assert counted.come(KIM, ENOUGH) == 10
     counted.now += 1e6
     assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
@@ -113,14 +113,14 @@ def test_all_together_have_a_bound(counted: Counted) -> None:
     for _ in range(day // 10):
         counted.now += 10
         entries += sum(counted.come(Origin(address=f"10.0.2.{number}"), 1) for number in range(20))
-    assert entries <= OF_ALL.burst + day / OF_ALL.every_s
+    assert entries <= OF_ALL.burst + day * OF_ALL.per_s
 
 
 def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
     for number in range(10_000):
-        counted.now += OF_ALL.every_s
+        counted.now += 1 / OF_ALL.per_s
         counted.come(Origin(address=f"10.1.{number}", browser="b"), 1)
-    assert len(counted.refusals._balances) == MAX_QUOTAS
+    assert len(counted.refusals._browsers) == MAX_BUCKETS
 
 
 def test_what_is_left_out_is_summed_up_by_browser_and_the_rest_together(counted: Counted) -> None:
