@@ -7,7 +7,7 @@ receipt, as a late service response does.
 import asyncio
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from app.i18n import TextLike, joined, number, say
 from app.panel.values import same_value
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.robot.command_status import CommandStatus, OnCorrection, Outcome
+from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
 
@@ -49,6 +50,12 @@ class Confirmations:
         self._log = RobotLog(log, robot.name)
         self._waiting: dict[str, list[_Waiting]] = {}
         self._latest: dict[str, str] = {}
+
+    def register(self, handlers: SampleHandlers, confirms: Iterable[Confirm]) -> None:
+        """Awaits readings of the topics of these confirmations from now on."""
+        for confirm in confirms:
+            for key in self._robot.possible_keys(confirm.topic):
+                handlers.await_readings(key, self.is_awaited)
 
     async def wait(
         self,

@@ -10,15 +10,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal, Protocol
 
-from app.commands.actions.goals import GoalTracker
-from app.commands.confirmations import Confirmations
-from app.commands.parameters.sync import ParameterSync
 from app.dialect.endpoint import Endpoint
-from app.interfaces import names
 from app.panel.model import Panel
-from app.panel.widgets.parameter import EVENTS
 from app.permission.interlocks import interlock_verdict
 from app.permission.verdict import Verdict
+from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
@@ -71,30 +67,22 @@ class Ingest:
         self,
         panel: Panel,
         robot: RobotState,
-        actions: GoalTracker,
-        confirmations: Confirmations,
-        parameters: ParameterSync,
+        handlers: SampleHandlers,
         listeners: Collection[SampleListener] = (),
     ) -> None:
         self._robot = robot
-        self._actions = actions
-        self._confirmations = confirmations
-        self._parameters = parameters
+        self._handlers = handlers
         self._log = RobotLog(log, robot.name)
-        goals = {robot.key(one): one for one in panel.actions()}
-        self._feedback = {names.feedback(key): one for key, one in goals.items()}
-        self._status = {names.status(key): one for key, one in goals.items()}
         self._interlocks = {
             robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
             for of in panel.interlocks
         }
-        self._events = frozenset(robot.possible_keys(EVENTS))
         sources = (source for widget in panel.commands for source in widget.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
         permitting = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.lossless = permitting | robot.keyed_topics
-        self.immediate = permitting | self._status.keys() | self._events
+        self.immediate = permitting | {*handlers.immediate}
         self._by_key: dict[str, list[SampleListener]] = {}
         for listener in listeners:
             for key in listener.keys:
@@ -118,12 +106,7 @@ class Ingest:
             change = self._ingest(key, sample, updates)
             updates.urgent |= change == "now"
             updates.other |= change == "soon"
-            if (
-                key in self._feedback
-                or key in self._status
-                or key in self._needed
-                or key in self._events
-            ):
+            if key in self._handlers or key in self._needed:
                 updates.other = True
             else:
                 updates.values.add(key)
@@ -166,16 +149,9 @@ class Ingest:
             self._log.exception("a sample of %s was not processed completely", key)
 
     def _apply(self, key: str, sample: Sample, updates: Updates) -> None:
-        if key in self._feedback:
-            if not self._robot.difference("AS", self._robot.key(self._feedback[key])):
-                self._actions.on_feedback(self._feedback[key], sample)
-        elif key in self._status:
-            self._actions.on_status(self._status[key], sample)
-        else:
-            if key in self._events:
-                self._parameters.on_event(key, sample)
+        if self._handlers.take(key, sample):
             self._robot.update(key, sample)
-            if self._confirmations.is_awaited(key):
+            if self._handlers.is_awaited(key):
                 updates.readings.append((key, self._robot.reading_by_key(key)))
 
     def _apply_tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
@@ -188,7 +164,7 @@ class Ingest:
             if endpoint := self._robot.dialect.endpoint(key):
                 self._track_publisher(key, token, endpoint)
                 if token.lost_seq:
-                    self._parameters.on_token_lost(endpoint)
+                    self._handlers.endpoint_lost(endpoint)
             if token.lost_seq and (zid := graph.apply_token(key, False)):
                 self._robot.mark_bridge_lost(zid, token.lost_seq)
                 updates.bridges_lost.append(zid)

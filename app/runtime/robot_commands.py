@@ -14,6 +14,7 @@ from app.commands.parameters.sync import ParameterSync
 from app.commands.press_judge import Arrivals, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
+from app.robot.sample_handlers import SampleHandlers
 from app.transport.peer import Peer, RobotContext
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ class RobotCommands:
         self.actions = GoalTracker(interfaces, robot, link, changed)
         self.confirmations = Confirmations(robot, changed)
         self.parameters = ParameterSync(panel, interfaces, robot, link, self.calls, changed)
+        self.sample_handlers = SampleHandlers()
+        self.actions.register(self.sample_handlers, panel.actions())
+        self.confirmations.register(self.sample_handlers, panel.confirmations())
+        self.parameters.register(self.sample_handlers)
         self._recovery = GoalRecovery(panel, robot, press_log, self.actions, changed)
         self.dispatcher = Dispatcher(
             panel,

@@ -86,9 +86,7 @@ def wire_session(
     ingest = Ingest(
         panel,
         robot,
-        commands.actions,
-        commands.confirmations,
-        commands.parameters,
+        commands.sample_handlers,
         [robot.table_entries, LogListener(robot.log_lines), *recorders],
     )
     own_line = partial(_show_own_line, robot, refresher)

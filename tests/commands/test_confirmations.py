@@ -13,6 +13,7 @@ from app.commands.receipts import Receipt
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
+from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
@@ -109,14 +110,9 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
     async def pressed(came_at: float) -> Receipt:
         panel = panel_of()
         desk = Desk(panel)
-        deaf: Any = object()
-        intake = Ingest(
-            panel,
-            desk.robot,
-            deaf,
-            desk.confirmations,
-            deaf,
-        )
+        handlers = SampleHandlers()
+        desk.confirmations.register(handlers, panel.confirmations())
+        intake = Ingest(panel, desk.robot, handlers)
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)
         on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))

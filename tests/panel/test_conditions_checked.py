@@ -11,6 +11,7 @@ from app.panel import load_panel
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits
 from app.permission.interlocks import interlock_verdict
+from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
@@ -187,18 +188,12 @@ def test_what_is_not_there_permits_by_no_condition() -> None:
         assert not permits(made, None)
 
 
-class Deaf:
-    def is_awaited(self, *_: object) -> bool:
-        return False
-
-
 def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path: Path) -> None:
     """A pressure that trembles below its limit must cost no more than a readout."""
     path = file_of(tmp_path, "Float64", "min = 5")
     panel = load_panel(path)
     robot = robot_there(panel)
-    deaf: Any = Deaf()
-    intake = Ingest(panel, robot, deaf, deaf, deaf)
+    intake = Ingest(panel, robot, SampleHandlers())
     shows: list[float] = []
 
     def take(value: float, *between: float) -> tuple[bool, bool]:

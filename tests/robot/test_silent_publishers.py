@@ -7,8 +7,6 @@ from datetime import UTC, datetime
 
 import pytest
 
-from app.commands.actions.goals import GoalTracker
-from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
 from app.commands.service_calls import ServiceCalls
 from app.dialect.bridge_dialect import token
@@ -17,6 +15,7 @@ from app.interfaces.names import Qos
 from app.permission.interlocks import interlock_verdict
 from app.permission.verdict import Verdict
 from app.robot.sample import Sample
+from app.robot.sample_handlers import SampleHandlers
 from app.robot.silent_publishers import (
     TOKEN_DELAY_LATCHED_S,
     TOKEN_DELAY_MOST_S,
@@ -181,13 +180,9 @@ async def made() -> Incoming:
     calls = ServiceCalls(INTERFACES, robot, services, lambda: None)
     inbox = Inbox(lambda _: None)
     inbox.expect([], [KEY], [])
-    intake = Ingest(
-        panel,
-        robot,
-        GoalTracker(INTERFACES, robot, services, lambda: None),
-        Confirmations(robot, lambda: None),
-        ParameterSync(panel, INTERFACES, robot, services, calls, lambda: None),
-    )
+    handlers = SampleHandlers()
+    ParameterSync(panel, INTERFACES, robot, services, calls, lambda: None).register(handlers)
+    intake = Ingest(panel, robot, handlers)
     return Incoming(inbox, intake, robot)
 
 

@@ -19,6 +19,7 @@ from app.panel.model import Panel
 from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
 from app.permission.principal import Principal
+from app.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
@@ -68,16 +69,8 @@ class Broken:
         raise RuntimeError(name)
 
 
-class Deaf:
-    def on_event(self, *_: object) -> None: ...
-    def on_token_lost(self, *_: object) -> None: ...
-    def is_awaited(self, *_: object) -> bool:
-        return False
-
-
-def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
-    deaf: Any = Deaf()
-    return Ingest(panel, robot, actions, deaf, deaf)
+def intake_of(panel: Panel, robot: RobotState) -> Ingest:
+    return Ingest(panel, robot, SampleHandlers())
 
 
 def session_of(panel: Panel, endpoint: str) -> RobotSession:
@@ -115,9 +108,9 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     panel = panel_of(COUNT)
     robot = robot_there(panel)
     permits(robot)
-    broken: Any = Broken()
-    intake = intake_of(panel, robot, broken)
-    feedback = "count/_action/feedback"
+    feedback, handlers = "count/_action/feedback", SampleHandlers()
+    handlers.add(feedback, SampleHandler(lambda received: Broken().take(received)))
+    intake = Ingest(panel, robot, handlers)
     changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
     page = Page(panel, robot)
     news = taken(intake.steps(changes), page)
@@ -129,7 +122,7 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
 def test_a_permission_that_blinked_is_shown_in_between() -> None:
     panel = small_panel()
     robot = robot_there(panel)
-    intake = intake_of(panel, robot, Deaf())
+    intake = intake_of(panel, robot)
     page = Page(panel, robot)
     blink = Changes({robot.key(ENABLED): sample(flag(True), flag(True), flag(False))}, {}, True)
     taken(intake.steps(blink), page)
@@ -144,7 +137,7 @@ def test_of_what_a_permission_said_too_fast_to_be_kept_nothing_is_taken_for_true
     page = Page(panel, robot)
     shown: list[bool] = []
     overrun = sample(flag(True), flag(True))._replace(overrun=True)
-    for _ in intake_of(panel, robot, Deaf()).steps(Changes({robot.key(ENABLED): overrun}, {}, True)):
+    for _ in intake_of(panel, robot).steps(Changes({robot.key(ENABLED): overrun}, {}, True)):
         page.show()
         shown.append(page.shown()["operation"]["enabled"])
     assert shown == [False, True, True]
@@ -154,7 +147,7 @@ def test_a_permission_that_is_said_again_is_not_urgent() -> None:
     """A node may say it a hundred times a second: nothing but a change is shown at once."""
     panel = small_panel(interlock={"max_age_s": 1.0})
     robot = robot_there(panel)
-    intake = intake_of(panel, robot, Deaf())
+    intake = intake_of(panel, robot)
     key, page = robot.key(ENABLED), Page(panel, robot)
 
     def said(permitted: bool) -> tuple[bool, set[str]]:
@@ -174,14 +167,14 @@ def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
     panel = small_panel()
     robot = robot_there(panel)
     permits(robot)
-    intake = intake_of(panel, robot, Deaf())
+    intake = intake_of(panel, robot)
     changes = Changes({robot.key(ENABLED): sample(b"broken")}, {}, True)
     page = Page(panel, robot)
     assert taken(intake.steps(changes), page).urgent
 
 
 def test_each_sample_of_a_recorded_topic_is_recorded_and_no_other() -> None:
-    class Tape(Deaf):
+    class Tape:
         keys = frozenset({"heard"})
         heard: ClassVar[list[bytes]] = []
 
@@ -190,9 +183,8 @@ def test_each_sample_of_a_recorded_topic_is_recorded_and_no_other() -> None:
 
     panel = small_panel()
     tape: Any = Tape()
-    deaf: Any = Deaf()
     robot = robot_there(panel)
-    intake = Ingest(panel, robot, deaf, deaf, deaf, [tape])
+    intake = Ingest(panel, robot, SampleHandlers(), [tape])
     assert intake.recorded == tape.keys
     kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
     page = Page(panel, robot)
@@ -290,7 +282,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
     token = endpoint(robot, "MP", ENABLED, BOOL)
     robot.update_publishers()
     permits(robot)
-    intake = intake_of(panel, robot, Deaf())
+    intake = intake_of(panel, robot)
     page = Page(panel, robot)
     key = robot.key(ENABLED)
     old, new = Sample(flag(True), 6, NOW, NOW, BRIDGE), Sample(flag(True), 8, NOW, NOW, BRIDGE)

@@ -6,7 +6,7 @@ it. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Action
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, Final
 
@@ -22,6 +22,7 @@ from app.interfaces import Fields, Interfaces, names
 from app.panel.template import response_paths
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.robot.state import Reading, RobotState, Sample
 from app.robot.topics import Topic
 
@@ -50,6 +51,15 @@ class GoalTracker:
         self._latest: dict[str, Goal] = {}  # by widget
         self._feedback: dict[str, Topic] = {}  # by widget
         self._states: dict[str, Sample] = {}  # by action: the last status message
+
+    def register(self, handlers: SampleHandlers, actions: Iterable[str]) -> None:
+        """Handles the feedback and status of these actions from now on."""
+        for action in actions:
+            key = self._robot.key(action)
+            feedback = SampleHandler(partial(self.on_feedback, action))
+            status = SampleHandler(partial(self.on_status, action), is_immediate=True)
+            handlers.add(names.feedback(key), feedback)
+            handlers.add(names.status(key), status)
 
     def on_graph_change(self) -> None:
         """Cuts off goals whose action server or bridge is lost. Call it after every change of the
@@ -164,6 +174,8 @@ class GoalTracker:
     def on_feedback(self, action: str, sample: Sample) -> None:
         """Processes the latest feedback of an action. Feedback of other programs' goals is ignored. The
         caller refreshes the view with the next frame."""
+        if self._robot.difference("AS", self._robot.key(action)):
+            return
         for goal in self._latest_goals(action):
             if self._robot.command_status[goal.widget.id].can_cancel:
                 topic = self._feedback_of(goal.widget)

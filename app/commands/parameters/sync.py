@@ -27,10 +27,11 @@ from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 from app.interfaces.names import PARAMETER_EVENTS
 from app.panel.model import Panel
-from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
+from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, EVENTS, GET, SET, Parameter, Value
 from app.permission.servers import SERVER_SETTLE_S, parameters_offered
 from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.parameter_state import read_parameter_state
+from app.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.robot.state import RobotState, Sample
 from app.ros_logging import RobotLog
 
@@ -75,6 +76,13 @@ class ParameterSync:
             for service in services
             for node in self._nodes.values()
         }
+
+    def register(self, handlers: SampleHandlers) -> None:
+        """Handles parameter events and lost nodes from now on."""
+        handlers.on_endpoint_lost(self.on_token_lost)
+        for key in self._robot.possible_keys(EVENTS):
+            take = partial(self.on_event, key)
+            handlers.add(key, SampleHandler(take, is_stored=True, is_immediate=True))
 
     # Changes of the graph.
 
