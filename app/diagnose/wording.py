@@ -33,7 +33,7 @@ ERRORS: Final[Rows] = {
     ),
     # This machine
     "port_in_use": (
-        "Another program listens on {about}, and it is no panel server.",
+        "Another program listens on {about}, and it is not a panel server.",
         "End that program (`ss -ltnp` names it), or run the panel with --port and another number.",
     ),
     "address_unusable": (
@@ -52,7 +52,7 @@ ERRORS: Final[Rows] = {
         "full every control locks.",
     ),
     "screen_small_targets": (
-        "On the screen {about} a key of 20 mm is {real_mm} mm wide: it has {screen} mm for a pixel, "
+        "On the screen {about} a button of 20 mm is {real_mm} mm wide: it has {screen} mm for a pixel, "
         "and the "
         "panel file says {panel}.",
         "Set mm_per_px = {screen} in the panel file, then check that the pages still fit.",
@@ -74,14 +74,14 @@ ERRORS: Final[Rows] = {
         f"{_UNREACHABLE}; a firewall may be in between.",
     ),
     "not_zenoh": (
-        "Something listens at {about}, but it does not answer as Zenoh does.",
+        "Something listens at {about}, but it does not respond as Zenoh does.",
         "Correct the port: the bridge's is 7447 unless its file says otherwise. If it is the right "
         "one, "
         "the bridge hangs: restart it. tls/ on one side needs tls/ on the other.",
     ),
     "no_bridge": (
         "A Zenoh router answers at {about}, but no ROS 2 bridge is connected to it.",
-        "Start zenoh-bridge-ros2dds on the robot, and let it listen there or connect to this router.",
+        "Start zenoh-bridge-ros2dds on the robot. It must listen there or connect to this router.",
     ),
     "bridge_silent": (
         "The bridge {about} is known, but does not respond.",
@@ -203,7 +203,7 @@ WARNINGS: Final[Rows] = {
         "If the browser runs on this machine: apt-get install {package}.",
     ),
     "screen_scale": (
-        "The screen {about} has {screen} mm for a pixel, and the panel file says {panel}: keys are "
+        "The screen {about} has {screen} mm for a pixel, and the panel file says {panel}: buttons are "
         "{real_mm} mm instead of 20 mm.",
         "Set mm_per_px = {screen} in the panel file.",
     ),
@@ -220,15 +220,15 @@ WARNINGS: Final[Rows] = {
         "Install version {tested} of zenoh-bridge-ros2dds.",
     ),
     "bridge_drops": (
-        "The bridge {about} has reliable_routes_blocking = false: it drops messages in silence.",
+        "The bridge {about} has reliable_routes_blocking = false: it drops messages silently.",
         "Set it to true. A lost `false` of a permission would leave a control open.",
     ),
     "bridge_piled_readers": (
-        "Each message of {about} arrives {times} times from one bridge: it has piled up readers.",
+        "Each message of {about} arrives {times} times from one bridge: it has accumulated readers.",
         "Restart the bridge (its issue 700).",
     ),
     "robot_elsewhere": (
-        "Nothing of the panel is there, but the bridge knows {found}.",
+        "The bridge forwards none of the panel's names, but it knows {found}.",
         'If that is the same topic, set namespace = "{namespace}" in the panel file.',
     ),
     "clock_differs": (
@@ -277,7 +277,7 @@ NOTES: Final[Rows] = {
         "Nothing, or listen longer: --listen 30.",
     ),
     "screen_unknown": (
-        "The screen {about} does not say how large it is.",
+        "The screen {about} does not report its size.",
         "Measure its width, and set mm_per_px in the panel file to that, divided by its pixels.",
     ),
 }

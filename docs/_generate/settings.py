@@ -15,7 +15,7 @@ ABOUT: Final = {
     ),
     "HOSTS": (
         "More host names under which browsers may open the panel, with commas between them, without "
-        "ports. An IPv6 address stands in brackets.",
+        "ports. Write an IPv6 address in brackets.",
         "only `127.0.0.1`, `localhost` and `[::1]`",
     ),
     "PROXIES": (
@@ -24,7 +24,7 @@ ABOUT: Final = {
         "none",
     ),
     "ROOT_PATH": (
-        "The path below which a proxy shows the panel, such as `/cell1`. The proxy may take it off or "
+        "The path below which a proxy shows the panel, such as `/cell1`. The proxy may remove it or "
         "leave it.",
         "none, or that of uvicorn's `--root-path`",
     ),

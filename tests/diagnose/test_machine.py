@@ -178,7 +178,7 @@ def test_a_screen_is_measured(
 def test_the_key_that_comes_out_too_small_is_reported_in_mm(setup: Setup) -> None:
     connect(setup.screens, edid(1280, 800, 150, 94))
     found = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
-    assert "a key of 20 mm is 11 mm wide" in found.what
+    assert "a button of 20 mm is 11 mm wide" in found.what
     assert "mm_per_px = 0.117" in found.do
 
 
@@ -247,7 +247,7 @@ def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.Captur
         "code": "port_in_use",
         "about": f"127.0.0.1 port {setup.port}",
         "robot": "",
-        "what": f"Another program listens on 127.0.0.1 port {setup.port}, and it is no panel server.",
+        "what": f"Another program listens on 127.0.0.1 port {setup.port}, and it is not a panel server.",
         "do": KINDS["port_in_use"].do,
     }
 

@@ -173,7 +173,7 @@ def test_the_messages_of_a_hold_are_json() -> None:
 @pytest.mark.parametrize("message", [Begin, Beat, End])
 def test_each_key_of_a_holds_messages_is_described(message: type[Said]) -> None:
     section = PAGES["reference/http.md"].split("## Hold to run: WebSocket")[1].split("\n## ")[0]
-    table = section.split("| key of the client's messages |")[1]
+    table = section.split("| JSON key of the client's messages |")[1]
     described = "".join(re.findall(r"^\| (`.+?) \|", table, re.MULTILINE))
     assert set(message.model_fields) <= set(re.findall(r"`(\w+)`", described))
 
