@@ -241,13 +241,14 @@ def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.Captur
     assert found["well"] is False
     assert set(found) == {"version", "panel", "well", "findings", "facts", "more"}
     first, second = found["findings"]
+    at = f"127.0.0.1 port {setup.port}"
     assert second["code"] == "demo_mode"
     assert first == {
         "severity": "error",
         "code": "port_in_use",
-        "about": f"127.0.0.1 port {setup.port}",
+        "about": at,
         "robot": "",
-        "what": f"Another program listens on 127.0.0.1 port {setup.port}, and it is not a panel server.",
+        "what": f"Another program listens on {at}, and it is not a panel server.",
         "do": KINDS["port_in_use"].do,
     }
 
