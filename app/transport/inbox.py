@@ -7,11 +7,11 @@ inbox. Knows nothing of Zenoh.
 import itertools
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
+from app.bounded import BoundedQueue
 from app.robot.state import Buffer, Sample, SkippedPayload
 
 UNSEEN_MOST: Final = 256  # changes of a lossless topic that are kept from one drain to the next
@@ -61,18 +61,14 @@ class _Unseen:
     """The messages of a topic since the last drain, without the newest: each change once. If there are
     too many, the newest of them."""
 
-    __slots__ = ("_bytes", "overrun", "values")
+    __slots__ = ("overrun", "values")
 
     def __init__(self) -> None:
-        self.values: deque[SkippedPayload] = deque()
+        self.values: BoundedQueue[SkippedPayload] = BoundedQueue(UNSEEN_MOST, UNSEEN_BYTES)
         self.overrun = False
-        self._bytes = 0
 
     def add(self, one: "_Arrived") -> None:
-        self.values.append(SkippedPayload(one.payload, one.at, one.wall))
-        self._bytes += len(one.payload)
-        while len(self.values) > UNSEEN_MOST or (self._bytes > UNSEEN_BYTES and len(self.values) > 1):
-            self._bytes -= len(self.values.popleft().payload)
+        if self.values.add(SkippedPayload(one.payload, one.at, one.wall), len(one.payload)):
             self.overrun = True
 
 
@@ -101,6 +97,10 @@ class _Arrived:
         return sample._replace(skipped_payloads=tuple(self.unseen.values), overrun=self.unseen.overrun)
 
 
+def _kept_samples() -> BoundedQueue[tuple[str, _Arrived]]:
+    return BoundedQueue(KEPT_MOST, KEPT_BYTES)
+
+
 class Inbox:
     """Samples and tokens received by the current session of a link. Those of earlier sessions are
     dropped."""
@@ -122,8 +122,7 @@ class Inbox:
         self._tokens: dict[str, Token] = {}
         self._caches: list[tuple[str, str]] = []
         self._transports: set[str] = set()
-        self._kept: deque[tuple[str, _Arrived]] = deque()
-        self._kept_bytes = 0
+        self._kept = _kept_samples()
 
     def expect(
         self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
@@ -164,7 +163,7 @@ class Inbox:
             samples, self._samples = self._samples, {}
             tokens, self._tokens = self._tokens, {}
             caches, self._caches = self._caches, []
-            kept, self._kept, self._kept_bytes = self._kept, deque(), 0
+            kept, self._kept = self._kept, _kept_samples()
             link_up = bool(self._transports)
         return Changes(
             {key: arrived.sample() for key, arrived in samples.items()},
@@ -208,11 +207,7 @@ class Inbox:
         self._wake(key in self._immediate)
 
     def _keep(self, key: str, arrived: _Arrived) -> None:
-        self._kept.append((key, arrived))
-        self._kept_bytes += len(arrived.payload)
-        while len(self._kept) > KEPT_MOST or (self._kept_bytes > KEPT_BYTES and len(self._kept) > 1):
-            _, oldest = self._kept.popleft()
-            self._kept_bytes -= len(oldest.payload)
+        self._kept.add((key, arrived), len(arrived.payload))
 
     def token(self, key: str, alive: bool) -> None:
         """A liveliness token appeared or was lost."""
