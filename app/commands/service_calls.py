@@ -92,7 +92,7 @@ class ServiceCalls:
 
     def on_graph_change(self) -> None:
         """Ends the waiting calls if no bridge is left. Call it after every change of the graph."""
-        if not self._robot.graph.bridges:
+        if not self._robot.graph.peers:
             for waiting in self._open.values():
                 if not waiting.cut.done():
                     waiting.cut.set_result(None)
@@ -155,7 +155,7 @@ class ServiceCalls:
             waiting.answered.add_done_callback(
                 lambda done: self._on_late_response(waiting, done, corrected)
             )
-        if waiting.cut.done() or not self._robot.graph.bridges:
+        if waiting.cut.done() or not self._robot.graph.peers:
             return Outcome("unknown", say("call_cut"))
         if waiting.answered.done():
             return Outcome("unknown", say("call_dropped", service=request.service))

@@ -47,9 +47,9 @@ def link_verdict(robot: RobotState, now: float) -> Verdict:
     """Whether commands can reach the robot at all."""
     if not robot.link_up:
         return _no_link(robot.endpoints)
-    if not robot.graph.bridges:
+    if not robot.graph.peers:
         return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.title)
-    if robot.graph.has_silent_bridge:
+    if robot.graph.has_silent_peer:
         return locked("bridge_silent")
     if now < robot.settled_at:
         return Verdict(False, "joining", say("joining"), robot.settled_at)
@@ -99,7 +99,7 @@ def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
     reading = robot.reading(topic).of_field(interlock.field, lacking_s)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
-    if robot.silent_publishers.has_silent(key, robot.bridges_of(key)):
+    if robot.silent_publishers.has_silent(key, robot.peers_of(key)):
         reason = say("new_publisher", topic=topic)
         which = robot.publishers(key).sentence(topic) if robot.graph.has_endpoint("MP", key) else ""
         return Verdict(False, "new_publisher", joined([reason, which]))

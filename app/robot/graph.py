@@ -1,4 +1,5 @@
-"""The robot's ROS graph, from the bridges' liveliness tokens and admin space.
+"""The robot's ROS graph, from its peers' liveliness tokens and admin space. A peer is a bridge, or a
+Zenoh session of the robot's own nodes.
 
 Endpoints are indexed by key, so that a query costs the same for any size of graph.
 """
@@ -67,7 +68,7 @@ def cached_until_change(
 
 
 class LiveGraph:
-    """The current ROS graph behind all bridges. Changed on the event loop only, by `apply_token` and
+    """The current ROS graph behind all peers. Changed on the event loop only, by `apply_token` and
     the `update_…` methods."""
 
     def __init__(
@@ -77,24 +78,24 @@ class LiveGraph:
         namespace: str | None = None,
         keys: Collection[str] | None = None,
     ) -> None:
-        """`namespace` distinguishes this robot's bridges from others; None: all bridges belong to it.
+        """`namespace` distinguishes this robot's peers from others; None: all peers belong to it.
         Only tokens for `keys` are kept; None: all."""
         self._dialect = dialect
         self.own_zid = own_zid  # of the panel's session: its tokens are ignored
         self._relevant_names = None if keys is None else frozenset(map(dialect.in_token, keys))
         self.cache: dict[Any, Any] = {}  # see `cached_until_change`
         self._namespace = namespace
-        self._bridges: dict[str, set[str]] = {}  # their own tokens, by zid
-        self._namespaces: dict[str, str] = {}  # of bridges
+        self._peers: dict[str, set[str]] = {}  # their own tokens, by zid
+        self._namespaces: dict[str, str] = {}  # of peers
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
         self._alive_since: dict[str, float] = {}  # of tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
         self.nodes_read_at = -math.inf  # monotonic seconds: when the last query of the nodes began
-        self._bridge_versions: Mapping[str, str] | None = None
+        self._versions: Mapping[str, str] | None = None
 
     def is_relevant(self, token_key: str) -> bool:
-        """Whether a token is a bridge's own, or for one of the keys that are kept."""
+        """Whether a token is a peer's own, or for one of the keys that are kept."""
         if self._relevant_names is None:
             return True
         name = self._dialect.name_in(token_key)
@@ -106,14 +107,14 @@ class LiveGraph:
         return endpoint is not None and token_key in self._tokens.get(endpoint.key, {})
 
     def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
-        """Applies a token's appearance (`now`, monotonic seconds) or end; returns the zid of a bridge
+        """Applies a token's appearance (`now`, monotonic seconds) or end; returns the zid of a peer
         that appeared or was lost."""
         endpoint = self._dialect.endpoint(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
         self.cache.clear()
         if endpoint.role is None:
-            return self._apply_bridge(endpoint.zid, token_key, alive)
+            return self._apply_peer(endpoint.zid, token_key, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
             self._alive_since[token_key] = now
@@ -129,21 +130,21 @@ class LiveGraph:
             self._tokens.pop(key, None)
         self._alive_since.pop(token_key, None)
 
-    def _apply_bridge(self, zid: str, token_key: str, alive: bool) -> str | None:
+    def _apply_peer(self, zid: str, token_key: str, alive: bool) -> str | None:
         """A session may have several tokens of its own: one for each of its nodes. It appears with the
         first of them and is lost with the last."""
         if alive:
-            known = zid in self._bridges
-            self._bridges.setdefault(zid, set()).add(token_key)
+            known = zid in self._peers
+            self._peers.setdefault(zid, set()).add(token_key)
             if known:
                 return None
-            self._bridge_versions = None  # the new bridge has not been queried yet
+            self._versions = None  # the new peer has not been queried yet
             return zid
-        tokens = self._bridges.get(zid, set())
+        tokens = self._peers.get(zid, set())
         tokens.discard(token_key)
-        if tokens or zid not in self._bridges:
+        if tokens or zid not in self._peers:
             return None
-        del self._bridges[zid]
+        del self._peers[zid]
         self._namespaces.pop(zid, None)
         return zid
 
@@ -162,66 +163,66 @@ class LiveGraph:
             self._nodes[node.key].append(node)
 
     def update_versions(self, versions: Mapping[str, str]) -> None:
-        """Replaces the versions of the bridges that responded, by zid."""
+        """Replaces the versions of the peers that responded, by zid."""
         self.cache.clear()
-        self._bridge_versions = versions
+        self._versions = versions
 
     def update_namespaces(self, namespaces: Mapping[str, str]) -> None:
-        """Adds the namespaces of bridges, by zid ("" for none)."""
+        """Adds the namespaces of peers, by zid ("" for none)."""
         self.cache.clear()
         self._namespaces |= namespaces
 
     @property
     @cached_until_change
-    def bridges(self) -> frozenset[str]:
-        """The zids of this robot's bridges. If none has its namespace, those with an unknown
+    def peers(self) -> frozenset[str]:
+        """The zids of this robot's peers. If none has its namespace, those with an unknown
         namespace."""
         own = self._namespace
-        known = ((zid, self._namespaces[zid]) for zid in self._bridges.keys() & self._namespaces.keys())
+        known = ((zid, self._namespaces[zid]) for zid in self._peers.keys() & self._namespaces.keys())
         matching = {zid for zid, of in known if own is None or within(own, of)}
-        return frozenset(matching or self._bridges.keys() - self._namespaces.keys())
+        return frozenset(matching or self._peers.keys() - self._namespaces.keys())
 
     @property
-    def every_bridge(self) -> Collection[str]:
-        """The zids of all bridges, also of other robots'."""
-        return self._bridges.keys()
+    def every_peer(self) -> Collection[str]:
+        """The zids of all peers, also of other robots'."""
+        return self._peers.keys()
 
     @property
     def namespaces(self) -> set[str]:
-        """The namespaces of this robot's bridges, as far as they are known."""
-        return {of for zid, of in self._namespaces.items() if zid in self.bridges}
+        """The namespaces of this robot's peers, as far as they are known."""
+        return {of for zid, of in self._namespaces.items() if zid in self.peers}
 
     @property
     @cached_until_change
-    def has_silent_bridge(self) -> bool:
-        """Whether a bridge has a token but did not respond to the last query."""
-        versions = self._bridge_versions
-        return versions is not None and bool(self.bridges - versions.keys())
+    def has_silent_peer(self) -> bool:
+        """Whether a peer has a token but did not respond to the last query."""
+        versions = self._versions
+        return versions is not None and bool(self.peers - versions.keys())
 
     @property
     @cached_until_change
     def is_simulated(self) -> bool:
-        """Whether a bridge is that of the simulated robot."""
-        versions = self._bridge_versions or {}
-        return any(versions.get(zid) == DEMO_VERSION for zid in self.bridges)
+        """Whether a peer is that of the simulated robot."""
+        versions = self._versions or {}
+        return any(versions.get(zid) == DEMO_VERSION for zid in self.peers)
 
     @cached_until_change
     def _endpoints(self, role: Role, key: str) -> list[Endpoint]:
         tokens = self._tokens.get(key, {}).values()
-        return [e for e in tokens if e.role == role and e.zid in self._bridges]
+        return [e for e in tokens if e.role == role and e.zid in self._peers]
 
-    def bridges_with(self, role: Role, key: str) -> frozenset[str]:
-        """The zids of the bridges behind which a node publishes, subscribes or serves."""
+    def peers_with(self, role: Role, key: str) -> frozenset[str]:
+        """The zids of the peers behind which a node publishes, subscribes or serves."""
         return frozenset(e.zid for e in self._endpoints(role, key))
 
     def has_endpoint(self, role: Role, key: str) -> bool:
-        """Whether a node behind a bridge publishes, subscribes or serves."""
+        """Whether a node behind a peer publishes, subscribes or serves."""
         return bool(self._endpoints(role, key))
 
     @cached_until_change
     def node_endpoints(self, role: Role, key: str) -> list[Endpoint]:
-        """Those of the robot's nodes, as the bridges knew them when they were queried last."""
-        return [e for e in self._nodes.get(key, ()) if e.role == role and e.zid in self._bridges]
+        """Those of the robot's nodes, as the peers knew them when they were queried last."""
+        return [e for e in self._nodes.get(key, ()) if e.role == role and e.zid in self._peers]
 
     @cached_until_change
     def described_endpoints(self, role: Role, key: str) -> list[Endpoint]:
@@ -241,7 +242,7 @@ class LiveGraph:
     def since(self, role: Role | None, key: str) -> float:
         """When the newest endpoint of this name appeared (monotonic seconds); -inf without one."""
         tokens = self._tokens.get(key, {}).items()
-        times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
+        times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._peers)
         return max(times, default=-math.inf)
 
     def is_transient_local(self, key: str) -> bool | None:
@@ -273,11 +274,11 @@ class LiveGraph:
         """The type of a counterpart or route that differs from `type_name`; None if all are equal."""
         theirs, others, direction = _COUNTERPARTS[role]
         for endpoint in chain(self._tokens.get(key, {}).values(), self._nodes.get(key, [])):
-            counts = endpoint.role == (theirs if endpoint.zid in self._bridges else others)
+            counts = endpoint.role == (theirs if endpoint.zid in self._peers else others)
             if counts and endpoint.type != type_name:
                 return endpoint.type
         for route in self._routes.get(key, []):
-            there = route.zid in self._bridges and route.direction == direction
+            there = route.zid in self._peers and route.direction == direction
             if there and route.type != type_name:
                 return route.type
         return None

@@ -1,5 +1,5 @@
 """The endpoints of the robot (publishers, subscribers, servers) that a panel needs, and which of them
-are missing while their bridge is connected."""
+are missing while their peer is connected."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
@@ -22,20 +22,20 @@ def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
 
 
 class EndpointPresence:
-    """The bridges behind which each required endpoint was last seen."""
+    """The peers behind which each required endpoint was last seen."""
 
     def __init__(self, needed: Iterable[RequiredEndpoint], key: Callable[[str], str]) -> None:
         """`key` returns the present key of a ROS name."""
         self.required = tuple(dict.fromkeys(needed))
         self._key = key
-        self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
+        self.last_peers: dict[RequiredEndpoint, frozenset[str]] = {}
 
     def update(self, graph: LiveGraph) -> None:
         """Updates the presence; call it after every change of the graph."""
         for end in self.required:
-            if bridges := graph.bridges_with(*self.keyed(end)):
-                self.last_bridges[end] = bridges
-        graph.cache.clear()  # results depend on `last_bridges` too
+            if peers := graph.peers_with(*self.keyed(end)):
+                self.last_peers[end] = peers
+        graph.cache.clear()  # results depend on `last_peers` too
 
     def keyed(self, end: RequiredEndpoint) -> RequiredEndpoint:
         """An endpoint as (role, key)."""
@@ -43,14 +43,14 @@ class EndpointPresence:
 
     def clear(self) -> None:
         """Forgets all endpoints; call it when the link is lost."""
-        self.last_bridges.clear()
+        self.last_peers.clear()
 
     def any_present(self, graph: LiveGraph) -> bool:
         """Whether any required endpoint exists."""
         return _any_present(graph, self)
 
     def missing(self, graph: LiveGraph) -> list[str]:
-        """The ROS names of endpoints that have disappeared while their bridge is connected."""
+        """The ROS names of endpoints that have disappeared while their peer is connected."""
         return _missing(graph, self)
 
 
@@ -63,6 +63,6 @@ def _any_present(graph: LiveGraph, presence: EndpointPresence) -> bool:
 def _missing(graph: LiveGraph, presence: EndpointPresence) -> list[str]:
     return [
         end[1]
-        for end, bridges in presence.last_bridges.items()
-        if bridges & graph.bridges and not graph.has_endpoint(*presence.keyed(end))
+        for end, peers in presence.last_peers.items()
+        if peers & graph.peers and not graph.has_endpoint(*presence.keyed(end))
     ]

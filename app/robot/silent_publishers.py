@@ -24,7 +24,7 @@ TOKEN_DELAY_LATCHED_S: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class _LastMessage:
-    """The newest message of a bridge: its sequence number, and when it arrived (monotonic seconds)."""
+    """The newest message of a peer: its sequence number, and when it arrived (monotonic seconds)."""
 
     seq: int
     at: float
@@ -45,32 +45,32 @@ class SilentPublishers:
         self._late: set[tuple[str, str]] = set()  # silent ones that may have sent the last message
 
     def record_message(self, key: str, source: str | None, seq: int, at: float) -> None:
-        """A message arrived from the bridge `source`, None if unknown."""
+        """A message arrived from the peer `source`, None if unknown."""
         if key not in self._topics:
             return
         self._last_messages[key, source] = _LastMessage(seq, at)
         silent = self._silent[key]
-        for bridge in [b for b, appeared in silent.items() if appeared < seq]:
-            if source is None or bridge in (source, None):
-                del silent[bridge]
+        for peer in [b for b, appeared in silent.items() if appeared < seq]:
+            if source is None or peer in (source, None):
+                del silent[peer]
 
     def add_publisher(self, endpoint: Endpoint, seq: int, at: float, lost_before: int = 0) -> None:
         """A publisher's token appeared. `lost_before` is the sequence number of its previous loss, if
         it was lost and appeared again."""
         if endpoint.role != "MP" or endpoint.key not in self._topics:
             return
-        key, bridge = endpoint.key, endpoint.zid
-        self._late.discard((key, bridge))
-        last_change = max(self._last_changes.get((key, bridge), 0), lost_before)
-        self._last_changes[key, bridge] = max(seq, last_change)
+        key, peer = endpoint.key, endpoint.zid
+        self._late.discard((key, peer))
+        last_change = max(self._last_changes.get((key, peer), 0), lost_before)
+        self._last_changes[key, peer] = max(seq, last_change)
         before_s = TOKEN_DELAY_LATCHED_S if endpoint.transient_local else TOKEN_DELAY_S
-        for source in (bridge, None):
+        for source in (peer, None):
             last = self._last_messages.get((key, source))
             if last and (last.seq > seq or (last.seq > last_change and at - last.at <= before_s)):
                 return
             if last and last.seq > last_change and at - last.at <= TOKEN_DELAY_MOST_S:
-                self._late.add((key, bridge))
-        self._silent[key][bridge] = seq
+                self._late.add((key, peer))
+        self._silent[key][peer] = seq
 
     def remove_publisher(self, endpoint: Endpoint, seq: int) -> None:
         """A publisher's token ended. If it never published, its topic stays silent."""
@@ -81,22 +81,22 @@ class SilentPublishers:
 
     def mark_single(self, key: str) -> None:
         """One node publishes the topic: the message shortly before its token was its own."""
-        for bridge in [bridge for late, bridge in self._late if late == key]:
-            self._late.discard((key, bridge))
-            self._silent[key].pop(bridge, None)
+        for peer in [peer for late, peer in self._late if late == key]:
+            self._late.discard((key, peer))
+            self._silent[key].pop(peer, None)
 
-    def remove_bridge(self, bridge: str) -> None:
-        """A bridge was lost. Its silent publishers count until any newer message arrives."""
-        self._late = {one for one in self._late if one[1] != bridge}
+    def remove_peer(self, peer: str) -> None:
+        """A peer was lost. Its silent publishers count until any newer message arrives."""
+        self._late = {one for one in self._late if one[1] != peer}
         for silent in self._silent.values():
-            if bridge in silent:
-                silent[None] = max(silent.pop(bridge), silent.get(None, 0))
-        for place in [p for p in self._last_changes if p[1] == bridge]:
+            if peer in silent:
+                silent[None] = max(silent.pop(peer), silent.get(None, 0))
+        for place in [p for p in self._last_changes if p[1] == peer]:
             del self._last_changes[place]
-        for source in [s for s in self._last_messages if s[1] == bridge]:
+        for source in [s for s in self._last_messages if s[1] == peer]:
             del self._last_messages[source]
 
-    def has_silent(self, key: str, bridges: Collection[str]) -> bool:
-        """Whether a publisher behind one of these bridges, or behind a lost bridge, has not
+    def has_silent(self, key: str, peers: Collection[str]) -> bool:
+        """Whether a publisher behind one of these peers, or behind a lost peer, has not
         published."""
-        return any(bridge is None or bridge in bridges for bridge in self._silent.get(key, ()))
+        return any(peer is None or peer in peers for peer in self._silent.get(key, ()))

@@ -74,7 +74,7 @@ class RobotState:
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
         self.endpoints = endpoints
-        self.settled_at = math.inf  # monotonic seconds: then a new bridge has set up its routes
+        self.settled_at = math.inf  # monotonic seconds: then a new peer has set up its routes
         self._keys: dict[str, str] = {}  # ROS name → key
         self._shared = {topic: possible_keys(topic, self.namespace) for topic in SHARED_TOPICS}
         self._keys |= {topic: keys[0] for topic, keys in self._shared.items()}
@@ -97,7 +97,7 @@ class RobotState:
         self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self._log = RobotLog(log, self.name)
-        self.is_responding = True  # False: its bridges do not respond
+        self.is_responding = True  # False: its peers do not respond
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
         self.presence = EndpointPresence(needed, self.key)
         self.undecodable: Counter[str] = Counter()
@@ -180,13 +180,13 @@ class RobotState:
         if (topic := self._topics.get(key)) is not None:
             topic.update(sample)
 
-    def mark_bridge_lost(self, bridge: str, seq: int) -> None:
-        """A bridge was lost at `seq`: its earlier samples are no longer valid."""
-        self.silent_publishers.remove_bridge(bridge)
+    def mark_peer_lost(self, peer: str, seq: int) -> None:
+        """A peer was lost at `seq`: its earlier samples are no longer valid."""
+        self.silent_publishers.remove_peer(peer)
         for key, topic in self._topics.items():
-            topic.forget_source(bridge)
+            topic.forget_source(peer)
             sample = topic.sample
-            if sample is not None and sample.seq < seq and sample.source in (bridge, None):
+            if sample is not None and sample.seq < seq and sample.source in (peer, None):
                 topic.invalidate()
                 self.replayed.begin(key)
 
@@ -250,18 +250,18 @@ class RobotState:
         """The same by the topic's key."""
         known = self._topics[key]
         found, sample = known.reading(), known.sample
-        if sample is None or self.is_from_bridge(key, sample.source):
+        if sample is None or self.is_from_peer(key, sample.source):
             return found
         return replace(found, status="cut")
 
-    def is_from_bridge(self, key: str, source: str | None) -> bool:
-        """Whether a sample's source is a bridge that is there: one of this robot, or any for a topic
+    def is_from_peer(self, key: str, source: str | None) -> bool:
+        """Whether a sample's source is a peer that is there: one of this robot, or any for a topic
         that is not below its namespace."""
-        return source is None or source in self.bridges_of(key)
+        return source is None or source in self.peers_of(key)
 
-    def bridges_of(self, key: str) -> Collection[str]:
-        """The zids of the bridges through which a topic may come."""
-        return self.graph.every_bridge if key in self._global_keys else self.graph.bridges
+    def peers_of(self, key: str) -> Collection[str]:
+        """The zids of the peers through which a topic may come."""
+        return self.graph.every_peer if key in self._global_keys else self.graph.peers
 
     @property
     def keyed_topics(self) -> frozenset[str]:
@@ -269,7 +269,7 @@ class RobotState:
         return frozenset(key for key, topic in self._topics.items() if topic.is_keyed)
 
     def cuts(self, key: str) -> int:
-        """How often a topic's last value was no longer valid: its bridge, its publisher or the link was
+        """How often a topic's last value was no longer valid: its peer, its publisher or the link was
         lost."""
         return self._topics[key].cuts
 

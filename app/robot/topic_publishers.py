@@ -52,8 +52,8 @@ class TopicPublishers:
     def of_topic(self, key: str, graph: LiveGraph) -> Publishers:
         """The publishers behind the present bridges. Two bridges of one domain know the same ones; a
         bridge that knows no DDS has those that it announces."""
-        known = [one for one in self._known.get(key, ()) if one.bridge in graph.bridges]
+        known = [one for one in self._known.get(key, ()) if one.bridge in graph.peers]
         nodes = {one.guid: one.nodes for one in sorted(known)}
-        others = graph.bridges_with("MP", key) - {one.bridge for one in known}
+        others = graph.peers_with("MP", key) - {one.bridge for one in known}
         names = sorted(name for several in nodes.values() for name in several)
         return Publishers(len(nodes) + len(others), tuple(names))

@@ -1,6 +1,6 @@
 """The robots of one panel. Each has its own session, with its own link, state and presses.
 
-Sessions are isolated: a lost bridge, a renewed session or a flood affects only one robot. Each page
+Sessions are isolated: a lost peer, a renewed session or a flood affects only one robot. Each page
 shows the link status of the other robots.
 """
 

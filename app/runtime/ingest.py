@@ -30,8 +30,8 @@ class Updates:
     topics with a new message; `other`: another change that can wait for the next frame. `readings` are
     messages (topic's key, reading) that may confirm a command.
 
-    `graph`: tokens have changed; `bridge_appeared`: there was no bridge before. `bridges_found` and
-    `bridges_lost` are zids.
+    `graph`: tokens have changed; `peer_appeared`: there was no peer before. `peers_found` and
+    `peers_lost` are zids.
     """
 
     urgent: bool = False
@@ -39,9 +39,9 @@ class Updates:
     values: set[str] = field(default_factory=set)
     readings: list[tuple[str, Reading]] = field(default_factory=list)
     graph: bool = False
-    bridge_appeared: bool = False
-    bridges_found: list[str] = field(default_factory=list)
-    bridges_lost: list[str] = field(default_factory=list)
+    peer_appeared: bool = False
+    peers_found: list[str] = field(default_factory=list)
+    peers_lost: list[str] = field(default_factory=list)
 
     def step(self) -> "Updates":
         """The update for an intermediate permission. Each reading is returned once."""
@@ -157,7 +157,7 @@ class Ingest:
     def _apply_tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
         """Applies token changes to the graph and to the robot's state."""
         now, graph = time.monotonic(), self._robot.graph
-        had_bridge = bool(tokens and graph.bridges)
+        had_peer = bool(tokens and graph.peers)
         for key, token in tokens.items():
             if not graph.is_relevant(key):
                 continue
@@ -166,14 +166,14 @@ class Ingest:
                 if token.lost_seq:
                     self._handlers.endpoint_lost(endpoint)
             if token.lost_seq and (zid := graph.apply_token(key, False)):
-                self._robot.mark_bridge_lost(zid, token.lost_seq)
-                updates.bridges_lost.append(zid)
-                had_bridge = had_bridge and bool(graph.bridges)
+                self._robot.mark_peer_lost(zid, token.lost_seq)
+                updates.peers_lost.append(zid)
+                had_peer = had_peer and bool(graph.peers)
             if token.lost_seq and token.alive:
                 self._robot.update_publishers(token.lost_seq)  # gone, possibly for a moment
             if token.alive and (zid := graph.apply_token(key, True, now)):
-                updates.bridges_found.append(zid)
-        updates.bridge_appeared = bool(updates.bridges_found) and not had_bridge
+                updates.peers_found.append(zid)
+        updates.peer_appeared = bool(updates.peers_found) and not had_peer
 
     def _track_publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
         """Tracks publishers that appear, possibly for a moment: until they publish, permissions on

@@ -160,7 +160,7 @@ class RobotSession:
         return link_verdict(self.robot, time.monotonic())
 
     async def check_readiness(self) -> Verdict:
-        """`link_verdict` after a query of the bridges, which takes at most a second."""
+        """`link_verdict` after a query of its peer, which takes at most a second."""
         if not self.link_verdict.permitted or await self.peer.answers():
             return self.link_verdict
         return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict

@@ -117,9 +117,9 @@ class Turn:
     def _apply(self, updates: Updates) -> None:
         """Updates holds, then confirmations, then the view, from the robot's current state."""
         if updates.graph:
-            self._peer.lost(updates.bridges_lost)
-            self._peer.found(updates.bridges_found)
-            self.on_graph_change(updates.bridge_appeared)
+            self._peer.lost(updates.peers_lost)
+            self._peer.found(updates.peers_found)
+            self.on_graph_change(updates.peer_appeared)
         self._commands.holds.judge()
         for key, reading in updates.readings:
             self._confirm(key, reading)

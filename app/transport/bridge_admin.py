@@ -29,7 +29,7 @@ class BridgeAdmin:
     async def answered(self, within_s: float) -> bool:
         """Whether all of the bridges answer a query of their version; LinkError without a link."""
         answers = await self._link.ask(bridge_dialect.VERSION, within_s)
-        return self._robot.graph.bridges <= {bridge_dialect.zid_of(key) for key, _ in answers}
+        return self._robot.graph.peers <= {bridge_dialect.zid_of(key) for key, _ in answers}
 
     async def ask(self) -> None:
         """Queries versions, namespaces, routes and nodes. LinkError without a link."""
@@ -43,7 +43,7 @@ class BridgeAdmin:
         graph.update_namespaces(namespaces)
         self.namespaces = namespaces or self.namespaces
         self._robot.update_shared_topics()
-        self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
+        self.missed = 0 if graph.peers <= versions.keys() else self.missed + 1
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
             graph.update_versions(versions)
         if self.missed:
@@ -55,7 +55,7 @@ class BridgeAdmin:
         ]
         began = time.monotonic()
         nodes = await ask_json(self._link, bridge_dialect.NODES)
-        own = {zid: namespaces.get(zid, self._robot.namespace) for zid in graph.bridges}
+        own = {zid: namespaces.get(zid, self._robot.namespace) for zid in graph.peers}
         endpoints = await self._participants.endpoints(
             nodes, own, self._robot.required_keys, lambda one: graph.since(one.role, one.key)
         )

@@ -63,11 +63,11 @@ class GraphMembership:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def on_graph_change(self, bridge_appeared: bool) -> None:
-        """Joins, updates its tokens, or leaves. `bridge_appeared`: there was no bridge before."""
-        if bridge_appeared or not self._robot.graph.bridges:
+    def on_graph_change(self, peer_appeared: bool) -> None:
+        """Joins, updates its tokens, or leaves. `peer_appeared`: there was no bridge before."""
+        if peer_appeared or not self._robot.graph.peers:
             self._leave()
-        if bridge_appeared:
+        if peer_appeared:
             self._joining = spawn_logged(self._join(), self._log, FAILED)
         if self._joined:
             self._hold()
@@ -106,7 +106,7 @@ class GraphMembership:
         if time.monotonic() - self._started_at >= FOUND_WITHIN_S:
             await asyncio.sleep(FRESH_S)
         await self._ask_until_answered()
-        if not self._robot.graph.bridges:
+        if not self._robot.graph.peers:
             return  # those that answered are other robots'
         self._hold()
         await self._settle()
@@ -156,7 +156,7 @@ class GraphMembership:
             if self._joined:
                 try:
                     await self._bridges.ask()
-                    if not self._robot.graph.bridges:
+                    if not self._robot.graph.peers:
                         self._leave()
                     elif self._joined:  # it may have left during the query
                         self._hold()

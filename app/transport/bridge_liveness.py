@@ -160,7 +160,7 @@ class BridgeLiveness:
     def _update_bridges(self) -> None:
         """Begins with a new detector if none of the bridges is one of those before, or the session is
         new. If one stays, so does its silence."""
-        bridges = self._robot.graph.bridges if self._robot.link_up else frozenset()
+        bridges = self._robot.graph.peers if self._robot.link_up else frozenset()
         if bridges != self._bridges:
             if not bridges & self._bridges:
                 self._detector = LivenessDetector()

@@ -66,7 +66,7 @@ class PublisherWatch:
         while True:
             await asyncio.sleep(self._every_s)
             with suppress(LinkError):
-                if self._robot.graph.bridges and await self.update():
+                if self._robot.graph.peers and await self.update():
                     self._changed()
 
     async def _publishers(self, key: str) -> list[Publisher]:
@@ -78,7 +78,7 @@ class PublisherWatch:
 
     def _names(self, key: str) -> Iterator[tuple[str, str]]:
         """(bridge, name of the topic behind it)."""
-        for zid in sorted(self._robot.graph.bridges):
+        for zid in sorted(self._robot.graph.peers):
             namespace = self._bridges.namespaces.get(zid, "")
             if within(f"/{key}", namespace):
                 yield zid, f"/{key}".removeprefix(namespace)

@@ -15,7 +15,7 @@ def log(widget: LogView, robot: RobotState) -> tuple[dict[str, Any], float]:
     shown: dict[str, Any] = {"state": "live", "note": "", "count": str(count)}
     if doubt := topic_mismatch("MS", widget, robot):
         shown |= {"state": "unreadable", "note": doubt.reason or ""}
-    elif not robot.link_up or not robot.graph.bridges:
+    elif not robot.link_up or not robot.graph.peers:
         shown |= {"state": "old", "note": say("rosout_cut")}
     elif not count:
         shown |= {"state": "waiting", "note": say("readout_waiting", topic=widget.topic)}

@@ -47,7 +47,7 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
     for session in fleet.sessions:
         robot, name = session.robot, session.entry.id if session.entry else ""
         up.add_metric([name], int(robot.link_up))
-        bridges.add_metric([name], len(robot.graph.bridges))
+        bridges.add_metric([name], len(robot.graph.peers))
         ready.add_metric([name], int(session.link_verdict.permitted))
         for key, count in robot.undecodable.items():
             unreadable.add_metric([name, key], count)

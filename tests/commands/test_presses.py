@@ -172,7 +172,7 @@ def forbids(bench: Bench) -> None:
 
 
 def cuts(bench: Bench) -> None:
-    bench.robot.mark_bridge_lost(BRIDGE, 2)
+    bench.robot.mark_peer_lost(BRIDGE, 2)
 
 
 def garbles(bench: Bench) -> None:

@@ -214,7 +214,7 @@ class Panels(RuleBasedStateMachine):
         self.robot.graph.apply_token(bridge_dialect.server_token(BRIDGE, "SS", "add", SERVICE), False)
         self.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), False)
         self.seq += 1
-        self.robot.mark_bridge_lost(BRIDGE, self.seq)
+        self.robot.mark_peer_lost(BRIDGE, self.seq)
         self.robot.update_publishers()
         self.robot.settled_at = float("inf")
         self.grounds.bridge, self.grounds.settled_at, self.grounds.value = False, None, None

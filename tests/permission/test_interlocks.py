@@ -131,7 +131,7 @@ def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, n
 
 
 def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     verdict = verdict_of(robot)
     assert verdict == locked("cut", topic=ENABLED, wanted=BOOL)
 

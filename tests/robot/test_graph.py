@@ -30,27 +30,27 @@ def graph() -> LiveGraph:
 def test_a_bridge_comes_and_goes() -> None:
     graph = LiveGraph(DIALECT, KIOSK)
     assert graph.apply_token(bridge_token(BRIDGE), True) == BRIDGE
-    assert graph.bridges == {BRIDGE}
+    assert graph.peers == {BRIDGE}
     assert graph.apply_token(bridge_token(BRIDGE), False) == BRIDGE
-    assert graph.bridges == frozenset()
+    assert graph.peers == frozenset()
 
 
 def test_a_topics_token_is_no_bridge(graph: LiveGraph) -> None:
     assert graph.apply_token(topic_token("x", "MP", "a", BOOL), True) is None
-    assert graph.bridges == {BRIDGE}
+    assert graph.peers == {BRIDGE}
 
 
 def test_the_kiosks_own_tokens_do_not_count() -> None:
     graph = LiveGraph(DIALECT, KIOSK)
     assert graph.apply_token(bridge_token(KIOSK), True) is None
     graph.apply_token(topic_token(KIOSK, "MP", "a", BOOL), True)
-    assert graph.bridges == frozenset()
+    assert graph.peers == frozenset()
     assert graph.mismatched_type("MP", "a", TEXT) is None
 
 
 def test_what_is_no_token_changes_nothing(graph: LiveGraph) -> None:
     assert graph.apply_token("@/b1/@ros2_lv/SS/add/x", True) is None
-    assert graph.bridges == {BRIDGE}
+    assert graph.peers == {BRIDGE}
 
 
 @pytest.mark.parametrize("role", ["MP", "MS"])
@@ -141,23 +141,23 @@ def test_routes_of_a_bridge_that_went_do_not_count(graph: LiveGraph) -> None:
 
 
 def test_a_bridge_that_was_not_asked_is_not_silent(graph: LiveGraph) -> None:
-    assert not graph.has_silent_bridge
+    assert not graph.has_silent_peer
 
 
 def test_a_bridge_that_does_not_answer_is_silent(graph: LiveGraph) -> None:
     graph.update_versions({})
-    assert graph.has_silent_bridge
+    assert graph.has_silent_peer
 
 
 def test_a_bridge_that_answers_is_not_silent(graph: LiveGraph) -> None:
     graph.update_versions({BRIDGE: '"1.10.0"', "router": '"1.10.0"'})
-    assert not graph.has_silent_bridge
+    assert not graph.has_silent_peer
 
 
 def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: LiveGraph) -> None:
     graph.apply_token(bridge_token("b2"), True)
     graph.update_versions({"b2": '"v1"'})
-    assert graph.has_silent_bridge
+    assert graph.has_silent_peer
 
 
 def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: LiveGraph) -> None:
@@ -171,20 +171,20 @@ def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: 
 
 def test_an_answer_of_who_is_no_bridge_does_not_help(graph: LiveGraph) -> None:
     graph.update_versions({"router": '"1.10.0"'})
-    assert graph.has_silent_bridge
+    assert graph.has_silent_peer
 
 
 def test_without_a_bridge_nothing_is_silent() -> None:
     graph = LiveGraph(DIALECT)
     graph.update_versions({})
-    assert not graph.has_silent_bridge
+    assert not graph.has_silent_peer
 
 
 def test_a_bridge_that_comes_back_is_asked_anew(graph: LiveGraph) -> None:
     graph.update_versions({})
     graph.apply_token(bridge_token(BRIDGE), False)
     graph.apply_token(bridge_token(BRIDGE), True)
-    assert not graph.has_silent_bridge
+    assert not graph.has_silent_peer
 
 
 @pytest.mark.parametrize(("version", "simulated"), [(DEMO_VERSION, True), ('"1.10.0"', False)])
@@ -274,15 +274,15 @@ def test_a_robots_bridges_are_those_of_its_namespace() -> None:
     graph = LiveGraph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
         graph.apply_token(bridge_token(zid), True)
-    assert graph.bridges == {"b1", "b2", "b3"}  # none has reported its namespace yet
+    assert graph.peers == {"b1", "b2", "b3"}  # none has reported its namespace yet
     graph.update_namespaces({"b1": "/robot1", "b2": "/robot10"})
-    assert graph.bridges == {"b1"}
+    assert graph.peers == {"b1"}
     graph.apply_token(bridge_token("b1"), False)
-    assert graph.bridges == {"b3"}  # it may be the robot's: it has not reported its namespace
+    assert graph.peers == {"b3"}  # it may be the robot's: it has not reported its namespace
     graph.update_namespaces({"b3": ""})
-    assert graph.bridges == {"b3"}  # robots with namespaces of their own are behind it
+    assert graph.peers == {"b3"}  # robots with namespaces of their own are behind it
     graph.update_namespaces({"b3": "/robot2"})
-    assert graph.bridges == frozenset()
+    assert graph.peers == frozenset()
 
 
 def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
@@ -291,14 +291,14 @@ def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
     graph.update_namespaces({"b1": "/robot1"})
     graph.apply_token(bridge_token("b2"), True)
     graph.update_versions({"b1": "v1"})
-    assert not graph.has_silent_bridge
+    assert not graph.has_silent_peer
     graph.update_versions({})
-    assert graph.has_silent_bridge
+    assert graph.has_silent_peer
 
 
 def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: LiveGraph) -> None:
     graph.update_namespaces({BRIDGE: "/robot7"})
-    assert graph.bridges == {BRIDGE}
+    assert graph.peers == {BRIDGE}
 
 
 def test_of_nodes_that_came_and_went_nothing_is_kept(graph: LiveGraph) -> None:

@@ -105,7 +105,7 @@ def test_no_entry_from_before_a_cut_counts(how: str) -> None:
     if how == "doubt":
         cell.robot.invalidate(cell.robot.key(ENABLED))
     elif how == "cut":
-        cell.robot.mark_bridge_lost(BRIDGE, 99)
+        cell.robot.mark_peer_lost(BRIDGE, 99)
     else:
         cell.robot.mark_link_lost()
         cell.robot.link_up, cell.robot.settled_at = True, 0.0
@@ -121,7 +121,7 @@ def test_the_entries_of_a_lost_bridge_end_with_it() -> None:
     cell.says(NOW, finger=0.1)
     assert cell.code(NOW) == "permitted"
     cell.robot.graph.apply_token("@/b2/@ros2_lv", False)
-    cell.robot.mark_bridge_lost("b2", 99)
+    cell.robot.mark_peer_lost("b2", 99)
     assert cell.code(NOW) == "missing"
 
 

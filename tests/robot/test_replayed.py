@@ -97,7 +97,7 @@ def test_after_each_loss_and_each_new_publisher_the_next_is_the_first(event: str
     robot.update_publishers()
     assert [says(robot, JOINED + 3.0), says(robot, JOINED + 5.0)] == [False, True]
     if event == "bridge lost":
-        robot.mark_bridge_lost(BRIDGE, 10**6)
+        robot.mark_peer_lost(BRIDGE, 10**6)
     elif event == "publisher lost":
         endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED, alive=False)
         robot.update_publishers()

@@ -122,7 +122,7 @@ def test_only_the_bridge_of_the_publisher_can_bring_its_message(known: SilentPub
 def test_a_bridge_that_goes_leaves_its_doubt_to_the_next_message(known: SilentPublishers) -> None:
     known.record_message(KEY, OTHER, 1, 0.0)
     known.add_publisher(PUBLISHER, 2, 10.0)
-    known.remove_bridge(BRIDGE)
+    known.remove_peer(BRIDGE)
     assert silent(known, OTHER)
     known.record_message(KEY, OTHER, 3, 10.1)
     assert not silent(known, OTHER)
@@ -282,7 +282,7 @@ def test_a_publisher_that_ended_is_not_the_only_one(known: SilentPublishers, end
     if end == "publisher":
         known.remove_publisher(PUBLISHER, 3)
     else:
-        known.remove_bridge(BRIDGE)
+        known.remove_peer(BRIDGE)
     known.mark_single(KEY)
     assert silent(known)
 

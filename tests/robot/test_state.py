@@ -121,7 +121,7 @@ def test_unreadable_samples_fill_no_log(robot: RobotState, caplog: pytest.LogCap
 @pytest.mark.parametrize("source", [BRIDGE, None])
 def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: RobotState, source: str | None) -> None:
     says(robot, "/heard", "old", seq=1, at=3.0, source=source)
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     reading = robot.reading("/heard")
     assert (reading.status, reading.value("data"), reading.at) == ("cut", "old", 3.0)
 
@@ -129,7 +129,7 @@ def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: RobotState, sour
 def test_a_sample_of_another_bridge_is_not_cut(robot: RobotState) -> None:
     robot.graph.apply_token(bridge_dialect.bridge_token("b2"), True)
     says(robot, "/heard", "fresh", source="b2")
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
@@ -150,7 +150,7 @@ def robot_of_several(namespace: str) -> RobotState:
 
 def test_a_topic_of_the_cell_comes_through_another_bridge() -> None:
     robot = robot_of_several("/r1")
-    assert robot.graph.bridges == {BRIDGE}
+    assert robot.graph.peers == {BRIDGE}
     says(robot, "//cell/heard", "open", source=OTHER)
     assert robot.reading("//cell/heard").status == "message"
     robot.graph.apply_token(bridge_token(OTHER), False)
@@ -179,13 +179,13 @@ def test_the_nodes_log_is_where_the_bridge_has_it(bridge: str, publisher: str | 
 
 def test_a_sample_from_after_the_loss_is_not_cut(robot: RobotState) -> None:
     says(robot, "/heard", "fresh", seq=3)
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
 def test_a_sample_after_the_cut_is_a_message_again(robot: RobotState) -> None:
     says(robot, "/heard", "old")
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     says(robot, "/heard", "new", seq=3)
     assert (robot.reading("/heard").status, robot.reading("/heard").value("data")) == ("message", "new")
 
@@ -193,18 +193,18 @@ def test_a_sample_after_the_cut_is_a_message_again(robot: RobotState) -> None:
 def test_every_topic_of_the_bridge_is_cut(robot: RobotState) -> None:
     says(robot, "/heard", "old")
     says(robot, ENABLED, True, BOOL)
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert {robot.reading(topic).status for topic in ("/heard", ENABLED)} == {"cut"}
 
 
 def test_a_cut_before_anything_was_heard_leaves_waiting(robot: RobotState) -> None:
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "waiting"
 
 
 def test_what_was_unreadable_before_the_cut_has_no_message(robot: RobotState) -> None:
     broken(robot)
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert (robot.reading("/heard").status, robot.reading("/heard").fields) == ("cut", None)
 
 

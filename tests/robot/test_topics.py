@@ -234,7 +234,7 @@ def test_what_was_being_read_when_it_stopped_to_count_never_counts(how: str) -> 
         cell.says(0)
         assert cell.locked_by == "reading"
         if how == "cut":
-            cell.robot.mark_bridge_lost(BRIDGE, 99)
+            cell.robot.mark_peer_lost(BRIDGE, 99)
         elif how == "doubt":
             cell.robot.invalidate("operation_enabled")
         else:

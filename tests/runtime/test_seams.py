@@ -114,7 +114,7 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
     page = Page(panel, robot)
     news = taken(intake.steps(changes), page)
-    assert (news.urgent, news.bridge_appeared) == (True, False)
+    assert (news.urgent, news.peer_appeared) == (True, False)
     assert robot.reading(ENABLED).value("data") is False
     assert "was not processed completely" in caplog.text
 

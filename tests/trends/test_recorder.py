@@ -93,7 +93,7 @@ def test_what_is_not_known_is_a_gap(cut: str) -> None:
         if cut == "link":
             cell.robot.mark_link_lost()
         elif cut == "bridge":
-            cell.robot.mark_bridge_lost(BRIDGE, 100)
+            cell.robot.mark_peer_lost(BRIDGE, 100)
         elif cut == "unreadable":
             cell.says(b"\x00\x01\x00\x00abc")
         elif cut == "nan":

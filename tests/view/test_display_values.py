@@ -33,7 +33,7 @@ def shown(
     if fields is not None:
         robot.update("heard", Sample(INTERFACES.encode(type_name, fields), 1, NOW, NOW, BRIDGE))
     if cut:
-        robot.mark_bridge_lost(BRIDGE, 2)
+        robot.mark_peer_lost(BRIDGE, 2)
     return build_view(panel, robot, now).view["widgets"]["heard"]
 
 

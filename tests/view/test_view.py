@@ -198,7 +198,7 @@ def test_a_readout_shows_value_and_time_of_reception(robot: RobotState) -> None:
 @pytest.mark.usefixtures("utc")
 def test_a_readout_from_before_a_cut_says_so(robot: RobotState) -> None:
     says(robot, "/heard", "hello", at=3661.0)
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     shown, _ = heard(robot)
     assert english(shown) == {
         "state": "old",
@@ -226,7 +226,7 @@ def test_a_readout_of_a_topic_of_another_type_says_so(robot: RobotState) -> None
 
 def test_what_was_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> None:
     robot.update("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
-    robot.mark_bridge_lost(BRIDGE, 2)
+    robot.mark_peer_lost(BRIDGE, 2)
     assert heard(robot)[0]["state"] == "waiting"
 
 

@@ -64,7 +64,7 @@ class GoalTracker:
     def on_graph_change(self) -> None:
         """Cuts off goals whose action server or bridge is lost. Call it after every change of the
         graph."""
-        bridge = bool(self._robot.graph.bridges)
+        bridge = bool(self._robot.graph.peers)
         if not bridge:
             self._states.clear()
         for goal in (*self._latest.values(), *self._results.goals):

@@ -53,7 +53,7 @@ class HoldMessages:
     def put_last(self, widget: HoldCommand, values: Values, now: float) -> TextLike:
         """Publishes the stop message if the link is up, even without permission: an extra stop does no
         harm. Returns why it was not sent, else ""."""
-        if not self._robot.link_up or not self._robot.graph.bridges:
+        if not self._robot.link_up or not self._robot.graph.peers:
             return link_verdict(self._robot, now).reason or ""
         try:
             self._put(widget, widget.stopping(), values, 0, no_check)

@@ -99,7 +99,7 @@ class ParameterSync:
         graph."""
         for node in self._nodes.values():
             offered = parameters_offered(node.name, self._robot) is None
-            if not (offered and self._robot.graph.bridges):
+            if not (offered and self._robot.graph.peers):
                 self._cut(node)
             elif node.task is None:
                 node.task = spawn_logged(self._keep_updated(node), self._log, FAILED)
@@ -124,7 +124,7 @@ class ParameterSync:
     def on_event(self, key: str, sample: Sample) -> None:
         """Applies a parameter event of any node, from the topic of this key. Queries the nodes if an
         event may have been missed."""
-        passed_on = self._robot.is_from_bridge(key, sample.source)
+        passed_on = self._robot.is_from_peer(key, sample.source)
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
