@@ -69,7 +69,7 @@ addEventListener("input", ({ target }) => {
 
 // What was entered here before is entered again, and what is entered now is kept: by a script that a page without
 // entries does not need. Where the browser keeps nothing, a page begins with the panel's values.
-export const KEPT = "operator-panel.entries";
+export const KEPT = `operator-panel.entries ${document.body.dataset.base}/${document.body.dataset.page}`;
 
 function hasKept() {
   try {

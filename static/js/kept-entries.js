@@ -6,9 +6,8 @@ const NUMBERS = "[data-number], [data-list]";
 const { enterPortable, portable } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
 if (document.querySelector("[data-step]")) await import("./inputs.js"); // sliders are there after it
 
-const { base, page, revision, seen } = document.body.dataset;
+const { revision, seen } = document.body.dataset;
 const STAMP = `${revision} ${seen.slice(0, seen.lastIndexOf("-"))}`; // the server's files and its start
-const PLACE = `${base}/${page}`;
 
 // null for what must not be restored.
 function valueOf(input) {
@@ -31,20 +30,19 @@ function fill(input, value) {
   return true;
 }
 
-// The entries of each page, with the start of the server in which they were made.
-const kept = () => JSON.parse(sessionStorage.getItem(KEPT) ?? "{}");
-
+// Each page has an item of its own: one that closes late overwrites no other's. It is written at each input, since the
+// next page may be there before this one is hidden.
 function keep() {
   const typed = entries.filter((input) => changed.has(input) && isTouched(input));
   const values = typed.map((input) => [input.name, valueOf(input)]).filter(([, value]) => value !== null);
-  sessionStorage.setItem(KEPT, JSON.stringify({ ...kept(), [PLACE]: { stamp: STAMP, values: Object.fromEntries(values) } }));
+  sessionStorage.setItem(KEPT, JSON.stringify({ stamp: STAMP, values: Object.fromEntries(values) }));
 }
 
-const { stamp, values = {} } = kept()[PLACE] ?? {};
+const { stamp, values = {} } = JSON.parse(sessionStorage.getItem(KEPT) ?? "{}");
 for (const [name, value] of stamp === STAMP ? Object.entries(values) : []) {
   const input = entries.find((one) => one.name === name);
   if (!input || changed.has(input) || input.closest("[inert]") || !fill(input, value)) continue;
   input.dispatchEvent(new InputEvent("input", { bubbles: true, inputType: "insertReplacementText" }));
 }
-addEventListener("pagehide", keep);
+for (const event of ["input", "change", "pagehide"]) addEventListener(event, keep);
 document.documentElement.dataset.kept = ""; // what was entered before is there

@@ -148,7 +148,7 @@ def test_a_log_that_is_switched_off_keeps_nothing(
     assert "operator's log is switched off" in page_text(kiosk, "/log")
     assert kiosk.http.get("/log.csv").status_code == 404
     assert 'href="/log"' not in page_text(kiosk, "/")
-    assert {file.name for file in kiosk.data.iterdir()} == {"server.lock", "messages-jazzy.json"}
+    assert {file.name for file in kiosk.data.iterdir()} == {"server.lock"}
 
 
 @contextmanager

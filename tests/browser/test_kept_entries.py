@@ -198,7 +198,7 @@ def test_what_is_outside_the_limits_or_no_number_is_not_restored(kiosk: Server, 
     page.evaluate(
         """() => {
           const wrong = '"level":"5000","mode":"7","light":"x"';
-          const key = "operator-panel.entries";
+          const key = Object.keys(sessionStorage).find((name) => name.endsWith("/one"));
           addEventListener("pagehide", () => {
             sessionStorage.setItem(key, sessionStorage.getItem(key).replace('"level":"5"', wrong));
           });

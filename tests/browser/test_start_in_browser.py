@@ -146,6 +146,18 @@ PRESS_ALL: Final = """async () => {
 }"""
 
 
+def go(page: Page, url: str, **options: Any) -> None:
+    """Opens a page; one that was locked before may be reloading itself, which aborts this."""
+
+    def opened() -> bool:
+        with suppress(Error):
+            page.goto(url, **options)
+            return True
+        return False
+
+    until(opened, f"{url} is open")
+
+
 def presses_all_buttons(page: Page) -> bool:
     """Whether all buttons of a locked page were pressed; the page may be loaded again at any moment."""
     with suppress(Error):
@@ -180,7 +192,7 @@ def test_a_page_whose_script_has_a_fault_is_locked_and_presses_nothing(
     posts = noted(tab, "POST")
     for script in ("main", "press", "tabs", "kinds/hold"):
         answer(tab, script, fault)
-        tab.goto(f"{demo.url}/pages/cell")
+        go(tab, f"{demo.url}/pages/cell")
         is_locked(tab)
         until(lambda: presses_all_buttons(tab), "the locked page is pressed")
         is_locked(tab)
@@ -191,7 +203,7 @@ def test_a_page_whose_script_has_a_fault_is_locked_and_presses_nothing(
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_each_script_is_needed(demo: Server, tab: Page, script: str) -> None:
     answer(tab, script, "500")
-    tab.goto(f"{demo.url}/pages/{SCRIPTS[script]}")
+    go(tab, f"{demo.url}/pages/{SCRIPTS[script]}")
     is_locked(tab)
 
 
@@ -199,7 +211,7 @@ def test_each_script_is_needed(demo: Server, tab: Page, script: str) -> None:
 def test_a_page_is_locked_in_the_readers_language(demo: Server, tab: Page, language: str) -> None:
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
     answer(tab, "main", "500")
-    tab.goto(demo.url)
+    go(tab, demo.url)
     expect(tab.locator("#fault")).to_have_text(sentence("page_faulty", language))
     expect(tab.locator("#why-operation")).to_contain_text(sentence("page_faulty", language))
 
@@ -222,7 +234,7 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
 ) -> None:
     tab.add_init_script(KEEP_TIMERS + storage)
     answer(tab, "full-text", "500")
-    tab.goto(demo.url)
+    go(tab, demo.url)
     for pause_s in PAUSES_S:
         is_locked(tab)
         assert kept_timers(tab) == [pause_s]
@@ -245,7 +257,7 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
 def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     answer(tab, "full-text", "500")
-    tab.goto(demo.url)
+    go(tab, demo.url)
     is_locked(tab)
     tab.route("**/static/*/main.js", lambda route: route.abort())
     for pause_s, longer_s in pairwise(PAUSES_S[:4]):
@@ -257,7 +269,7 @@ def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, ta
 def test_a_script_that_never_arrives_locks_the_page(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     tab.route("**/static/*/press.js", lambda route: None)
-    tab.goto(demo.url, wait_until="domcontentloaded")
+    go(tab, demo.url, wait_until="domcontentloaded")
     end_timer(tab, STARTS_WITHIN_S)
     is_locked(tab)
 
@@ -265,7 +277,7 @@ def test_a_script_that_never_arrives_locks_the_page(demo: Server, tab: Page) -> 
 def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     answer(tab, "floor/floor", "500")
-    tab.goto(demo.url)
+    go(tab, demo.url)
     is_locked(tab)
     streams = noted(tab, "/events")
     for hidden in (True, False):
@@ -277,7 +289,7 @@ def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Pa
 
 def test_a_press_that_fails_before_it_is_sent_says_that_it_was_not(demo: Server, tab: Page) -> None:
     tab.route("**/press-socket.js", lambda route: route.abort())
-    tab.goto(demo.url)
+    go(tab, demo.url)
     expect(tab.locator("html[data-floor]")).to_be_attached()
     button = tab.get_by_role("button", name="Publish", exact=True)
     expect(button).to_be_enabled()
@@ -297,7 +309,7 @@ def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
     tab.add_init_script(NEEDS[need])
     streams = noted(tab, "/events")
-    tab.goto(demo.url)
+    go(tab, demo.url)
     expect(tab.locator("body")).to_have_text(sentence("browser_too_old", language))
     expect(tab.locator(".too-old")).to_be_visible()
     assert tab.locator("button, input, select, form").count() == 0
