@@ -4,7 +4,7 @@ import time
 
 from app import main
 from app.process import shutdown
-from app.runtime import robot_session
+from app.runtime import wiring
 from app.transport.zenoh_session import ZenohSession
 
 
@@ -13,6 +13,6 @@ class Standing(ZenohSession):
         time.sleep(60)
 
 
-vars(robot_session)["ZenohSession"] = Standing
+vars(wiring)["ZenohSession"] = Standing
 vars(shutdown)["SHUTDOWN_TIMEOUT_S"] = 5.0
 app = main.app
