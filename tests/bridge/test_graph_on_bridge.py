@@ -288,11 +288,13 @@ def test_the_routes_tell_which_panels_use_them(
     bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[..., object]
 ) -> None:
     servers(live(bridge.endpoint, tmp_path))
-    graph = until_graph(
-        bridge.endpoint,
-        lambda graph: any(r.key == "operation" and r.remote for g in graph.robots for r in g.routes),
-        "the panel's routes",
-    )
+
+    def has_route(graph: GraphSnapshot) -> bool:
+        """The bridge learns later which node a subscription belongs to."""
+        routes = (route for robot in graph.robots for route in robot.routes)
+        return any(r.key == "operation" and r.remote and r.local_nodes for r in routes)
+
+    graph = until_graph(bridge.endpoint, has_route, "the panel's routes")
     (found,) = graph.robots
     (route,) = [r for r in found.routes if r.key == "operation" and r.remote]
     assert (route.kind, route.direction, route.local_nodes) == ("topic", "sub", ("/system_controller",))
