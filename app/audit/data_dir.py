@@ -30,7 +30,7 @@ class DataDir:
         self._lock = str(path / LOCK)
         self._fd: int | None = None
 
-    def hold(self) -> None:
+    def claim(self) -> None:
         """Creates and locks the folder; FolderInUse names the process that has it, OSError if it can't
         be created."""
         if self._fd is not None and self._lock_is_in_place(self._fd):
@@ -67,7 +67,7 @@ class DataDir:
         end = loop.time() + HELD_BY_OTHER_S
         while True:
             try:
-                return self.hold()
+                return self.claim()
             except FolderInUse:
                 if loop.time() > end:
                     raise

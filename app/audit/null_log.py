@@ -59,7 +59,7 @@ class NullLog:
         """LogError if another server has taken the folder in the meantime."""
         if self._folder is not None:
             try:
-                self._folder.hold()
+                self._folder.claim()
             except FolderInUse as error:
                 raise LogError(say("folder_taken", why=error.text)) from error
             except OSError as error:

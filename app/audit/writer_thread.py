@@ -210,7 +210,7 @@ class WriterThread:
     def _open(self) -> None:
         try:
             with as_log_error():
-                self._folder.hold()
+                self._folder.claim()
             self._store = store = self._opening.store(self.head)
             self._syncer.set_store(store)
             store.probe()

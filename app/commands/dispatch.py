@@ -32,7 +32,7 @@ async def assume_flushed() -> bool:
     return True
 
 
-class Outgoing(NamedTuple):
+class PreparedPress(NamedTuple):
     """A press to be sent: the checked `values` of its inputs, the `fields` of the filled-in template,
     and the other arguments of `Dispatcher.send`."""
 
@@ -82,7 +82,7 @@ class Dispatcher:
         self._parameters = trackers.parameters
         self._monotonic = monotonic
         # By kind or family of widgets: how to send it, why it would be refused, how to check an entry.
-        self.senders: Mapping[type[Any], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {
+        self.senders: Mapping[type[Any], Callable[[Any, PreparedPress], Awaitable[Outcome]]] = {
             PublishPress: self._publish,
             Call: self._call,
             Action: self._start,
@@ -158,14 +158,14 @@ class Dispatcher:
         values = self.check_inputs(self._input_ids[widget.id], inputs)
         fields = fill(widget.template, add_now(values))
         send = find_row(self.senders, widget)
-        return await send(widget, Outgoing(values, fields, press_id, correct, entry, final_check))
+        return await send(widget, PreparedPress(values, fields, press_id, correct, entry, final_check))
 
     def refusal(self, widget: PressCommand, inputs: Mapping[str, Any]) -> TextLike:
         """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
         values = self.check_inputs(self._input_ids[widget.id], inputs)
         return find_row(self.refusals, widget)(widget, fill(widget.template, add_now(values)))
 
-    async def _publish(self, widget: PublishPress, going: Outgoing) -> Outcome:
+    async def _publish(self, widget: PublishPress, going: PreparedPress) -> Outcome:
         if widget.confirm is None:
             return await self._until_flushed(widget, self._put(widget, going.fields, going.final_check))
         equals = self._expected(widget.confirm, going.values)
@@ -184,7 +184,7 @@ class Dispatcher:
         self._interfaces.encode(widget.type, fields)
         return ""
 
-    async def _call(self, widget: Call, going: Outgoing) -> Outcome:
+    async def _call(self, widget: Call, going: PreparedPress) -> Outcome:
         request, _ = self._interfaces.service_types(widget.type)
         payload = self._interfaces.encode(request, going.fields)
         return await self._calls.call(widget, payload, going.press_id, going.correct, going.final_check)
@@ -193,12 +193,12 @@ class Dispatcher:
         self._interfaces.encode(self._interfaces.service_types(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
-    async def _start(self, widget: Action, going: Outgoing) -> Outcome:
+    async def _start(self, widget: Action, going: PreparedPress) -> Outcome:
         return await self.actions.start(
             widget, going.fields, going.press_id, going.correct, going.entry, going.final_check
         )
 
-    async def _set(self, widget: Parameter, going: Outgoing) -> Outcome:
+    async def _set(self, widget: Parameter, going: PreparedPress) -> Outcome:
         value = going.fields["value"]
         return await self._parameters.set(
             widget, value, going.press_id, going.correct, going.final_check

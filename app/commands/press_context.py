@@ -14,13 +14,13 @@ from app.audit.press_record import Log, origin_of
 from app.errors import InputError
 from app.i18n import TextLike, number, say
 from app.permission.control_authority import ControlAuthority
-from app.permission.press_permission import NO_GROUNDS, Grounds
+from app.permission.press_permission import NO_CONDITIONS, ServerConditions
 from app.permission.principal import Principal
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.view.publisher import ViewPublisher
 
 MAX_AHEAD_S: Final = 1.0  # tolerance for a press time in the future: rounding and drift
-EVENT_ID: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>
+EVENT_ID: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <instance_id>-<version>
 MAX_ID_LENGTH: Final = 64
 PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{MAX_ID_LENGTH}}}$"
 _is_event_id: Final = re.compile(EVENT_ID).fullmatch
@@ -39,7 +39,7 @@ class PressContext:
     view that the operator saw is stale, "" if it is not."""
 
     origin: Origin
-    grounds: Callable[[], Grounds] = lambda: NO_GROUNDS
+    grounds: Callable[[], ServerConditions] = lambda: NO_CONDITIONS
     stale_reason: Callable[[], TextLike] = never_stale
 
 
@@ -52,15 +52,14 @@ class PressGuard:
         control: ControlAuthority,
         operators_log: Log,
         expires_s: float,
-        boots: Callable[[], Collection[str]],
+        instance_ids: Callable[[], Collection[str]],
     ) -> None:
-        """`boots` returns the boot ids of all robots' views: a press with another robot's id is
-        refused."""
+        """`instance_ids`: those of the views of all robots. A press with another robot's is refused."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
         self._expires_s = expires_s
-        self._boots = boots
+        self._instance_ids = instance_ids
         self._ended = False
 
     def close(self) -> None:
@@ -101,21 +100,22 @@ class PressGuard:
         return say("ahead") if age < -MAX_AHEAD_S else ""
 
     def _check(self, seen: str) -> None:
-        boot, _, version = seen.partition("-")
+        instance_id, _, version = seen.partition("-")
         if not _is_event_id(seen):
             raise InputError(f'seen: "{seen:.60}" is not the id of an event')
-        if boot == self._publisher.boot and int(version) > self._publisher.version:
+        if instance_id == self._publisher.instance_id and int(version) > self._publisher.version:
             newest = self._publisher.id
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
 
-    def _grounds(self, who: Principal) -> Grounds:
-        return Grounds(self._control.verdict(who), self._log.lock, self._ended, who)
+    def _grounds(self, who: Principal) -> ServerConditions:
+        return ServerConditions(self._control.verdict(who), self._log.lock, self._ended, who)
 
     def _stale_reason(self, widget: str, seen: str, at: float | None) -> TextLike:
         """Why the view that the operator saw is stale, "" if it is not."""
-        boot, _, version = seen.partition("-")
-        if boot and boot != self._publisher.boot:
-            return say("seen_on_another" if boot in self._boots() else "seen_before_restart")
-        if boot and int(version) < self._publisher.lock_changed_at(widget):
+        instance_id, _, version = seen.partition("-")
+        if instance_id and instance_id != self._publisher.instance_id:
+            is_other = instance_id in self._instance_ids()
+            return say("seen_on_another" if is_other else "seen_before_restart")
+        if instance_id and int(version) < self._publisher.lock_changed_at(widget):
             return say("changed_meanwhile")
         return "" if at is None else self.late(at)

@@ -17,7 +17,7 @@ from app.robot.state import RobotState
 
 
 @dataclass(frozen=True, slots=True)
-class Arrivals:
+class PendingSamples:
     """Data that has arrived from the robot: `ingest` applies it to the robot's state, `has_urgent`
     returns whether more has arrived that may change a permission."""
 
@@ -33,7 +33,7 @@ class PressJudge:
         self,
         panel: Panel,
         robot: RobotState,
-        latest: Arrivals,
+        latest: PendingSamples,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._panel = panel

@@ -98,7 +98,7 @@ async def _shakes_hands(report: Report, zenoh: Path, endpoint: str, robot: str) 
 async def check_version(report: Report, session: AdminSession, endpoint: str, robot: str) -> None:
     """Whether the other side has this Zenoh; its admin space may be off."""
     ours = version("eclipse-zenoh")
-    answers = await asyncio.gather(*(session.ask(selector, ASK_S) for selector in ROUTERS))
+    answers = await asyncio.gather(*(session.query_all(selector, ASK_S) for selector in ROUTERS))
     for _, answer in (one for several in answers for one in several):
         with suppress(
             ValueError, TypeError, AttributeError, LookupError, RecursionError

@@ -109,7 +109,7 @@ def _in_use(report: Report, folder: Path, served: bool) -> bool:
         return False
     data = DataDir(folder)
     try:
-        data.hold()
+        data.claim()
     except FolderInUse as error:
         report.find("data_in_use", str(folder), detail=str(error))
         return True

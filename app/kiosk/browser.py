@@ -12,7 +12,7 @@ from app.errors import SettingsError
 from app.kiosk.child import Child, high_pipe
 from app.kiosk.config import BROWSERS
 from app.kiosk.devtools import BROWSER_READS, BROWSER_WRITES, DevTools, DevToolsError, Event, NoResponse
-from app.kiosk.judge import Look
+from app.kiosk.judge import PageStatus
 from app.kiosk.page_script import KEEP_IN, LOOK
 
 # How long a browser may take to start on a busy machine.
@@ -107,19 +107,19 @@ class Browser:
         except TimeoutError:
             raise NoResponse(f"the browser did not start within {STARTS_WITHIN_S:g} s") from None
 
-    async def look(self, waiting_url: str, origin: str) -> Look:
+    async def look(self, waiting_url: str, origin: str) -> PageStatus:
         """What the page shows now."""
         await self._close_others()
         if self._crashed:
-            return Look(crashed=True)
+            return PageStatus(crashed=True)
         try:
             seen = await self._evaluate(LOOK)
         except NoResponse:
-            return Look(crashed=True) if self._crashed else Look(responds=False)
+            return PageStatus(crashed=True) if self._crashed else PageStatus(responds=False)
         except DevToolsError:  # between two documents; a browser that is gone is seen by its end
-            return Look(crashed=self._crashed, on_panel=True, ours=True, age_s=0.0)
+            return PageStatus(crashed=self._crashed, on_panel=True, ours=True, age_s=0.0)
         url = str(seen["url"])
-        return Look(
+        return PageStatus(
             waiting=url == waiting_url,
             on_panel=url.startswith(f"{origin}/"),
             ours=bool(seen["ours"]),

@@ -25,7 +25,7 @@ class Action(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class PageStatus:
     """What was seen of the page. `age_s` is the age of its last event, None if it has no stream."""
 
     responds: bool = True
@@ -55,7 +55,7 @@ class Judge:
         self._pause_s = SILENT_AFTER_S
         self._silent_before = -LONGEST_PAUSE_S
 
-    def judge(self, look: Look, server_answers: bool | None, now: float) -> Verdict:
+    def judge(self, look: PageStatus, server_answers: bool | None, now: float) -> Verdict:
         """`server_answers` is None if it was not queried: a page with young events shows that it does.
         `now` is in seconds of a monotonic clock."""
         verdict = self._judge(look, server_answers, now)
@@ -68,7 +68,7 @@ class Judge:
             self._opened.clear()
         return verdict
 
-    def _judge(self, look: Look, server: bool | None, now: float) -> Verdict:
+    def _judge(self, look: PageStatus, server: bool | None, now: float) -> Verdict:
         opened = Action.OPEN_WAITING if server is False else Action.OPEN_PANEL
         if look.crashed:
             return Verdict(opened, "the page crashed")
@@ -85,7 +85,7 @@ class Judge:
             return Verdict(opened, "no page of the panel is shown")
         return self._silence(look, server, now)
 
-    def _silence(self, look: Look, server: bool | None, now: float) -> Verdict:
+    def _silence(self, look: PageStatus, server: bool | None, now: float) -> Verdict:
         """A page whose events are old while the server answers is opened again, then the browser
         restarted, each time after a longer pause."""
         if look.age_s is not None and look.age_s < SILENT_AFTER_S:

@@ -30,7 +30,7 @@ from app.robot.keyed_values import kept_s
 from app.robot.state import Reading, RobotState
 
 # The codes of a `link_verdict` that locks.
-NO_WAY: Final = frozenset(
+LINK_CODES: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
 )
 
@@ -88,13 +88,13 @@ def interlock_verdict(
 def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
     """The verdict of an interlock of a robot that can be reached."""
     topic, key = interlock.topic, robot.key(interlock.topic)
-    if doubt := topic_mismatch("MS", interlock, robot):
-        return doubt
+    if mismatch := topic_mismatch("MS", interlock, robot):
+        return mismatch
     if interlock.require_publisher and not robot.graph.has_endpoint("MP", key):
         return locked("no_publisher", topic=topic)
     is_single = interlock.publishers == "one"
-    if is_single and (doubt := several_publishers(interlock, robot)):
-        return doubt
+    if is_single and (mismatch := several_publishers(interlock, robot)):
+        return mismatch
     lacking_s = kept_s(interlock.max_age_s, single_publisher=is_single)
     reading = robot.reading(topic).of_field(interlock.field, lacking_s)
     if reading.status != "message":
@@ -169,8 +169,8 @@ def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict |
 
 def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
     """Why a message may not be published: another type, or the last one's effect is awaited."""
-    if doubt := topic_mismatch("MP", of, robot):
-        return doubt
+    if mismatch := topic_mismatch("MP", of, robot):
+        return mismatch
     if of.one_at_a_time and robot.command_status.get(of.id, IDLE).busy:
         return locked("busy")
     return None
@@ -191,8 +191,8 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
     """The value from which a step is made, None where it is not known now; and why that locks, or until
     when it counts."""
     of = step.value
-    if doubt := topic_mismatch("MS", of, robot):
-        return None, doubt
+    if mismatch := topic_mismatch("MS", of, robot):
+        return None, mismatch
     reading = robot.reading(of.topic).of_field(of.field, kept_s(of.max_age_s))
     if reading.status != "message":
         return None, locked(reading.status, topic=of.topic, wanted=of.type)

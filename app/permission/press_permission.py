@@ -16,7 +16,7 @@ from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.permission.interlocks import (
-    NO_WAY,
+    LINK_CODES,
     blocked_buttons,
     command_blocked,
     interlock_verdict,
@@ -28,7 +28,7 @@ from app.robot.state import RobotState
 
 
 @dataclass(frozen=True, slots=True)
-class Grounds:
+class ServerConditions:
     """Why the server itself locks a press.
 
     `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
@@ -41,10 +41,10 @@ class Grounds:
     who: Principal | None = None
 
 
-NO_GROUNDS: Final = Grounds()
+NO_CONDITIONS: Final = ServerConditions()
 
 
-class Question(NamedTuple):
+class PermissionRequest(NamedTuple):
     """May `widget` be pressed at `now` (monotonic seconds)? `link` and `interlocks` (the widget's
     own, in their order) are verdicts that are known already: they are the same for many widgets."""
 
@@ -53,7 +53,7 @@ class Question(NamedTuple):
     now: float
     link: Verdict
     interlocks: Sequence[Verdict]
-    grounds: Grounds = NO_GROUNDS
+    grounds: ServerConditions = NO_CONDITIONS
 
 
 class Check(NamedTuple):
@@ -62,16 +62,16 @@ class Check(NamedTuple):
     same interlocks whose topic can be used."""
 
     name: str
-    judge: Callable[[Question], Verdict | None]
+    judge: Callable[[PermissionRequest], Verdict | None]
     alone: bool = True
     alike: bool = False
 
 
-def _ending(of: Question) -> Verdict | None:
+def _ending(of: PermissionRequest) -> Verdict | None:
     return locked("ending") if of.grounds.ending else None
 
 
-def _log(of: Question) -> Verdict | None:
+def _log(of: PermissionRequest) -> Verdict | None:
     lock = of.grounds.log_lock
     return Verdict(False, "log", lock) if lock else None
 
@@ -87,12 +87,12 @@ CHECKS: Final = (
 
 # Why a receipt says that it was refused, by a verdict's code; "interlock" for all others.
 CAUSES: Final[Mapping[str, Cause]] = {
-    **dict.fromkeys((*NO_WAY, "no_service", "no_parameters", "getting_ready", "ending"), "link"),
+    **dict.fromkeys((*LINK_CODES, "no_service", "no_parameters", "getting_ready", "ending"), "link"),
     "log": "log",
 }
 
 
-def permission(question: Question) -> Verdict:
+def permission(question: PermissionRequest) -> Verdict:
     """The verdict of all checks, in their order."""
     verdicts = []
     for check in CHECKS:
@@ -111,14 +111,14 @@ def permissions(
     now: float,
     link: Verdict,
     interlocks: Mapping[str, Verdict],
-    grounds: Grounds = NO_GROUNDS,
+    grounds: ServerConditions = NO_CONDITIONS,
 ) -> dict[str, Verdict]:
     """The verdicts of all commands of a panel, by their ids. Uniform buttons with the same interlocks
     are judged once, and get one object."""
 
     def judge(widget: Command) -> Verdict:
         own = [interlocks[name] for name in widget.interlocks]
-        return permission(Question(widget, robot, now, link, own, grounds))
+        return permission(PermissionRequest(widget, robot, now, link, own, grounds))
 
     verdicts: dict[str, Verdict] = {}
     groups = panel.uniform_buttons.values() if all(check.alike for check in CHECKS) else ()
@@ -138,12 +138,12 @@ def judged(
     interlocks: Iterable[Interlock],
     robot: RobotState,
     now: float,
-    grounds: Grounds = NO_GROUNDS,
+    grounds: ServerConditions = NO_CONDITIONS,
 ) -> Verdict:
     """Whether a widget with these interlocks may be pressed or held now."""
     link = link_verdict(robot, now)
     permissions = [interlock_verdict(one, robot, now, link) for one in interlocks]
-    return permission(Question(widget, robot, now, link, permissions, grounds))
+    return permission(PermissionRequest(widget, robot, now, link, permissions, grounds))
 
 
 def combined(verdicts: Sequence[Verdict]) -> Verdict:

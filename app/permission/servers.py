@@ -35,8 +35,8 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
         return locked("no_service", name=name)
     if found != call.type:
         return locked("wrong_type", topic=name, found=found, wanted=call.type)
-    if doubt := _unfit(role, name, robot):
-        return doubt
+    if mismatch := _unfit(role, name, robot):
+        return mismatch
     ready_at = robot.graph.since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
@@ -60,10 +60,10 @@ def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:
 def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
     """Why a parameter may not be set: its node is not running or has not reported what may be set, or
     a response is awaited."""
-    if doubt := parameters_offered(parameter.node, robot) or unsettable(
+    if mismatch := parameters_offered(parameter.node, robot) or unsettable(
         parameter, robot.parameters.get(parameter.id, UNKNOWN)
     ):
-        return doubt
+        return mismatch
     return locked("busy") if robot.command_status.get(parameter.id, IDLE).busy else None
 
 
@@ -75,8 +75,8 @@ def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
             return locked("no_parameters", node=node)
         if found != wanted:
             return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
-        if doubt := _unfit("SS", f"{node}/{name}", robot):
-            return doubt
+        if mismatch := _unfit("SS", f"{node}/{name}", robot):
+            return mismatch
     return None
 
 

@@ -22,7 +22,7 @@ POLL_INTERVAL_S: Final = 0.05
 
 
 class RespondingLink(Protocol):
-    def respond(self) -> None:
+    def probe(self) -> None:
         """Returns if the link is not stalled; blocks while it is."""
 
 
@@ -75,7 +75,7 @@ class Watchdog:
         for _, link in links:
             if id(link) not in self._probes:
                 # A separate thread: the executor's may all be busy, and this one may never end.
-                thread = threading.Thread(target=link.respond, name="watchdog", daemon=True)
+                thread = threading.Thread(target=link.probe, name="watchdog", daemon=True)
                 self._probes[id(link)] = thread
                 thread.start()
         end = loop.time() + self._every_s / 2

@@ -103,8 +103,8 @@ class Fleet:
     def link_statuses(self) -> Mapping[str, Lamp]:
         return {entry: k.refresher.lamp for entry, k in self._sessions.items() if entry is not None}
 
-    def boots(self) -> Collection[str]:
-        return {session.publisher.boot for session in self.sessions}
+    def instance_ids(self) -> Collection[str]:
+        return {session.publisher.instance_id for session in self.sessions}
 
     def show_but(self, robot: RobotState) -> None:
         for session in self.sessions:

@@ -11,7 +11,7 @@ from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
 from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
-from app.commands.press_judge import Arrivals, PressJudge
+from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.robot.sample_handlers import SampleHandlers
@@ -51,7 +51,7 @@ class RobotCommands:
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             flushed=peer.flushed,
         )
-        arrivals = Arrivals(context.signals.judging.emit, lambda: link.has_immediate)
+        arrivals = PendingSamples(context.signals.judging.emit, lambda: link.has_immediate)
         judge = PressJudge(panel, robot, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(

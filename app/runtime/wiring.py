@@ -77,7 +77,9 @@ def wire_session(
     sources = ViewSources(control, operators_log, others, server.recordings, server.simulated)
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
-    press_guard = PressGuard(publisher, control, operators_log, panel.press_expires_s, others.boots)
+    press_guard = PressGuard(
+        publisher, control, operators_log, panel.press_expires_s, others.instance_ids
+    )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)

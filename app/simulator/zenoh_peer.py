@@ -20,7 +20,7 @@ from app.interfaces import Interfaces
 from app.simulator.simulated import SimulatedRobot
 from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_action import served
-from app.simulator.zenoh_robot import PlayedRobot
+from app.simulator.zenoh_robot import SimulatedZenohRobot
 
 log = logging.getLogger("kiosk.simulator")
 
@@ -48,7 +48,7 @@ class Simulator:
         self._session = zenoh.open(_listening(endpoint))
         keys: set[str] = set()
         self.robots = [
-            PlayedRobot(self._session, namespace, robot, interfaces, self._lock, keys)
+            SimulatedZenohRobot(self._session, namespace, robot, interfaces, self._lock, keys)
             for namespace, robot in robots.items()
         ]
         self._declared = list(self._graph(robots))

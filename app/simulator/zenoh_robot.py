@@ -14,7 +14,7 @@ from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_action import Answer, PlayedAction, latched, served
 
 
-class PlayedRobot:
+class SimulatedZenohRobot:
     """One robot, in its namespace."""
 
     def __init__(

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 class AdminSpace(Protocol):
     """The part of the Zenoh session that queries of the admin space need."""
 
-    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]:
+    async def query_all(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer that arrives in time. LinkError without a link."""
 
 
@@ -22,7 +22,7 @@ class GraphLink(AdminSpace, Protocol):
 async def ask_json(link: AdminSpace, selector: str) -> list[tuple[str, Any]]:
     """(key, answer) of each answer that is JSON; others are ignored. LinkError without a link."""
     found = []
-    for key, answer in await link.ask(selector):
+    for key, answer in await link.query_all(selector):
         with suppress(ValueError, RecursionError):
             found.append((key, json.loads(answer)))
     return found

@@ -28,14 +28,14 @@ class BridgeAdmin:
 
     async def answered(self, within_s: float) -> bool:
         """Whether all of the bridges answer a query of their version; LinkError without a link."""
-        answers = await self._link.ask(bridge_dialect.VERSION, within_s)
+        answers = await self._link.query_all(bridge_dialect.VERSION, within_s)
         return self._robot.graph.peers <= {bridge_dialect.zid_of(key) for key, _ in answers}
 
     async def ask(self) -> None:
         """Queries versions, namespaces, routes and nodes. LinkError without a link."""
         graph = self._robot.graph
         answers, namespaces = await asyncio.gather(
-            self._link.ask(bridge_dialect.VERSION), self._namespaces()
+            self._link.query_all(bridge_dialect.VERSION), self._namespaces()
         )
         versions = {
             bridge_dialect.zid_of(key): answer.decode(errors="replace") for key, answer in answers

@@ -80,7 +80,7 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
     do not arrive in time. A bridge that has a token but does not answer has no version."""
     tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
         link.tokens(),
-        link.ask(dialect.VERSION),
+        link.query_all(dialect.VERSION),
         ask_json(link, dialect.CONFIG),
         ask_json(link, dialect.NODES),
         ask_json(link, entities.DDS),

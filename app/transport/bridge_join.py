@@ -87,7 +87,7 @@ class GraphMembership:
 
     def _hold(self) -> None:
         try:
-            self._link.hold(self._tokens.wanted(self._link.zid))
+            self._link.declare_tokens(self._tokens.wanted(self._link.zid))
         except LinkError as error:
             self._log.warning("%s", error)
 
@@ -98,7 +98,7 @@ class GraphMembership:
             self._joining.cancel()
             self._joining = None
         try:
-            self._link.hold(())
+            self._link.declare_tokens(())
         except LinkError as error:
             self._log.warning("%s", error)
 

@@ -190,7 +190,7 @@ class BridgeLiveness:
         return answered
 
     async def _all(self, bridges: frozenset[str]) -> bool:
-        queries = (self._link.ask(bridge_dialect.version(zid), LONGEST_S) for zid in bridges)
+        queries = (self._link.query_all(bridge_dialect.version(zid), LONGEST_S) for zid in bridges)
         try:
             return bool(bridges) and all(await asyncio.gather(*queries))
         except LinkError:

@@ -73,7 +73,7 @@ class BridgeObserver:
             Declarations(subscribe=expressions, recorded=set(expressions), immediate=set(expressions))
         )
         if hold:
-            self._session.hold(self._dialect.own_tokens(self.zid, topics))
+            self._session.declare_tokens(self._dialect.own_tokens(self.zid, topics))
         connected = False
         while True:
             await self._woken.wait()

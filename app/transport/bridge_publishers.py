@@ -84,7 +84,7 @@ class PublisherWatch:
                 yield zid, f"/{key}".removeprefix(namespace)
 
     async def _writers(self, zid: str, name: str) -> Collection[Writer]:
-        answers = await self._link.ask(entities.writers(zid, name))
+        answers = await self._link.query_all(entities.writers(zid, name))
         found = (entities.writer_place(key) for key, _ in answers)
         return sorted({one for one in found if one is not None})
 
@@ -92,7 +92,7 @@ class PublisherWatch:
         """The nodes of a writer's process that publish the topic; asked for until they are known."""
         if nodes := self._nodes.get((writer, name)):
             return nodes
-        answers = await self._link.ask(entities.nodes_of(writer))
+        answers = await self._link.query_all(entities.nodes_of(writer))
         found = [node for key, answer in answers if (node := _publishing(key, answer, name))]
         self._nodes[writer, name] = tuple(sorted(found))
         return self._nodes[writer, name]

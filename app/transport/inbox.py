@@ -57,7 +57,7 @@ class Changes:
     caches: Collection[tuple[str, str]] = ()
 
 
-class _Unseen:
+class Superseded:
     """The messages of a topic since the last drain, without the newest: each change once. If there are
     too many, the newest of them."""
 
@@ -83,7 +83,7 @@ class _Arrived:
     wall: float
     cached: bool = False
     skipped: int = 0
-    unseen: _Unseen | None = None
+    unseen: Superseded | None = None
 
     def sample(self, kept: bool = False) -> Sample:
         """`sent` is set for kept samples only: reading a stamp's time is slow."""
@@ -124,7 +124,7 @@ class Inbox:
         self._transports: set[str] = set()
         self._kept = _kept_samples()
 
-    def expect(
+    def set_topics(
         self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
     ) -> None:
         """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
@@ -151,7 +151,7 @@ class Inbox:
 
         return handle
 
-    def respond(self) -> None:
+    def probe(self) -> None:
         """Returns when the lock is free. Blocks while a callback holds it."""
         with self._lock:
             pass
@@ -242,10 +242,10 @@ class Inbox:
             self._wake_loop(False)
 
 
-def _unseen(replaced: _Arrived, newest: Buffer) -> _Unseen | None:
+def _unseen(replaced: _Arrived, newest: Buffer) -> Superseded | None:
     """The messages before `newest` that have not been drained."""
     unseen = replaced.unseen
     if bytes(replaced.payload) != bytes(newest):
-        unseen = unseen or _Unseen()
+        unseen = unseen or Superseded()
         unseen.add(replaced)
     return unseen

@@ -65,7 +65,7 @@ class ZenohSession:
 
     def start(self, declared: Declarations) -> None:
         """Declares everything, once in a session."""
-        self._inbox.expect(declared.immediate, declared.lossless, declared.recorded)
+        self._inbox.set_topics(declared.immediate, declared.lossless, declared.recorded)
         self._declared = declared
         self._declare()
 
@@ -168,7 +168,7 @@ class ZenohSession:
 
         return Callback(handle, indirect=False)
 
-    def hold(self, tokens: Iterable[str]) -> None:
+    def declare_tokens(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""
         wanted, held = set(tokens), self._held
         if held is None:
@@ -214,7 +214,9 @@ class ZenohSession:
                 )
             )
 
-    async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
+    async def query_all(
+        self, selector: str, timeout_s: float = ASK_TIMEOUT_S
+    ) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer to a query that arrives within `timeout_s`."""
         get = self._session.get
         with translated(f"can't ask {selector}"):
@@ -242,9 +244,9 @@ class ZenohSession:
             info = self._session.info
             return bool(info.routers_zid() or info.peers_zid())
 
-    def respond(self) -> None:
+    def probe(self) -> None:
         """Returns when both the inbox and the session respond; blocks until then."""
-        self._inbox.respond()
+        self._inbox.probe()
         with suppress(zenoh.ZError):  # a session that is being renewed has responded too
             info = self._session.info
             info.peers_zid()

@@ -37,7 +37,7 @@ Given = TypeVar("Given")
 Loaded = dict[tuple[FieldName, int], list[Bucket]]
 
 
-class Kept(NamedTuple):
+class StoredField(NamedTuple):
     """A field that is kept on disk."""
 
     name: FieldName
@@ -62,7 +62,7 @@ class TrendDisk:
     def __init__(self, folder: Path, panel: Panel) -> None:
         self._folder = folder
         self._panel = panel
-        self._kept: list[Kept] = []
+        self._kept: list[StoredField] = []
         self._listeners: list[tuple[History, Callable[[], None]]] = []
         self._saved: dict[int, float] = {}  # by the level's identity: the time of the last bucket
         self._loop = asyncio.get_running_loop()
@@ -81,7 +81,7 @@ class TrendDisk:
         for topic, field in sorted(disk_fields(trends_of(self._panel))):
             name = (robot_id, topic, types[topic], field)
             history = robot.history.fields[robot.key(topic), field]
-            self._kept.append(Kept(name, robot.history, history))
+            self._kept.append(StoredField(name, robot.history, history))
         self._listeners.append((robot.history, show))
 
     async def start(self) -> None:

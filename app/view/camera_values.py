@@ -13,9 +13,9 @@ from app.robot.state import RobotState
 def camera(widget: Camera, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` and `note`; and when they change. Unknown while no browser shows it."""
     received = robot.camera_topics.get(robot.key(widget.topic))
-    doubt = topic_mismatch("MS", widget, robot)
-    if doubt and doubt.code != "unheard":  # its bridge reads it while a browser shows it
-        return {"state": "unreadable", "note": doubt.reason or ""}, math.inf
+    mismatch = topic_mismatch("MS", widget, robot)
+    if mismatch and mismatch.code != "unheard":  # its bridge reads it while a browser shows it
+        return {"state": "unreadable", "note": mismatch.reason or ""}, math.inf
     if received is None or received.at == -math.inf:
         return {"state": "waiting", "note": say("camera_waiting", topic=widget.topic)}, math.inf
     if received.problem:

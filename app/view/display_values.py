@@ -91,8 +91,8 @@ def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState
 def _reading(widget: ShownTopic, robot: RobotState) -> Reading | FieldState:
     """The last message of a topic, or why there is none that can be shown."""
     topic = widget.topic
-    if doubt := topic_mismatch("MS", widget, robot):
-        return FieldState("unreadable", doubt.reason or "")
+    if mismatch := topic_mismatch("MS", widget, robot):
+        return FieldState("unreadable", mismatch.reason or "")
     reading = robot.reading(topic)
     if reading.status == "unreadable":
         return FieldState("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))

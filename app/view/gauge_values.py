@@ -9,7 +9,7 @@ from app.robot.state import RobotState
 from app.view.display_values import NOTHING, FieldState, field_state, scaled, written_number
 
 NEAR: Final = 1e-6  # relative: a float32 is the nearest to a limit, not the limit itself
-HARDEST_FIRST: Final = ("low_low", "high_high", "low", "high")
+BY_SEVERITY: Final = ("low_low", "high_high", "low", "high")
 
 Attributes = dict[str, Any]
 
@@ -48,7 +48,7 @@ def _shown(widget: Gauge, field: FieldState) -> Attributes:
 
 def _level(widget: Gauge, value: float) -> tuple[str, TextLike]:
     """The hardest limit that a value is beyond, and what is said of it."""
-    for name in HARDEST_FIRST:
+    for name in BY_SEVERITY:
         limit = getattr(widget, name)
         if limit is not None and is_beyond(value, limit, below=name.startswith("low")):
             return name, say(f"gauge_{name}", limit=written_number(limit, widget.format))

@@ -42,7 +42,7 @@ class Heartbeat:
                 self._timer.cancel()
                 self._timer = None
 
-    def along(self) -> None:
+    def beat_early(self) -> None:
         """Beats now if a beat is nearly due: it is sent with the event that is about to be sent."""
         timer = self._timer
         if timer is not None and timer.when() - asyncio.get_running_loop().time() <= EARLY_S:

@@ -44,7 +44,7 @@ UNDER_WAY: Final[Mapping[str, str]] = {
 
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
-Shown = tuple[Attributes, float]
+AttributesUntil = tuple[Attributes, float]
 
 
 class Enabled(TypedDict):
@@ -52,10 +52,12 @@ class Enabled(TypedDict):
     reason: TextLike | None
 
 
-def show(widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
+def attributes_of(
+    widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED
+) -> AttributesUntil:
     """The attributes of a widget at `now` (monotonic seconds), and when time alone changes them;
     `verdict` is that of a command, whose own deadline is not counted here."""
-    return find_row(SHOWN, widget)(widget, robot, verdict, now)
+    return find_row(ATTRIBUTES, widget)(widget, robot, verdict, now)
 
 
 def enabled(verdict: Verdict) -> Enabled:
@@ -104,35 +106,39 @@ def _doing(of: CommandStatus) -> TextLike:
     return say("goal_state_percent", state=state, percent=int(100 * of.fraction))
 
 
-def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:
+def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> AttributesUntil:
     """The lock, and the result of the last press."""
     came = progress(robot.command_status.get(widget.id, IDLE))
     return {**lock(widget, verdict), **came}, math.inf
 
 
-def _published(widget: PublishPress, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+def _published(
+    widget: PublishPress, robot: RobotState, verdict: Verdict, now: float
+) -> AttributesUntil:
     if widget.confirm is not None:
         return _pressed(widget, robot, verdict, now)
     return lock(widget, verdict), math.inf
 
 
-def _held(widget: HoldCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:
+def _held(widget: HoldCommand, robot: RobotState, verdict: Verdict, _: float) -> AttributesUntil:
     holding = robot.held_since.get(widget.id, "")
     return {**lock(widget, verdict), "held": bool(holding), "holding": holding}, math.inf
 
 
-def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
     pressed, until = _pressed(widget, robot, verdict, now)
     return pressed | parameter(widget, robot), until
 
 
-def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
     pressed, _ = _pressed(widget, robot, verdict, now)
     reported, until = step(widget, robot, now)
     return pressed | reported, until
 
 
-SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
+ATTRIBUTES: Final[
+    Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], AttributesUntil]]
+] = {
     Static: lambda of, robot, verdict, now: ({}, math.inf),
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),

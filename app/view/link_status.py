@@ -15,7 +15,7 @@ from app.i18n import Text, TextLike, joined, number, say
 from app.i18n.values import longest
 from app.interfaces import has_key
 from app.panel.model import Panel
-from app.permission.interlocks import NO_WAY
+from app.permission.interlocks import LINK_CODES
 from app.permission.mismatches import topic_mismatch
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
@@ -23,7 +23,7 @@ from app.view.definition_notes import definition_notes
 
 State = Literal["ok", "wait", "bad"]
 
-BRIDGE: Final = NO_WAY | {"unheard"}
+BRIDGE: Final = LINK_CODES | {"unheard"}
 GONE: Final = frozenset({"no_publisher", "no_service", "no_parameters"})
 NODE: Final = GONE | {
     "waiting",

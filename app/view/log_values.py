@@ -13,8 +13,8 @@ def log(widget: LogView, robot: RobotState) -> tuple[dict[str, Any], float]:
     """Attributes: `state`, `note` and `count`, the number of all lines that came."""
     count = robot.log_lines[robot.key(widget.topic)].count
     shown: dict[str, Any] = {"state": "live", "note": "", "count": str(count)}
-    if doubt := topic_mismatch("MS", widget, robot):
-        shown |= {"state": "unreadable", "note": doubt.reason or ""}
+    if mismatch := topic_mismatch("MS", widget, robot):
+        shown |= {"state": "unreadable", "note": mismatch.reason or ""}
     elif not robot.link_up or not robot.graph.peers:
         shown |= {"state": "old", "note": say("rosout_cut")}
     elif not count:

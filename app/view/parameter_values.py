@@ -105,9 +105,9 @@ def never_received(known: ParameterState) -> bool:
 
 def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> TextLike:
     time = format_time(known.wall)
-    doubt = parameters_offered(parameter.node, robot)
-    if doubt is not None and doubt.code in NEVER_ASKED:
-        return doubt.reason or ""
+    mismatch = parameters_offered(parameter.node, robot)
+    if mismatch is not None and mismatch.code in NEVER_ASKED:
+        return mismatch.reason or ""
     if never_received(known):
         silent = known.state == "silent" and parameter.id not in robot.querying
         return say("parameter_unanswered" if silent else "parameter_asking", node=parameter.node)

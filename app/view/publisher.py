@@ -62,7 +62,7 @@ class ViewPublisher:
         `without_control` has what is different for clients without control, `pages` the ids of the
         widgets that a page shows, by the page's."""
         self._pages = pages
-        self.boot = secrets.token_hex(4)
+        self.instance_id = secrets.token_hex(4)
         self.version = 1
         self.view = view
         self.revision = revision
@@ -81,8 +81,8 @@ class ViewPublisher:
 
     @property
     def id(self) -> str:
-        """`<boot>-<version>`, the id of the events that lead here."""
-        return f"{self.boot}-{self.version}"
+        """`<instance_id>-<version>`, the id of the events that lead here."""
+        return f"{self.instance_id}-{self.version}"
 
     def post(self, view: View, without_control: Mapping[str, Attributes] = NOTHING) -> None:
         """Publishes a view with a new version; does nothing if it is the same as the newest."""
@@ -95,7 +95,7 @@ class ViewPublisher:
                 self._lock_changes[widget] = self.version
         self.view, self._latest_events, self._without_control = view, events, without_control
         self._by_role, self._snapshots, self._prepared, self._whole = {}, {}, {}, {}
-        self.heartbeat.along()
+        self.heartbeat.beat_early()
         self._wake()
 
     def lock_changed_at(self, widget: str) -> int:

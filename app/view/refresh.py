@@ -33,8 +33,8 @@ class OtherRobots(Protocol):
     def link_statuses(self) -> Mapping[str, Lamp]:
         """The lamp of each robot, by the robot's id."""
 
-    def boots(self) -> Collection[str]:
-        """The `boot` of each robot's publisher."""
+    def instance_ids(self) -> Collection[str]:
+        """The `instance_id` of each robot's publisher."""
 
     def show_but(self, robot: RobotState) -> None:
         """Refreshes the views of the other robots: the lamp of `robot` has changed."""
@@ -46,7 +46,7 @@ class NoOtherRobots:
     def link_statuses(self) -> Mapping[str, Lamp]:
         return {}
 
-    def boots(self) -> Collection[str]:
+    def instance_ids(self) -> Collection[str]:
         return ()
 
     def show_but(self, robot: RobotState) -> None: ...

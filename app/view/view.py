@@ -15,10 +15,10 @@ from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import for_role as control_for_role
 from app.permission.interlocks import interlock_verdict, link_verdict
-from app.permission.press_permission import NO_GROUNDS, Grounds, permissions
+from app.permission.press_permission import NO_CONDITIONS, ServerConditions, permissions
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
-from app.view.kinds import Attributes, Enabled, Shown, enabled, show
+from app.view.kinds import Attributes, AttributesUntil, Enabled, attributes_of, enabled
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 from app.view.robot_state import UNKNOWN, RobotWord, robot_word
 
@@ -100,7 +100,7 @@ def build_view(
     """The view at `now` (monotonic seconds)."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
-    grounds = Grounds(log_lock=context.log_lock) if context.log_lock else NO_GROUNDS
+    grounds = ServerConditions(log_lock=context.log_lock) if context.log_lock else NO_CONDITIONS
     verdicts = permissions(panel, robot, now, passable, interlocks, grounds)
     failures: dict[str, Exception] = {}
     uniform = _uniform(panel, robot, now, verdicts, failures)
@@ -137,11 +137,11 @@ def _uniform(
     now: float,
     verdicts: Mapping[str, Verdict],
     failures: dict[str, Exception],
-) -> dict[str, Shown]:
+) -> dict[str, AttributesUntil]:
     """The attributes of the uniform buttons: one object for all with the same verdict."""
-    shown: dict[str, Shown] = {}
+    shown: dict[str, AttributesUntil] = {}
     for buttons in panel.uniform_buttons.values():
-        by_verdict: dict[int, Shown] = {}
+        by_verdict: dict[int, AttributesUntil] = {}
         for button in buttons:
             verdict = verdicts[button.id]
             attributes = by_verdict.get(id(verdict))
@@ -154,11 +154,11 @@ def _uniform(
 
 def _show(
     widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict, failures: dict[str, Exception]
-) -> Shown:
+) -> AttributesUntil:
     """The attributes of a widget. One whose attributes can't be made is locked and says so, whatever is
     wrong with it: the others are shown. It is tried again after `RETRY_S`."""
     try:
-        return show(widget, robot, now, verdict)
+        return attributes_of(widget, robot, now, verdict)
     except Exception as error:
         failures[widget.id] = error
         return FAILED_COMMAND if isinstance(widget, Command) else FAILED, now + RETRY_S

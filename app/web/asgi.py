@@ -14,7 +14,7 @@ KEY: Final = "panel.send"
 
 
 class Application(FastAPI):
-    """A FastAPI application with `Heads` and `KeepServerSend` around FastAPI's own outer layers.
+    """A FastAPI application with `HeadAsGet` and `KeepServerSend` around FastAPI's own outer layers.
 
     `state.server` is the configuration of the server, set at startup; None if it is not uvicorn.
     """
@@ -25,10 +25,10 @@ class Application(FastAPI):
         await super().__call__(scope, receive, send)
 
     def build_middleware_stack(self) -> ASGIApp:
-        return Heads(KeepServerSend(super().build_middleware_stack()))
+        return HeadAsGet(KeepServerSend(super().build_middleware_stack()))
 
 
-class Heads:
+class HeadAsGet:
     """Answers HEAD as GET without the body (RFC 9110, 9.3.2), whatever route it is.
 
     The route gets a disconnect once its head is sent: an event stream ends there.

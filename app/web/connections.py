@@ -147,7 +147,7 @@ def connections_most() -> int:
     return max(1, min(CONNECTIONS_MOST, files - FILES_KEPT))
 
 
-def want_files() -> None:
+def raise_file_limit() -> None:
     """Takes as many open files as the system allows this process, up to `FILES_WANTED`."""
     files, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = FILES_WANTED if most == resource.RLIM_INFINITY else min(FILES_WANTED, most)

@@ -5,7 +5,7 @@ opened; every message of the browser's has the last `stamp` that it got, and `af
 had it: so each one's age is known. Without an answer no browser shows that something is held.
 
     server   {"stamp": 0.2}
-    browser  {"do": "begin", "inputs": {…}, "seen": "<boot>-<version>", "stamp": 0.2, "after": 0.9}
+    browser  {"do": "begin", "inputs": {…}, "seen": "<instance>-<version>", "stamp": 0.2, "after": 0.9}
     server   {"stamp": 2.1, "state": "held", "lease": "…", "reason": "Held since 10:00:00."}
     browser  {"do": "beat", "number": 1, "lease": "…", "stamp": 2.1, "after": 80}
     server   {"stamp": 83.0, "state": "held"}
@@ -31,7 +31,7 @@ from app.errors import InputError
 from app.web.request_body import json_of
 
 # What a browser may say of why it ends a hold → the code of the sentence.
-WHYS: Final[Mapping[str, str]] = {
+END_REASONS: Final[Mapping[str, str]] = {
     "released": RELEASED,
     "cancel": "hold_by_cancel",
     "sliding": "hold_by_sliding",
@@ -48,7 +48,7 @@ Deflected = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
 
 
-class Said(BaseModel):
+class HoldMessage(BaseModel):
     """The fields of every message of a browser."""
 
     model_config = ConfigDict(extra="forbid")
@@ -57,13 +57,13 @@ class Said(BaseModel):
     after: Milliseconds
 
 
-class Begin(Said):
+class Begin(HoldMessage):
     do: Literal["begin"]
     inputs: dict[str, JsonValue]
     seen: Annotated[str, Field(pattern=EVENT_ID)]
 
 
-class Beat(Said):
+class Beat(HoldMessage):
     do: Literal["beat"]
     lease: str
     number: Annotated[int, Field(ge=1)]
@@ -76,7 +76,7 @@ class Beat(Said):
         return None if self.x is None or self.y is None else (self.x, self.y)
 
 
-class End(Said):
+class End(HoldMessage):
     do: Literal["end"]
     lease: str = ""
     why: str

@@ -14,7 +14,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from app.permission.client_places import ClientPlaces, shares
 from app.process.listen_sockets import check_port_free
-from app.web.connections import Connection, connections_most, want_files
+from app.web.connections import Connection, connections_most, raise_file_limit
 from app.web.request_body import LONGEST
 from app.web.sockets import Socket
 
@@ -45,7 +45,7 @@ def bound(server: Config) -> None:
     server.ws_per_message_deflate = OPTIONS["ws_per_message_deflate"]
     if isinstance(server.loaded_app, ProxyHeadersMiddleware):
         server.loaded_app = server.loaded_app.app
-    want_files()
+    raise_file_limit()
     if server.http_protocol_class is HttpToolsProtocol:
         server.http_protocol_class = Connection
         Connection.places = ClientPlaces(shares(connections_most()), Connection.proxies)

@@ -115,7 +115,7 @@ def sentences_table() -> str:
         # A code that comes by a variable and is an ordinary word is only somewhere in the text.
         named = saying or [path for path, texts in _texts().items() if code in texts]
         rows.append((shown(SENTENCES[code]), f"`{code}`", ", ".join(map(place, named))))
-    return _markdown(rows, [("Sentence", "Code", "Said in"), ("---",) * 3])
+    return _markdown(rows, [("Sentence", "Code", "HoldMessage in"), ("---",) * 3])
 
 
 @cache

@@ -164,7 +164,7 @@ def test_a_lock_that_is_gone_is_taken_again_and_said(tmp_path: Path) -> None:
         await until_good(log)
         await log.pressed(pressed(2))
         with pytest.raises(FolderInUse):
-            DataDir(tmp_path).hold()
+            DataDir(tmp_path).claim()
 
     run(tmp_path, work)
     assert f"{LOCK} was removed or renamed" in entries(tmp_path)[-2].reason
@@ -176,7 +176,7 @@ def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, req
     async def work(log: OperatorLog) -> None:
         (tmp_path / LOCK).unlink()
         other = DataDir(tmp_path)
-        other.hold()
+        other.claim()
         with pytest.raises(LogError):
             await log.pressed(pressed(1))
         async with asyncio.timeout(10):
@@ -200,7 +200,7 @@ def test_without_a_log_too_the_lock_is_looked_at(tmp_path: Path) -> None:
         assert await log.pressed(pressed(2)) is None  # taken again
         (tmp_path / LOCK).unlink()
         other = DataDir(tmp_path)
-        other.hold()
+        other.claim()
         with pytest.raises(LogError, match="is in use by process"):
             await log.pressed(pressed(3))
         other.release()
@@ -233,7 +233,7 @@ def test_a_server_sends_nothing_that_its_log_does_not_have(
     until(lambda: "new" in kiosk.widget("last_heard")["text"], "the robot has it")
     (tmp_path / LOCK).unlink()
     other = DataDir(tmp_path)
-    other.hold()
+    other.claim()
     refused = kiosk.press("operation", "twice")
     assert refused.status_code == 503
     until(lambda: "is in use by process" in kiosk.snapshot()["notice"]["fault"], "it says who has it")

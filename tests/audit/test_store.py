@@ -424,7 +424,7 @@ def test_presses_of_an_earlier_server_are_undone_until_they_are_closed(tmp_path:
 
 def test_the_folder_and_the_file_are_the_users_alone(tmp_path: Path) -> None:
     folder = DataDir(tmp_path / "state/panel")
-    folder.hold()
+    folder.claim()
     store = Store(folder.path, "boot1")
     fill(store, 1)
     modes = {p.name: stat.S_IMODE(p.stat().st_mode) for p in (folder.path, *folder.path.iterdir())}
@@ -437,11 +437,11 @@ def test_the_folder_and_the_file_are_the_users_alone(tmp_path: Path) -> None:
 
 def test_a_folder_has_one_holder_at_a_time(tmp_path: Path) -> None:
     first, second = DataDir(tmp_path), DataDir(tmp_path)
-    first.hold()
+    first.claim()
     with pytest.raises(FolderInUse, match=rf"{tmp_path} is in use by process \d+ since 2\d{{3}}-"):
-        second.hold()
+        second.claim()
     first.release()
-    second.hold()
+    second.claim()
     second.release()
 
 
@@ -451,7 +451,7 @@ def test_the_lock_is_not_written_through_a_link(tmp_path: Path) -> None:
     (tmp_path / "state").mkdir()
     (tmp_path / "state" / LOCK).symlink_to(other)
     with pytest.raises(OSError, match="symbolic links"):
-        DataDir(tmp_path / "state").hold()
+        DataDir(tmp_path / "state").claim()
     assert other.read_text() == "not mine"
 
 

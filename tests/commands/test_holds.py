@@ -15,7 +15,7 @@ from app.commands.holds.controller import HoldController
 from app.commands.holds.lease import LEASE_S, MAX_AHEAD_S, Lease, sent_at
 from app.commands.holds.messages import HoldMessages
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_judge import Arrivals
+from app.commands.press_judge import PendingSamples
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
@@ -23,7 +23,7 @@ from app.i18n import ENGLISH, TextLike, say, sentences
 from app.panel.model import Panel
 from app.permission.interlocks import link_verdict
 from app.view.view import build_view
-from app.web.hold_protocol import WHYS
+from app.web.hold_protocol import END_REASONS
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -145,7 +145,7 @@ class Bench:
         self.news: Callable[[], bool] = lambda: bool(self.pending)
         self.holds = HoldController(
             self.panel, self.robot, HoldMessages(INTERFACES, self.robot, self.way, checked),
-            self.loop, Arrivals(self.take, lambda: self.news()), changed=lambda: None,
+            self.loop, PendingSamples(self.take, lambda: self.news()), changed=lambda: None,
         )  # fmt: skip
 
     def take(self) -> None:
@@ -230,7 +230,7 @@ def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
     assert coded(receipt.reason, "topic", "found") == ("wrong_type", "/jog", TEXT)
 
 
-@pytest.mark.parametrize("code", sorted(set(WHYS.values()) - {RELEASED} | {"hold_by_closing"}))
+@pytest.mark.parametrize("code", sorted(set(END_REASONS.values()) - {RELEASED} | {"hold_by_closing"}))
 def test_every_other_end_says_why_and_wants_a_new_press(bench: Bench, code: str) -> None:
     holding = bench.begun()
     bench.holds.end(holding, code)

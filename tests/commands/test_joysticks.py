@@ -12,7 +12,7 @@ from app.commands.holds.deflection import moved, ramped, shaped
 from app.commands.holds.lease import LEASE_S
 from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.panel.widgets.joystick import Joystick
-from app.web.hold_protocol import WHYS
+from app.web.hold_protocol import END_REASONS
 from tests.commands.test_holds import POINT, STOPS, Bench
 from tests.support.builders import BRIDGE, TEXT, endpoint, permits
 
@@ -61,7 +61,7 @@ def test_it_begins_in_the_middle_and_sends_what_the_newest_beat_has() -> None:
     assert bench.points[-1] == (-2.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("code", sorted({*WHYS.values(), "hold_by_closing", "hold_by_renewal"}))
+@pytest.mark.parametrize("code", sorted({*END_REASONS.values(), "hold_by_closing", "hold_by_renewal"}))
 def test_whatever_ends_a_hold_ends_it_with_zeros(code: str) -> None:
     bench = bench_of()
     holding = held(bench)

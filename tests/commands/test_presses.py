@@ -19,7 +19,7 @@ from app.panel.model import Panel
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ControlAuthority
-from app.permission.press_permission import Grounds
+from app.permission.press_permission import ServerConditions
 from app.permission.principal import Principal
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.state import RobotState, Sample
@@ -95,7 +95,7 @@ class Bench:
         who: Principal = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        by = PressContext(origin_of(who), lambda: Grounds(self.may_press(who)))
+        by = PressContext(origin_of(who), lambda: ServerConditions(self.may_press(who)))
         return asyncio.run(self._presses.press(widget, given, press_id, by))
 
     def cancel(self, widget: str) -> Receipt:

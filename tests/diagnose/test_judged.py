@@ -285,7 +285,7 @@ def test_another_version_of_zenoh(theirs: str, expected: list[str]) -> None:
     class Session:
         zid = "us"
 
-        async def ask(self, selector: str, timeout_s: float = 1.0) -> list[tuple[str, bytes]]:
+        async def query_all(self, selector: str, timeout_s: float = 1.0) -> list[tuple[str, bytes]]:
             far = {"sessions": [{"peer": "them"}], "version": "v0.5.0"}
             near = {"sessions": [{"peer": "us"}], "version": theirs}
             answers = [b"no JSON", json.dumps(far).encode(), json.dumps(near).encode()]

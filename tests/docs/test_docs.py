@@ -12,7 +12,7 @@ import pytest
 
 from app.panel import load_panel
 from app.settings import PREFIX, VARIABLES
-from app.web.hold_protocol import WHYS, Beat, Begin, End, Said
+from app.web.hold_protocol import END_REASONS, Beat, Begin, End, HoldMessage
 from app.web.serving import OPTIONS
 from bench.report.tables import BEGIN, END
 from tests.support.parts import ROOT, Server, as_response, until
@@ -171,7 +171,7 @@ def test_the_messages_of_a_hold_are_json() -> None:
 
 
 @pytest.mark.parametrize("message", [Begin, Beat, End])
-def test_each_key_of_a_holds_messages_is_described(message: type[Said]) -> None:
+def test_each_key_of_a_holds_messages_is_described(message: type[HoldMessage]) -> None:
     section = PAGES["reference/http.md"].split("## Hold to run: WebSocket")[1].split("\n## ")[0]
     table = section.split("| JSON key of the client's messages |")[1]
     described = "".join(re.findall(r"^\| (`.+?) \|", table, re.MULTILINE))
@@ -181,7 +181,7 @@ def test_each_key_of_a_holds_messages_is_described(message: type[Said]) -> None:
 def test_each_reason_for_the_end_of_a_hold_is_described() -> None:
     row = re.search(r"^\| `why` \| (.+) \|$", PAGES["reference/http.md"], re.MULTILINE)
     assert row
-    assert set(WHYS) == set(re.findall(r"`(\w+)`", row[1])) - {"end"}
+    assert set(END_REASONS) == set(re.findall(r"`(\w+)`", row[1])) - {"end"}
 
 
 def test_every_place_in_the_code_is_there() -> None:

@@ -9,20 +9,22 @@ from app.kiosk.judge import (
     UNDRAWN_AFTER_S,
     Action,
     Judge,
-    Look,
+    PageStatus,
 )
 
-LIVE = Look(on_panel=True, ours=True, age_s=0.2)
-SILENT = Look(on_panel=True, ours=True, age_s=60.0)
+LIVE = PageStatus(on_panel=True, ours=True, age_s=0.2)
+SILENT = PageStatus(on_panel=True, ours=True, age_s=60.0)
 
 
-def actions(look: Look, server: bool | None, for_s: float, judge: Judge | None = None) -> list[Action]:
+def actions(
+    look: PageStatus, server: bool | None, for_s: float, judge: Judge | None = None
+) -> list[Action]:
     """What a judge does about the same look once a second."""
     judge = judge or Judge()
     return [judge.judge(look, server, float(second)).action for second in range(int(for_s) + 1)]
 
 
-def first(look: Look, server: bool | None = True) -> Action:
+def first(look: PageStatus, server: bool | None = True) -> Action:
     return Judge().judge(look, server, 0.0).action
 
 
@@ -31,47 +33,47 @@ def test_a_live_panel_is_left_alone() -> None:
 
 
 def test_a_page_without_a_stream_is_left_alone() -> None:
-    assert set(actions(Look(on_panel=True, ours=True), True, 600)) == {Action.NONE}
+    assert set(actions(PageStatus(on_panel=True, ours=True), True, 600)) == {Action.NONE}
 
 
 def test_what_does_not_respond_is_restarted() -> None:
-    assert first(Look(responds=False)) is Action.RESTART
+    assert first(PageStatus(responds=False)) is Action.RESTART
 
 
 def test_a_crashed_page_is_opened_again_or_waits_for_the_server() -> None:
-    assert first(Look(crashed=True), True) is Action.OPEN_PANEL
-    assert first(Look(crashed=True), False) is Action.OPEN_WAITING
+    assert first(PageStatus(crashed=True), True) is Action.OPEN_PANEL
+    assert first(PageStatus(crashed=True), False) is Action.OPEN_WAITING
 
 
 def test_a_page_that_crashes_again_and_again_needs_another_browser() -> None:
-    assert Action.RESTART in actions(Look(crashed=True), True, 5)
+    assert Action.RESTART in actions(PageStatus(crashed=True), True, 5)
 
 
 def test_the_waiting_page_stays_until_the_server_answers() -> None:
-    waiting = Look(waiting=True)
+    waiting = PageStatus(waiting=True)
     assert set(actions(waiting, False, 600)) == {Action.NONE}
     assert first(waiting, True) is Action.OPEN_PANEL
 
 
 def test_another_page_is_left_at_once() -> None:
-    assert first(Look(), True) is Action.OPEN_PANEL
-    assert first(Look(), False) is Action.OPEN_WAITING
+    assert first(PageStatus(), True) is Action.OPEN_PANEL
+    assert first(PageStatus(), False) is Action.OPEN_WAITING
 
 
 def test_a_page_of_the_server_that_is_none_of_the_panel_is_left_soon() -> None:
-    found = actions(Look(on_panel=True), True, FOREIGN_AFTER_S)
+    found = actions(PageStatus(on_panel=True), True, FOREIGN_AFTER_S)
     assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.OPEN_PANEL)
 
 
 def test_a_page_that_draws_nothing_is_restarted() -> None:
-    undrawn = Look(on_panel=True, ours=True, age_s=0.2, drawn=False)
+    undrawn = PageStatus(on_panel=True, ours=True, age_s=0.2, drawn=False)
     found = actions(undrawn, None, UNDRAWN_AFTER_S)
     assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.RESTART)
 
 
 def test_one_look_that_draws_starts_the_time_anew() -> None:
     judge = Judge()
-    undrawn = Look(on_panel=True, ours=True, age_s=0.2, drawn=False)
+    undrawn = PageStatus(on_panel=True, ours=True, age_s=0.2, drawn=False)
     looks = [undrawn] * 4 + [LIVE] + [undrawn] * 4
     found = {judge.judge(look, None, float(at)).action for at, look in enumerate(looks)}
     assert found == {Action.NONE}

@@ -8,7 +8,7 @@ from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCo
 from app.panel.widgets.kinds import KINDS, find_row
 from app.permission.interlocks import COMMAND_CHECKS
 from app.settings import shipped_path
-from app.view.kinds import SHOWN
+from app.view.kinds import ATTRIBUTES
 from tests.support.builders import FakeTransport, panel_of, robot_there, sending_of
 
 EACH = pytest.mark.parametrize(("kind", "of"), KINDS.items())
@@ -31,7 +31,7 @@ def test_a_kind_is_the_one_that_its_class_names(kind: str, of: type[BaseWidget])
 
 @EACH
 def test_a_kind_is_shown(kind: str, of: type[BaseWidget]) -> None:
-    assert callable(find_row(SHOWN, widget(of, kind)))
+    assert callable(find_row(ATTRIBUTES, widget(of, kind)))
 
 
 @EACH

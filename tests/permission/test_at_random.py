@@ -86,7 +86,7 @@ class Way(FakeTransport):
         return query
 
 
-class Grounds:
+class ServerConditions:
     """What must be so for a permission, kept beside the robot and by its simplest rules."""
 
     def __init__(self, strict: bool = True) -> None:
@@ -140,7 +140,7 @@ class Panels(RuleBasedStateMachine):
         self.panel = one_panel(strict)
         self.loop = SetLoop()
         self.way = Way()
-        self.grounds = Grounds(strict)
+        self.grounds = ServerConditions(strict)
         self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
         self.key = self.robot.key(ENABLED)
         self.calls = ServiceCalls(INTERFACES, self.robot, self.way, lambda: None)
@@ -196,7 +196,7 @@ class Panels(RuleBasedStateMachine):
     @rule()
     def link_goes(self) -> None:
         self.robot.mark_link_lost()
-        self.grounds = Grounds(self.grounds.strict)
+        self.grounds = ServerConditions(self.grounds.strict)
         self.calls.on_graph_change()
 
     @precondition(lambda self: self.grounds.link and not self.grounds.bridge)

@@ -8,9 +8,9 @@ from hypothesis import strategies as some
 
 from app.permission import press_permission
 from app.permission.interlocks import interlock_verdict, link_verdict
-from app.permission.press_permission import CHECKS, Check, Grounds, judged, permissions
+from app.permission.press_permission import CHECKS, Check, ServerConditions, judged, permissions
 from app.permission.verdict import PERMITTED, Verdict
-from app.view.kinds import show
+from app.view.kinds import attributes_of
 from app.view.view import build_view
 from tests.support.builders import (
     BOOL,
@@ -68,7 +68,7 @@ def test_each_verdict_and_what_is_shown_is_that_of_the_button_alone(
     now = NOW + later
     link = link_verdict(robot, now)
     interlocks = {one.id: interlock_verdict(one, robot, now, link) for one in panel.interlocks}
-    grounds = Grounds(control, log, ending)
+    grounds = ServerConditions(control, log, ending)
     verdicts = permissions(panel, robot, now, link, interlocks, grounds)
     for widget in panel.commands:
         alone = judged(widget, panel.interlocks_of(widget), robot, now, grounds)
@@ -76,7 +76,7 @@ def test_each_verdict_and_what_is_shown_is_that_of_the_button_alone(
     shown = build_view(panel, robot, now).view["widgets"]
     for widget in panel.commands:
         plain = judged(widget, panel.interlocks_of(widget), robot, now)
-        assert shown[widget.id] == show(widget, robot, now, plain)[0]
+        assert shown[widget.id] == attributes_of(widget, robot, now, plain)[0]
 
 
 def test_a_check_that_differs_between_buttons_is_made_for_each(

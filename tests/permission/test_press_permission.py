@@ -10,8 +10,8 @@ from app.permission import press_permission
 from app.permission.press_permission import (
     CHECKS,
     Check,
-    Grounds,
-    Question,
+    PermissionRequest,
+    ServerConditions,
     cause_of,
     combined,
     judged,
@@ -33,11 +33,11 @@ def locked(code: str) -> Verdict:
     return Verdict(False, code, f"locked by {code}")
 
 
-def question(**more: Any) -> Question:
+def question(**more: Any) -> PermissionRequest:
     panel = panel_of(MESSAGE, FREE)
     robot = robot_there(panel)
     parts = {"link": PERMITTED, "interlocks": (), **more}
-    return Question(next(iter(panel.commands)), robot, NOW, **parts)
+    return PermissionRequest(next(iter(panel.commands)), robot, NOW, **parts)
 
 
 @pytest.fixture
@@ -48,14 +48,16 @@ def alarm(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_first_that_locks_is_reported() -> None:
-    everything = Grounds(locked("control"), "The disk is full.", ending=True)
+    everything = ServerConditions(locked("control"), "The disk is full.", ending=True)
     one_press = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
     assert permission(one_press).code == "link"
     assert permission(question(interlocks=[locked("one")], grounds=everything)).code == "ending"
-    without = Grounds(locked("control"), "The disk is full.")
+    without = ServerConditions(locked("control"), "The disk is full.")
     log = permission(question(interlocks=[locked("one")], grounds=without))
     assert (log.code, log.reason, log.others) == ("log", "The disk is full.", ())
-    control = permission(question(interlocks=[locked("one")], grounds=Grounds(locked("control"))))
+    control = permission(
+        question(interlocks=[locked("one")], grounds=ServerConditions(locked("control")))
+    )
     assert (control.code, control.others) == ("control", ())
     both = permission(question(interlocks=[locked("one"), PERMITTED, locked("two")]))
     assert both.reasons == ["locked by one", "locked by two"]

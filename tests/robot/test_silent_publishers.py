@@ -179,7 +179,7 @@ async def made() -> Incoming:
     robot = robot_there(panel)
     calls = ServiceCalls(INTERFACES, robot, services, lambda: None)
     inbox = Inbox(lambda _: None)
-    inbox.expect([], [KEY], [])
+    inbox.set_topics([], [KEY], [])
     handlers = SampleHandlers()
     ParameterSync(panel, INTERFACES, robot, services, calls, lambda: None).register(handlers)
     intake = Ingest(panel, robot, handlers)

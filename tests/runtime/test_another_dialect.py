@@ -84,7 +84,7 @@ class TinyPeer:
         robot, link = self._context.robot, self._context.link
         if peer_appeared:
             own = OwnEndpoint("MP", robot.key("/go"), "std_msgs/msg/String", Qos())
-            link.hold(robot.dialect.own_tokens(link.zid, [own]))
+            link.declare_tokens(robot.dialect.own_tokens(link.zid, [own]))
             robot.settled_at = time.monotonic()
 
     def check_stall(self) -> None: ...

@@ -50,7 +50,7 @@ class Cell:
         self.session = wire_session(server, config_to("tcp/127.0.0.1:1"), ACCESS)
         self.inbox: Inbox = self.session.link._inbox
         ingest = self.session.ingest
-        self.inbox.expect(ingest.immediate, ingest.lossless, ingest.recorded)
+        self.inbox.set_topics(ingest.immediate, ingest.lossless, ingest.recorded)
         monkeypatch.setattr(self.session.link, "put", lambda *_: None)
         monkeypatch.setattr(self.session.link, "has_reader", lambda _: True)
         monkeypatch.setattr(self.session.link, "hold", lambda _: None)

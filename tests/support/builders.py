@@ -11,7 +11,7 @@ from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressContext
-from app.commands.press_judge import Arrivals, PressJudge
+from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
@@ -185,5 +185,5 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, transport, monotonic=monotonic, **more)
-    judge = PressJudge(panel, robot, Arrivals(catch_up, news), monotonic)
+    judge = PressJudge(panel, robot, PendingSamples(catch_up, news), monotonic)
     return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

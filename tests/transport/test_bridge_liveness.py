@@ -108,7 +108,7 @@ class Line(FakeTransport):
         self.frozen = ""  # a bridge that does not answer
         self.fails = False
 
-    async def ask(self, selector: str, timeout_s: float = 2.0) -> list[tuple[str, bytes]]:
+    async def query_all(self, selector: str, timeout_s: float = 2.0) -> list[tuple[str, bytes]]:
         if self.fails:
             raise LinkError("no session")
         assert timeout_s == LONGEST_S

@@ -30,7 +30,7 @@ def woken() -> list[bool]:
 def inbox(woken: list[bool]) -> Inbox:
     """`permit` is lossless and immediate, `parts` lossless, `status` immediate, `taped` recorded."""
     mine = Inbox(woken.append)
-    mine.expect(["status", "permit"], ["permit", "parts"], ["taped"])
+    mine.set_topics(["status", "permit"], ["permit", "parts"], ["taped"])
     return mine
 
 

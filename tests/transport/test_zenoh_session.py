@@ -125,7 +125,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
 
     def renew() -> None:
         for _ in range(RENEWALS):
-            link.hold(tokens(link.zid, 10))
+            link.declare_tokens(tokens(link.zid, 10))
             link.renew()
             link.drain()
 
@@ -224,10 +224,10 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
 ) -> None:
     _, session = peer
     link = linked(declared([], []))
-    link.hold(tokens(link.zid, 1))
+    link.declare_tokens(tokens(link.zid, 1))
     link.renew()
     wanted = tokens(link.zid, 2)
-    link.hold(wanted)
+    link.declare_tokens(wanted)
 
     def found() -> set[str]:
         replies = session.liveliness().get(bridge_dialect.TOKENS, timeout=1)

@@ -86,13 +86,13 @@ def test_a_beat_that_is_nearly_due_goes_along_and_wakes_no_stream_itself() -> No
     async def work() -> None:
         beating = Beating()
         with beating.heart.heard():
-            beating.heart.along()
+            beating.heart.beat_early()
             assert beating.heart.count == 0  # it is not due yet
             await asyncio.sleep(heartbeat.BEAT_S - heartbeat.EARLY_S + 0.01)
-            beating.heart.along()
+            beating.heart.beat_early()
             if not beating.woken.is_set():  # else the machine stood still
                 assert beating.heart.count == 1
-                beating.heart.along()
+                beating.heart.beat_early()
                 assert beating.heart.count == 1
 
     run(work)
@@ -101,7 +101,7 @@ def test_a_beat_that_is_nearly_due_goes_along_and_wakes_no_stream_itself() -> No
 def test_without_a_listener_none_goes_along() -> None:
     async def work() -> None:
         beating = Beating()
-        beating.heart.along()
+        beating.heart.beat_early()
         assert beating.heart.count == 0
 
     run(work)

@@ -60,11 +60,11 @@ def test_every_event_has_the_id_of_the_version_it_leads_to(
     permits(robot)
     publisher.post(view_of(robot, fault="x"))
     ids = {event_id for _, _, event_id in events_in(publisher.events_since(1, old).decode())}
-    assert ids == {f"{publisher.boot}-2"}
+    assert ids == {f"{publisher.instance_id}-2"}
 
 
 def test_each_start_has_its_own_boot(publisher: ViewPublisher) -> None:
-    assert ViewPublisher(publisher.view, "r1").boot != publisher.boot
+    assert ViewPublisher(publisher.view, "r1").instance_id != publisher.instance_id
 
 
 def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(

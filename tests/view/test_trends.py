@@ -16,7 +16,7 @@ from app.panel.widgets.trend import Trend
 from app.robot.history import Column
 from app.robot.state import RobotState
 from app.trends.recorder import TrendRecorder
-from app.view.kinds import show
+from app.view.kinds import attributes_of
 from app.view.trend_plot import COLUMNS, axis_range, draw, plot, time_ticks, value_ticks
 from tests.support.builders import INTERFACES, NOW, Table, panel_of, robot_there, says
 
@@ -41,21 +41,21 @@ def test_the_newest_values_are_shown_and_those_beyond_a_limit_marked() -> None:
     widget, robot = cell()
     says(robot, "/inlet", 4.9, FLOAT)
     says(robot, "/gripper", 0.46, FLOAT)
-    shown, until = show(widget, robot, NOW)
+    shown, until = attributes_of(widget, robot, NOW)
     assert [render(shown[name]) for name in ("text0", "text1")] == ["4.9 bar", "4.6"]
     assert (shown["state"], shown["state0"], shown["state1"]) == ("live", "low", "live")
     assert until == NOW + 5.0
     says(robot, "/inlet", 6.6, FLOAT)
-    assert show(widget, robot, NOW)[0]["state0"] == "high"
+    assert attributes_of(widget, robot, NOW)[0]["state0"] == "high"
 
 
 def test_each_pen_that_is_not_live_is_named() -> None:
     widget, robot = cell()
     says(robot, "/inlet", 6.0, FLOAT)
-    shown, _ = show(widget, robot, NOW)
+    shown, _ = attributes_of(widget, robot, NOW)
     assert (shown["state"], shown["state0"], shown["state1"]) == ("waiting", "live", "waiting")
     assert str(shown["note"]) == "Gripper: waiting for /gripper"
-    shown, until = show(widget, robot, NOW + 7)
+    shown, until = attributes_of(widget, robot, NOW + 7)
     assert str(shown["note"]) == "Inlet: 7 s old Gripper: waiting for /gripper"
     assert (shown["state0"], until) == ("old", NOW + 8)
 
@@ -64,7 +64,7 @@ def test_a_pen_that_is_not_a_number_says_so() -> None:
     widget, robot = cell()
     says(robot, "/inlet", math.nan, FLOAT)
     says(robot, "/gripper", 0.46, FLOAT)
-    shown, _ = show(widget, robot, NOW)
+    shown, _ = attributes_of(widget, robot, NOW)
     assert (shown["state"], shown["state0"], shown["state1"]) == ("live", "unreadable", "live")
     assert str(shown["note"]) == "Inlet: the value is not a number (NaN)"
 
@@ -73,14 +73,14 @@ def test_a_lost_bridge_makes_values_old() -> None:
     widget, robot = cell()
     says(robot, "/inlet", 6.0, FLOAT)
     robot.mark_link_lost()
-    assert show(widget, robot, NOW)[0]["state0"] == "old"
+    assert attributes_of(widget, robot, NOW)[0]["state0"] == "old"
 
 
 def test_a_fault_of_the_disk_is_shown_where_the_disk_is_used() -> None:
     for disk in (True, False):
         widget, robot = cell(disk=disk)
         robot.history.fault = "full"
-        assert show(widget, robot, NOW)[0]["fault"] == ("full" if disk else "")
+        assert attributes_of(widget, robot, NOW)[0]["fault"] == ("full" if disk else "")
 
 
 def columns(*items: tuple[int, float, float, float] | None) -> list[Column]:

@@ -13,7 +13,7 @@ from app.panel.widgets.families import BaseWidget
 from app.robot.state import RobotState, Sample
 from app.view import view as view_module
 from app.view.display_values import LONGEST_TEXT, readout, written
-from app.view.kinds import show
+from app.view.kinds import attributes_of
 from app.view.view import View, ViewContext, build_view, update_displays
 from tests.support.builders import (
     BOOL,
@@ -317,7 +317,7 @@ def test_a_widget_that_cannot_be_shown_leaves_the_others(
     def fail(widget: BaseWidget, *parameters: Any) -> Any:
         if widget.id in names:
             raise ValueError(widget.id)
-        return show(widget, *parameters)
+        return attributes_of(widget, *parameters)
 
     monkeypatch.setattr(view_module, "show", fail)
     built = build_view(PANEL, robot, NOW)

@@ -18,7 +18,7 @@ from app.commands.holds.lease import LEASE_S, Lease
 from app.commands.holds.messages import HoldMessages, Values
 from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
 from app.commands.press_context import PressContext
-from app.commands.press_judge import Arrivals
+from app.commands.press_judge import PendingSamples
 from app.commands.receipts import MAX_FINAL_CHECKS, PressRecorder, Receipt
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import TextLike, say
@@ -46,7 +46,7 @@ class HoldController:
         robot: RobotState,
         messages: HoldMessages,
         loop: Clock,
-        latest: Arrivals,
+        latest: PendingSamples,
         *,
         changed: Callable[[], None],
         recorder: PressRecorder | None = None,

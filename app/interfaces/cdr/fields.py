@@ -4,12 +4,12 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from app.errors import DecodeError
-from app.interfaces.cdr.beginnings import StructureFactory, TruncatedReader
 from app.interfaces.cdr.encapsulation import check_end, split_header
 from app.interfaces.cdr.formats import is_number
 from app.interfaces.cdr.reader import ByteOrder, Read, value_reader
 from app.interfaces.cdr.scanner import Scan
 from app.interfaces.cdr.steps import Mark, Op
+from app.interfaces.cdr.truncated_reader import StructureFactory, TruncatedReader
 from app.interfaces.definitions import Type
 
 

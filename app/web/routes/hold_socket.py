@@ -24,7 +24,7 @@ from app.panel.template import needed_inputs
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import principal_of
-from app.web.hold_protocol import WHYS, Beat, Begin, End, Message, Said, read_message
+from app.web.hold_protocol import END_REASONS, Beat, Begin, End, HoldMessage, Message, read_message
 from app.web.language import language_of
 from app.web.request_body import received
 
@@ -170,7 +170,7 @@ class _HoldSocket:
         """Applies a message to the hold; False once it has ended."""
         holds = self._session.holds
         if isinstance(said, End) and said.lease in ("", holding.lease.id):
-            holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
+            holds.end(holding, END_REASONS.get(said.why, "hold_by_nonsense"))
             return False
         if not isinstance(said, Beat) or said.lease != holding.lease.id:
             holds.end(holding, "hold_by_nonsense")
@@ -190,7 +190,7 @@ class _HoldSocket:
             raise WebSocketDisconnect(message.get("code", 1000))
         return read_message(message.get("text") or "")
 
-    def _sent(self, said: Said) -> float:
+    def _sent(self, said: HoldMessage) -> float:
         return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
 
     async def _send_end(self) -> None:

@@ -3,7 +3,7 @@
 A press has the fields of a post's body, and `widget`. Its `id` is required, since answers come in any
 order. `status` is that of the answer to a post, with a receipt or an `error`:
 
-    browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<boot>-<version>", "at": "…"}
+    browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<instance>-<n>", "at": …}
     server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "code": "…", …}
     server   {"press": "5f…", "status": 404, "error": "…"}
 

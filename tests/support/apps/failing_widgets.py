@@ -8,10 +8,10 @@ from app.panel.widgets.gauge import Gauge
 from app.view import kinds
 from app.web.rendering import page_words
 
-shown = kinds.SHOWN[Gauge]
+shown = kinds.ATTRIBUTES[Gauge]
 
 
-def gauge(*parameters: Any) -> kinds.Shown:
+def gauge(*parameters: Any) -> kinds.AttributesUntil:
     attributes, until = shown(*parameters)
     if str(attributes["text"]).startswith("9"):
         raise RuntimeError("this gauge fails")
@@ -22,6 +22,6 @@ def plot(*_: Any) -> Any:
     raise RuntimeError("this plot fails")
 
 
-vars(kinds)["SHOWN"] = {**kinds.SHOWN, Gauge: gauge}
+vars(kinds)["ATTRIBUTES"] = {**kinds.ATTRIBUTES, Gauge: gauge}
 vars(page_words)["plot"] = plot
 app = main.app
