@@ -20,7 +20,7 @@ from tests.support.parts import ROOT
 ROOMS = (
     "interfaces",
     "dialect",
-    "graph",
+    "survey",
     "panel",
     "robot",
     "permission",

@@ -6,7 +6,7 @@ from typing import Final
 from app.diagnose.findings import Report, few
 from app.diagnose.names import NamesBehindBridge
 from app.dialect.endpoint import DEMO_VERSION
-from app.graph.model import Bridge, GraphSnapshot
+from app.survey.model import Bridge, GraphSnapshot
 
 TESTED: Final = "1.10.2"  # zenoh-plugin-ros2dds; see docs/compatibility.md
 

@@ -13,10 +13,10 @@ from app.diagnose.names import PanelRobot
 from app.diagnose.robot import LISTEN_S, check_connection, check_robot
 from app.diagnose.screen import DRM, check_screens
 from app.errors import PanelError
-from app.graph.model import GraphSnapshot
 from app.i18n import ENGLISH
 from app.panel import Panel, load_panel
 from app.settings import Settings
+from app.survey.model import GraphSnapshot
 
 UNKNOWN_TYPE: Final = re.compile(
     r'" is not (an interface|a service|an action) of ROS 2|" is not there: '

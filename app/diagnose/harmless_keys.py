@@ -21,8 +21,8 @@ from app.diagnose.harmless import (
     rules,
     words,
 )
-from app.graph.model import CYCLONE_DDS
 from app.panel.widgets.kinds import KINDS
+from app.survey.model import CYCLONE_DDS
 
 _VENDOR: Final = re.compile(f"|{CYCLONE_DDS}|Fast DDS|Connext|OpenSplice|OpenDDS|GurumDDS|CoreDX DDS")
 

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.dialect.endpoint import within
-from app.graph.forwarding import (
+from app.interfaces.names import GLOBAL, PARAMETER_EVENTS, SHARED_TOPICS, key_of, possible_keys
+from app.panel.model import Panel, RobotEntry
+from app.survey.forwarding import (
     Forwarding,
     ServerList,
     TopicList,
     server_forwarding,
     topic_forwarding,
 )
-from app.graph.model import (
+from app.survey.model import (
     BridgeRoute,
     GraphSnapshot,
     Node,
@@ -22,8 +24,6 @@ from app.graph.model import (
     TopicEndpoint,
     near,
 )
-from app.interfaces.names import GLOBAL, PARAMETER_EVENTS, SHARED_TOPICS, key_of, possible_keys
-from app.panel.model import Panel, RobotEntry
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
 from app.diagnose.observation import Observation
 from app.errors import DecodeError
-from app.graph.model import TopicEndpoint
 from app.i18n import TextLike, render, say
 from app.interfaces import Interfaces, has_key
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits, unmet
 from app.robot.sample import Sample
+from app.survey.model import TopicEndpoint
 
 REGULAR: Final = 2  # messages while one listens
 

@@ -16,8 +16,8 @@ from app.diagnose.permissions import check_permissions
 from app.diagnose.topics import TopicChecks
 from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError
-from app.graph.model import GraphSnapshot
 from app.interfaces import load_interfaces
+from app.survey.model import GraphSnapshot
 from app.transport.bridge_graph_reader import first_graph, later_graph, silent
 from app.transport.zenoh_config import config_from
 from app.transport.zenoh_session import ZenohSession

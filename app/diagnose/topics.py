@@ -6,13 +6,13 @@ from typing import Final
 
 from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
-from app.graph.forwarding import Forwarding, ServerList, TopicList
-from app.graph.model import Server, TopicEndpoint
 from app.interfaces import Interfaces
 from app.interfaces.names import Qos
 from app.panel.widgets.parameter import DESCRIBE, EVENTS, GET, SET
 from app.panel.widgets.service_action import Call
 from app.robot.definitions import differs, own_hash
+from app.survey.forwarding import Forwarding, ServerList, TopicList
+from app.survey.model import Server, TopicEndpoint
 
 BEST_EFFORT: Final = "it is published best effort, and the panel asks for reliable."
 VOLATILE: Final = "it is published volatile, and the panel asks for transient local."

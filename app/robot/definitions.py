@@ -9,9 +9,9 @@ from typing import Final
 
 from app.dialect.endpoint import Endpoint, Role
 from app.errors import InterfaceError
-from app.graph.model import CALLABLE
 from app.interfaces import Interfaces
 from app.robot.graph import LiveGraph, cached_until_change
+from app.survey.model import CALLABLE
 
 HASH: Final = "RIHS01_"  # other versions of hashes can't be compared
 

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from app.graph.node_services import PARAMETER_TYPES
 from app.i18n import TextLike, joined, say
 from app.i18n.values import numbers
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import Parameter, Value
+from app.survey.node_services import PARAMETER_TYPES
 
 NOT_SET: Final = 0
 EMPTY_VALUE: Final[Mapping[str, Any]] = {

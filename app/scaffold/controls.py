@@ -4,14 +4,14 @@ from collections.abc import Collection, Iterator, Mapping
 from textwrap import shorten
 from typing import Any, Final
 
-from app.graph.model import Server, Topic
-from app.graph.node_services import NodeParameter
 from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES
 from app.scaffold.entry import Entry, Omission
 from app.scaffold.fields import NUMBERS
 from app.scaffold.naming import label_of, place_of, words_of
 from app.scaffold.reasons import NO_MESSAGE
+from app.survey.model import Server, Topic
+from app.survey.node_services import NodeParameter
 
 TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 OF_EVERY_NODE: Final = (

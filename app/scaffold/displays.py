@@ -5,13 +5,13 @@ from itertools import takewhile
 from math import ceil, degrees, pi
 from typing import Any, Final
 
-from app.graph.model import Topic
 from app.interfaces import Interfaces
 from app.scaffold.entry import Entry, Omission
 from app.scaffold.fields import NUMBERS, Shown, range_for, shown_fields
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import NEGATIVE, label_of, place_of
 from app.scaffold.reasons import NO_JOINTS, too_long, why_no_display
+from app.survey.model import Topic
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from app.errors import InterfaceError
-from app.graph.model import Server, Topic
-from app.graph.node_services import NodeParameter
 from app.interfaces import Interfaces
 from app.interfaces.names import GLOBAL
 from app.scaffold import controls
@@ -16,6 +14,8 @@ from app.scaffold.interlocks import interlock_candidates, interlock_for
 from app.scaffold.labels import with_own_labels
 from app.scaffold.pages import MOST_PAGES, make_pages
 from app.scaffold.reasons import OF_NAMES
+from app.survey.model import Server, Topic
+from app.survey.node_services import NodeParameter
 
 LEFT_OUT: Final = frozenset(("/parameter_events", "/clock", *OF_NAMES))
 # Services that each node has, by the last part of their names (rcl_interfaces and others).

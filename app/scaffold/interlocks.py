@@ -5,10 +5,10 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from app.dialect.endpoint import within
-from app.graph.model import Topic
 from app.scaffold.entry import Entry, InterlockCandidate
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import NEGATIVE, id_of, label_of, permits
+from app.survey.model import Topic
 
 BOOL: Final = "std_msgs/msg/Bool"
 

@@ -9,7 +9,7 @@ from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.dialect.bridge_entities import DdsEntity, TokenQos
 from app.dialect.endpoint import Endpoint
-from app.graph.model import (
+from app.survey.model import (
     CALLABLE,
     Bridge,
     BridgeRoute,

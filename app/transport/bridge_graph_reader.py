@@ -8,8 +8,8 @@ from typing import Final
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
 from app.errors import LinkError
-from app.graph.model import GraphSnapshot
 from app.printable import one_line
+from app.survey.model import GraphSnapshot
 from app.transport.admin_space import GraphLink, ask_json
 from app.transport.bridge_graph import GraphAnswers, ros_graph
 

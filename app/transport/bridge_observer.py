@@ -12,8 +12,8 @@ from typing import Final
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
-from app.graph.model import GraphSnapshot
 from app.robot.sample import Sample
+from app.survey.model import GraphSnapshot
 from app.transport.bridge_graph_reader import first_graph
 from app.transport.declarations import Declarations
 from app.transport.zenoh_config import Config

@@ -10,14 +10,14 @@ import pytest
 
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
-from app.graph.model import GraphSnapshot, Node
-from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import Definitions
 from app.interfaces.names import Qos
 from app.interfaces.parsing import parse_definition
 from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
 from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
+from app.survey.model import GraphSnapshot, Node
+from app.survey.node_services import NodeParameter, NodeServices
 from app.transport.bridge_observer import CONNECT_S, BridgeObserver
 from app.transport.zenoh_config import Config, config_to
 from tests.support.cyclone import NODE, CycloneRobot

@@ -20,8 +20,11 @@ from app.diagnose.observation import Observation
 from app.diagnose.permissions import check_permissions
 from app.diagnose.robot import check_copies
 from app.diagnose.topics import TopicChecks
-from app.graph.forwarding import denies
-from app.graph.model import (
+from app.interfaces import load_interfaces
+from app.panel import load_panel
+from app.robot.sample import Sample
+from app.survey.forwarding import denies
+from app.survey.model import (
     Bridge,
     BridgeRoute,
     EndpointQos,
@@ -32,9 +35,6 @@ from app.graph.model import (
     Topic,
     TopicEndpoint,
 )
-from app.interfaces import load_interfaces
-from app.panel import load_panel
-from app.robot.sample import Sample
 from tests.diagnose.setups import (
     BOOL,
     STRING,

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from app.graph.model import Topic
 from app.interfaces import Interfaces, load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
@@ -18,6 +17,7 @@ from app.scaffold.entry import Draft
 from app.scaffold.labels import own_labels
 from app.scaffold.pages import MOST_PAGES, MOST_WIDGETS
 from app.scaffold.toml_text import toml_text
+from app.survey.model import Topic
 from tests.scaffold.test_scaffold import BOOL, INTERFACES, heard, published, server, widgets
 
 TRIGGER = "std_srvs/srv/Trigger"

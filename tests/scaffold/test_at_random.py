@@ -10,8 +10,6 @@ from typing import Any, Final
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app.graph.model import EndpointQos, Server, Topic, TopicEndpoint
-from app.graph.node_services import PARAMETER_TYPES, NodeParameter
 from app.interfaces import Type, load_interfaces
 from app.interfaces.definitions import INTEGER_RANGES, attribute_name
 from app.interfaces.names import is_valid_name
@@ -20,6 +18,8 @@ from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
 from app.scaffold.entry import Draft
 from app.scaffold.toml_text import toml_text
+from app.survey.model import EndpointQos, Server, Topic, TopicEndpoint
+from app.survey.node_services import PARAMETER_TYPES, NodeParameter
 
 INTERFACES: Final = load_interfaces("jazzy")
 MESSAGES: Final = sorted(name for name in INTERFACES.structures if "/msg/" in name)

@@ -10,8 +10,6 @@ from typing import Any
 
 import pytest
 
-from app.graph.model import EndpointQos, Server, Topic, TopicEndpoint
-from app.graph.node_services import NodeParameter
 from app.interfaces import load_interfaces
 from app.panel import check_panel
 from app.panel.load import faults_of_text
@@ -21,6 +19,8 @@ from app.scaffold.entry import Draft
 from app.scaffold.fields import Shown, range_for, shown_fields
 from app.scaffold.naming import id_of, label_of, permits, place_of
 from app.scaffold.toml_text import toml_text
+from app.survey.model import EndpointQos, Server, Topic, TopicEndpoint
+from app.survey.node_services import NodeParameter
 
 INTERFACES = load_interfaces("jazzy")
 BOOL = "std_msgs/msg/Bool"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from app.dialect.bridge_entities import entity_of
-from app.graph.model import EndpointQos, PeerEndpoint, RobotGraph
+from app.survey.model import EndpointQos, PeerEndpoint, RobotGraph
 from app.transport.bridge_graph import GraphAnswers, ros_graph
 
 FAST, CYCLONE = "010f78fdb176d54800000000000001c1", "01103b80c068b0dad3529cde000001c1"

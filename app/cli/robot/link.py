@@ -17,11 +17,11 @@ from app.cli.arguments import seconds
 from app.diagnose.findings import Finding, few
 from app.dialect.endpoint import within
 from app.errors import KioskError, LinkError
-from app.graph.model import GraphSnapshot, RobotGraph, Topic, near
 from app.interfaces import DISTROS
 from app.interfaces.names import GLOBAL, NAMESPACE
 from app.panel import load_panel
 from app.settings import LOOPBACK_HOSTS, Settings
+from app.survey.model import GraphSnapshot, RobotGraph, Topic, near
 from app.transport.bridge_observer import CONNECT_S, BridgeObserver
 from app.transport.zenoh_config import config_from
 

@@ -27,7 +27,6 @@ from app.cli.robot.settled_graph import settled_graph
 from app.cli.robot.survey import robot_at, survey, usable
 from app.diagnose.findings import few
 from app.errors import KioskError
-from app.graph.model import GraphSnapshot
 from app.interfaces import load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import LeftOut, checked_draft
@@ -37,6 +36,7 @@ from app.scaffold.labels import own_labels
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
 from app.settings import APP
+from app.survey.model import GraphSnapshot
 
 PROG = "python -m app.cli scaffold"
 LISTEN_S: Final = 3.0

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from app.cli.robot.link import Place, absent_robots
-from app.graph.forwarding import lost_topics
-from app.graph.model import GraphSnapshot
+from app.survey.forwarding import lost_topics
+from app.survey.model import GraphSnapshot
 
 SETTLES_WITHIN_S: Final = 5.0
 READ_EVERY_S: Final = 0.5

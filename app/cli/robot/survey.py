@@ -9,14 +9,14 @@ from typing import Any, Final
 
 from app.cli.robot.topic_reader import endpoint_for
 from app.errors import DecodeError
-from app.graph.forwarding import lost_servers, lost_topics, topic_forwarding
-from app.graph.model import GraphSnapshot, RobotGraph, Server, Topic
-from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces
 from app.interfaces.names import NAMESPACE, SHARED_TOPICS
 from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, shown
 from app.scaffold.fields import shown_fields
+from app.survey.forwarding import lost_servers, lost_topics, topic_forwarding
+from app.survey.model import GraphSnapshot, RobotGraph, Server, Topic
+from app.survey.node_services import NodeParameter, NodeServices
 from app.transport.bridge_observer import BridgeObserver
 
 ARRIVALS: Final = 3  # of a topic, by which it is known how often it is published

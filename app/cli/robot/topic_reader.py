@@ -9,14 +9,14 @@ from app.cli.robot.link import Place, full_name, lost_text, shown_topics, topic_
 from app.cli.robot.settled_graph import settled_graph
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import InterfaceError, LinkError
-from app.graph.forwarding import topic_forwarding
-from app.graph.model import GraphSnapshot, RobotGraph, Topic
-from app.graph.node_services import NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import attribute_name
 from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import Qos
 from app.robot.sample import Sample
+from app.survey.forwarding import topic_forwarding
+from app.survey.model import GraphSnapshot, RobotGraph, Topic
+from app.survey.node_services import NodeServices
 from app.transport.bridge_observer import BridgeObserver
 
 DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost

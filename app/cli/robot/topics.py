@@ -23,9 +23,9 @@ from app.cli.robot.link import (
     shown_topics,
 )
 from app.cli.robot.settled_graph import settled_graph
-from app.graph.forwarding import Forwarding, topic_forwarding
-from app.graph.model import RobotGraph, Topic, TopicEndpoint
 from app.printable import one_line
+from app.survey.forwarding import Forwarding, topic_forwarding
+from app.survey.model import RobotGraph, Topic, TopicEndpoint
 
 PROG = "python -m app.cli topics"
 NOT_FORWARDED: Final[Mapping[Forwarding, str]] = {

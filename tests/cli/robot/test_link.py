@@ -13,7 +13,7 @@ from app.cli.robot.hz import Rate
 from app.cli.robot.link import Place, add_options, place_of, topic_named
 from app.cli.robot.topic_reader import TopicReader
 from app.errors import LinkError, PanelError
-from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 
 BOOL = "std_msgs/msg/Bool"
 

@@ -10,7 +10,7 @@ import pytest
 
 from app.cli.robot.link import Place
 from app.cli.robot.settled_graph import settled_graph
-from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 
 LONG_S = 60.0
 PLACE = Place(zenoh=Path("zenoh.json5"))

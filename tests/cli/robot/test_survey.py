@@ -8,7 +8,7 @@ import pytest
 
 from app.cli.robot.scaffold import _base
 from app.cli.robot.survey import MOST_ROBOTS, Heard, survey, usable
-from app.graph.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 from tests.cli.robot.test_link import place_below
 from tests.support.builders import INTERFACES
 

@@ -10,10 +10,10 @@ from math import isfinite
 from typing import Any, Final, Protocol
 
 from app.errors import DecodeError, InterfaceError
-from app.graph.model import Node, RobotGraph, Topic
 from app.interfaces import Interfaces
 from app.interfaces.definitions import Definitions
 from app.interfaces.type_descriptions import SERVICE, SERVICE_TYPE_NAME, definitions_of
+from app.survey.model import Node, RobotGraph, Topic
 
 # The names of rcl_interfaces/msg/ParameterType, by their numbers.
 PARAMETER_TYPES: Final = (

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Literal
 
-from app.graph.model import Bridge, Node, RobotGraph, Topic
+from app.survey.model import Bridge, Node, RobotGraph, Topic
 
 Forwarding = Literal["forwarded", "denied", "lost"]
 # The lists of a bridge's `allow` and `deny`.
