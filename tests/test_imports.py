@@ -26,6 +26,7 @@ ROOMS = (
     "permission",
     "audit",
     "trends",
+    "alarms",
     "view",
     "commands",
     "recording",
