@@ -28,6 +28,7 @@ from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
+from app.panel.stories import StoryName
 from app.panel.texts import panel_texts
 from app.panel.widgets.families import (
     BaseWidget,
@@ -111,6 +112,7 @@ class Panel(Description):
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
+    demo_story: StoryName | None = None
     demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")

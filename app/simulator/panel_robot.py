@@ -1,7 +1,7 @@
 """The robot of any panel: it has everything that the panel listens to, publishes, calls and sets.
 
 Pure: `step` it with the time. The names of the reference system's `system_controller` are played by
-`DemoRobot`, as far as the panel has them with the same types.
+`DemoRobot`, as far as the panel has them with the same types, and those of its story by the story.
 """
 
 import logging
@@ -14,10 +14,13 @@ from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
 from app.panel.demo import NO_ENTRY
 from app.panel.model import Panel
+from app.panel.used_names import played_names
 from app.simulator.answers import DONE, feedback_at, good_response
 from app.simulator.declared import declared_by
 from app.simulator.goals import ActionServer, CountAction, SimulatedAction
 from app.simulator.kinds import Acted, Declared, Need, Published, Served, Shown, needs_of
+from app.simulator.palletizing.cell import SPEED_MM_S
+from app.simulator.palletizing.played import PlayedPalletizing
 from app.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters
 from app.simulator.presses import effects
 from app.simulator.robot import (
@@ -54,8 +57,11 @@ class PanelRobot:
         self._panel = panel
         self._demo = DemoRobot()
         needs = [need for widget in panel.widgets() for need in needs_of(widget, self._interfaces)]
-        self._own = _reference_topics(panel)
-        skipped = {**self._own, EVENTS: EVENT_TYPE}
+        names = played_names(panel)
+        self._story = None if names is None else PlayedPalletizing(names, number)
+        told = {} if names is None else names.publishes
+        self._own = {name: kind for name, kind in _reference_topics(panel).items() if name not in told}
+        skipped = {**self._own, **told, EVENTS: EVENT_TYPE}
         shown = _of(needs, Shown)
         self._topics = simulated_topics(panel, shown, self._interfaces, skipped, APART * number)
         self._published = _by_topic(_of(needs, Published))
@@ -80,7 +86,15 @@ class PanelRobot:
             for topic, one in self._topics.items()
         }
         events = Topic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
-        return {**own, **simulated, EVENTS: events}
+        return {**own, **dict(self._told_topics()), **simulated, EVENTS: events}
+
+    def _told_topics(self) -> Iterator[tuple[str, Topic]]:
+        """The topics of the story. Those with states keep the last one for late subscribers."""
+        if self._story is None:
+            return
+        for topic, kind in self._story.names.publishes.items():
+            qos = LATCHED if self._story.is_latched(topic) else self._panel.qos(topic).wire_qos
+            yield topic, Topic(kind, qos, self._hash(kind))
 
     @cached_property
     def subscribes(self) -> Mapping[str, Topic]:
@@ -101,7 +115,8 @@ class PanelRobot:
     @cached_property
     def actions(self) -> Mapping[str, ActionServer]:
         own = {COUNT: CountAction(COUNT_TYPE, self._demo)} if self._has(COUNT) else {}
-        return {**own, **self._simulated}
+        told = self._story.actions if self._story else {}
+        return {**own, **self._simulated, **told}
 
     # What it receives and publishes.
 
@@ -112,6 +127,8 @@ class PanelRobot:
             message = self._interfaces.decode(type_name, payload)
         except DecodeError:
             return  # as a ROS node that can't read a message: nothing happens
+        if self._story and topic in self._story.names.subscribes:
+            self._story.receive(topic, message)
         echoes = topic in LISTENS and type_name == TEXT
         if echoes:
             self._demo.hear(topic, message.data)
@@ -135,6 +152,8 @@ class PanelRobot:
 
     def _answer(self, service: str, request: Any) -> Mapping[str, Any]:
         node, _, _ = service.rpartition("/")
+        if self._story and service in self._story.names.services:
+            return self._story.serve(service, request)
         if service in self._responses:
             return self._responses[service][1](self._moment)
         if node in self._nodes:
@@ -151,6 +170,7 @@ class PanelRobot:
         for topic, fields in (*self._demo.step(moment.t), *of_presses):
             if topic in self._own:
                 yield topic, self._interfaces.encode(self._own[topic], fields)
+        yield from self._tell()
         for node in self._nodes.values():
             for event in node.news():
                 yield EVENTS, self._interfaces.encode(EVENT_TYPE, event)
@@ -163,6 +183,15 @@ class PanelRobot:
                 continue
             if payload is not None:
                 yield name, payload
+
+    def _tell(self) -> Iterator[tuple[str, bytes]]:
+        """The messages of the story. Its belt has the speed that the parameter of the node sets."""
+        if self._story is None:
+            return
+        if NODE in self._nodes:
+            self._story.cell.speed_mm_s = self._nodes[NODE].value("speed", SPEED_MM_S)
+        for topic, fields in self._story.step(self._moment):
+            yield topic, self._interfaces.encode(self._story.names.publishes[topic], fields)
 
     # How it is made.
 
@@ -211,6 +240,8 @@ class PanelRobot:
         for name, widgets in several.items():
             entry = self._panel.demo.get(name, NO_ENTRY)
             own = name == COUNT and widgets[0].type == COUNT_TYPE
+            if self._story and name in self._story.actions:
+                continue
             if (own and not {"result", "duration_s"} & entry.model_fields_set) or entry.silent:
                 continue
             types = self._interfaces.action_types(widgets[0].type)

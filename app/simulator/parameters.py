@@ -81,6 +81,10 @@ class NodeParameters:
             return {"values": [_value(one.type, one.value) for _, one in found]}
         return {"descriptors": [_descriptor(name, one) for name, one in found]}
 
+    def value(self, name: str, default: Any) -> Any:
+        """The value of a parameter, or a default if it is not declared."""
+        return self._declared[name].value if name in self._declared else default
+
     def news(self) -> list[Fields]:
         """The events since the last call; their stamps are left at 0."""
         news, self._news = self._news, []

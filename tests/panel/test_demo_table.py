@@ -112,6 +112,41 @@ def test_a_mistake_is_one_fault_at_its_place(
     assert fault.line in (LINE - 1, LINE)
 
 
+def story_faults(folder: Path, panel: str) -> list[tuple[str, str]]:
+    path = folder / "cell.toml"
+    path.write_text(f'demo_story = "palletizing"\n{panel}')
+    try:
+        load_panel(path)
+    except PanelError as error:
+        return [(fault.place, fault.message) for fault in error.faults]
+    return []
+
+
+def test_a_story_is_for_a_panel_that_uses_its_names_with_their_types(tmp_path: Path) -> None:
+    assert story_faults(tmp_path, PANEL) == []
+    other = PANEL.replace('"/door"', '"/boxes"')
+    ((place, message),) = story_faults(tmp_path, other)
+    assert place == "demo_story"
+    assert message.startswith(
+        "plays /boxes as std_msgs/msg/UInt32, and the panel has std_msgs/msg/Bool"
+    )
+    assert story_faults(tmp_path, other + '[demo."/boxes"]\nvalues = [true]\n') == []
+
+
+def test_a_story_without_a_name_that_the_panel_uses_is_a_fault(tmp_path: Path) -> None:
+    ((place, message),) = story_faults(tmp_path, PANEL.replace('"/joint_states"', '"/joints"'))
+    assert (place, "the panel uses no name of the story" in message) == ("demo_story", True)
+
+
+def test_an_unknown_story_is_a_fault(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(f'demo_story = "welding"\n{PANEL}')
+    with pytest.raises(PanelError) as raised:
+        load_panel(path)
+    (fault,) = raised.value.faults
+    assert (fault.place, "palletizing" in fault.message) == ("demo_story", True)
+
+
 def test_an_entry_of_a_widget_with_a_fault_is_no_second_fault(tmp_path: Path) -> None:
     table = '[demo."/door"]\nvalues = [true]\n[[page]]\nid = "two"\ntitle = "Two"\n'
     wrong = PANEL.replace('topic = "/door"\ntype = "std_msgs/msg/Bool"', 'topic = "/door"')

@@ -267,9 +267,9 @@ def test_a_mistake_is_one_fault_in_words(faults_of: FaultsOf, mistake: Mapping[s
 def test_it_is_not_toml(faults_of: FaultsOf) -> None:
     for old, new, line in (
         ('title = "Robot cell 1"', "title = Robot cell 1", 2),
-        ('label = "Speed"', 'label = "Speed', 107),
-        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 107),
-        ("min = -1.0", "min : -1.0", 110),
+        ('label = "Speed"', 'label = "Speed', 108),
+        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 108),
+        ("min = -1.0", "min : -1.0", 111),
     ):
         fault = the_one(faults_of, changed(old, new))
         assert (fault.place, fault.line) == ("", line)

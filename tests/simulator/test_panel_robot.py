@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import pytest
 
-from app.interfaces import DISTROS, load_interfaces
+from app.interfaces import DISTROS
 from app.interfaces.names import Qos
 from app.panel import Panel, load_panel
 from app.panel.widgets.families import BaseWidget, Display
@@ -26,8 +26,8 @@ from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_peer import ANY_PORT, Simulator
 from tests.support.builders import INTERFACES
 from tests.support.parts import TESTS
+from tests.support.stepped import STEP_S, Stepped
 
-STEP_S: Final = 0.1
 ROUND_S: Final = PERMITTED_S + FORBIDDEN_S
 HEAD: Final = 'title = "Cell"\nmode = "demo"\n'
 Loaded = Callable[[str], Panel]
@@ -44,41 +44,6 @@ def loaded(tmp_path: Path) -> Loaded:
         return load_panel(path)
 
     return panel
-
-
-class Stepped:
-    """A robot, and the fields that it has published so far: topic → [(time, value)]."""
-
-    def __init__(self, panel: Panel, number: int = 0) -> None:
-        self.panel = panel
-        self.robot = PanelRobot(panel, number)
-        self.interfaces = load_interfaces(panel.distro, panel.interfaces)
-        self.said: dict[str, list[tuple[float, bytes]]] = {}
-        self.now = 0.0
-
-    def run(self, seconds: float) -> "Stepped":
-        for _ in range(round(seconds / STEP_S)):
-            for topic, payload in self.robot.step(Moment(1000 + self.now, 10**18)):
-                self.said.setdefault(topic, []).append((self.now, payload))
-            self.now = round(self.now + STEP_S, 6)
-        return self
-
-    def values(self, topic: str, field: str = "data") -> list[Any]:
-        return [value for _, value in self.timed(topic, field)]
-
-    def timed(self, topic: str, field: str = "data") -> list[tuple[float, Any]]:
-        reader = self.interfaces.field_reader(self.robot.publishes[topic].type, [field])
-        return [(at, reader.read(payload).get(field)) for at, payload in self.said.get(topic, ())]
-
-    def hear(self, topic: str, **fields: Any) -> None:
-        type_name = self.robot.subscribes[topic].type
-        self.robot.receive(topic, self.interfaces.encode(type_name, fields))
-
-    def call(self, service: str, **fields: Any) -> Any:
-        request, response = self.interfaces.service_types(self.robot.services[service])
-        answer = self.robot.serve(service, self.interfaces.encode(request, fields))
-        assert answer is not None
-        return self.interfaces.decode(response, answer)
 
 
 def readout(topic: str, type_name: str, field: str = "data", **more: str) -> str:

@@ -12,9 +12,10 @@ from app.panel.demo import DemoEntry
 from app.panel.faults.places import place_of
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.model import Panel
+from app.panel.stories import STORIES
+from app.panel.used_names import used_names
 from app.panel.values import join_list, number_text
 from app.panel.widgets.parameter import Parameter, is_valid_value
-from app.panel.widgets.service_action import ServerCommand
 
 Use = Literal["topic", "publication", "service", "action", "node"]
 
@@ -49,13 +50,33 @@ class _Names:
 
 
 def demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """The faults of all entries. By their cause they are consequences of faults of subscriptions."""
-    for fault in _entry_faults(panel, interfaces):
+    """The faults of the story and all entries. By their cause they are consequences of faults of
+    subscriptions."""
+    names = _names(panel)
+    for fault in (*_story_faults(panel, names), *_entry_faults(panel, names, interfaces)):
         yield replace(fault, cause=f"listens {fault.cause or fault.place}")
 
 
-def _entry_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    names = _names(panel)
+def _story_faults(panel: Panel, names: _Names) -> Iterator[Fault]:
+    """Faults of a story: names with other types than it plays, or none that the panel uses."""
+    if panel.demo_story is None:
+        return
+    played = list(STORIES[panel.demo_story].types)
+    used = False
+    for use, name, wanted in played:
+        found = names.types[use].get(name)
+        if found is None or name in panel.demo:
+            continue
+        used = True
+        if found != wanted:
+            what = f"plays {name} as {wanted}, and the panel has {found}; rename it or use that type"
+            yield Fault("demo_story", what, cause=name)
+    if not used:
+        some = list_names(sorted(name for _, name, _ in played))
+        yield Fault("demo_story", f"the panel uses no name of the story; there is {some}")
+
+
+def _entry_faults(panel: Panel, names: _Names, interfaces: Interfaces) -> Iterator[Fault]:
     for name, entry in panel.demo.items():
         place = place_of(("demo", name))
         uses = names.uses(name)
@@ -70,13 +91,7 @@ def _entry_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
 
 
 def _names(panel: Panel) -> _Names:
-    servers = [widget for widget in panel.widgets() if isinstance(widget, ServerCommand)]
-    types: dict[Use, Mapping[str, str]] = {
-        "topic": panel.listened(),
-        "publication": panel.publications(),
-        "service": {one.server_name: one.type for one in servers if one.server_role == "SS"},
-        "action": {one.server_name: one.type for one in servers if one.server_role == "AS"},
-    }
+    types: dict[Use, Mapping[str, str]] = {use: used for use, used in used_names(panel).items()}
     parameters: dict[str, dict[str, Parameter]] = {}
     for widget in panel.parameters():
         parameters.setdefault(widget.node, {})[widget.parameter] = widget

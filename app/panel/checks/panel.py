@@ -184,8 +184,8 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """Imported only where a panel has the table, for a faster start."""
-    if panel.demo:
+    """Imported only where a panel has the table or a story, for a faster start."""
+    if panel.demo or panel.demo_story:
         from app.panel.checks.demo import demo_faults
 
         yield from demo_faults(panel, interfaces)

@@ -1,0 +1,1 @@
+"""The story `palletizing`: a cell in which an arm stacks boxes on a pallet."""
