@@ -28,7 +28,7 @@ from app.robot.state import RobotState
 
 
 async def assume_flushed() -> bool:
-    """For transports that cannot tell whether the bridge received a message."""
+    """For transports that cannot tell whether the peer received a message."""
     return True
 
 
@@ -66,7 +66,7 @@ class Dispatcher:
         monotonic: Callable[[], float] = time.monotonic,
         flushed: Callable[[], Awaitable[bool]] = assume_flushed,
     ) -> None:
-        """`flushed` returns whether everything sent so far has reached the bridge."""
+        """`flushed` returns whether everything sent so far has reached the peer."""
         self._flushed = flushed
         self._widgets = {w.id: w for w in panel.widgets()}
         self._input_ids = {
@@ -215,11 +215,13 @@ class Dispatcher:
         return Outcome("published" if has_reader else "unknown", text)
 
     async def _until_flushed(self, widget: PublishPress, answer: Outcome) -> Outcome:
-        """Waits for the bridge's response: until then a published message may still be lost."""
+        """Waits for the peer's response: until then a published message may still be lost."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._flushed():
             return answer
-        return Outcome("unknown", say("sent_unanswered", topic=widget.topic, time=at))
+        return Outcome(
+            "unknown", say(self._robot.traits.sentences.press_unconfirmed, topic=widget.topic, time=at)
+        )
 
     def check_inputs(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The checked values of the inputs with these ids; InputError for bad or missing ones."""

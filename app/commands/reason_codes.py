@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Final
 
+from app.dialect.peer_traits import EVERY_SENTENCES
 from app.i18n import BETWEEN, Text, TextLike
 
 # Sentences that only frame another one → the parameter with that sentence.
@@ -14,7 +15,8 @@ FRAMES: Final[Mapping[str, str]] = {
     "with_reply": "said",
     "log_not_on_disk": "said",
 }
-ADVICE: Final = frozenset({"cyclone_hint"})  # follows a reason and is none itself
+# They follow a reason and are none themselves.
+ADVICE: Final = frozenset(sentences.timeout_hint for sentences in EVERY_SENTENCES)
 
 
 def reason_code(reason: TextLike) -> str | None:

@@ -16,7 +16,7 @@ from app.clock import format_time
 from app.commands.transport import Transport
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
-from app.i18n import PanelText, Text, TextLike, joined, number, say
+from app.i18n import PanelText, Text, TextLike, hint, joined, number, say
 from app.i18n.values import filled_in, together
 from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.template import RESPONSE_PLACEHOLDER, response_paths
@@ -29,11 +29,9 @@ from app.ros_logging import RobotLog, rosout_extra
 log = logging.getLogger("kiosk.calls")
 
 LATE_FAILED: Final = "processing a late response failed"
-BRIDGE_LOSS_DELAY_S: Final = 0.3  # from the end of a query to the end of the lost bridge's token
 NO_VALUE: Final = "—"
 MAX_VALUE_CHARS: Final = 500  # of one value: every browser gets it, and logs keep it
 LATE_S: Final = 60.0  # after the timeout, a response still corrects the receipt
-MAX_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +50,7 @@ class Request:
 
 @dataclass(slots=True)
 class _Waiting:
-    """A call whose query is open; `cut` is done when the bridge was lost in the meantime."""
+    """A call whose query is open; `cut` is done when the peer was lost in the meantime."""
 
     request: Request
     press_id: str
@@ -82,16 +80,16 @@ class ServiceCalls:
         self._correcting: set[asyncio.Task[None]] = set()
 
     def unanswered(self, key: str) -> int:
-        """How many requests of a service the bridge may still hold."""
+        """How many requests of a service the peer may still hold."""
         return sum(self._robot.key(w.request.service) == key for w in self._open.values())
 
     def full(self, service: str) -> TextLike:
         """Why no further request of a service may be sent, "" if it may."""
-        full = self.unanswered(self._robot.key(service)) >= MAX_UNANSWERED
+        full = self.unanswered(self._robot.key(service)) >= self._robot.traits.max_unanswered
         return say("too_many", service=service) if full else ""
 
     def on_graph_change(self) -> None:
-        """Ends the waiting calls if no bridge is left. Call it after every change of the graph."""
+        """Ends the waiting calls if no peer is left. Call it after every change of the graph."""
         if not self._robot.graph.peers:
             for waiting in self._open.values():
                 if not waiting.cut.done():
@@ -144,13 +142,13 @@ class ServiceCalls:
         return answer
 
     async def _response(self, waiting: _Waiting, corrected: OnCorrection) -> Outcome:
-        request = waiting.request
+        request, sentences = waiting.request, self._robot.traits.sentences
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
         await asyncio.wait(ends, timeout=request.timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
             return await self._read(request, reply)
-        if waiting.answered.done():  # without a reply: the bridge's token may end a little later
-            await asyncio.wait({waiting.cut}, timeout=BRIDGE_LOSS_DELAY_S)
+        if waiting.answered.done():  # without a reply: the peer's token may end a little later
+            await asyncio.wait({waiting.cut}, timeout=self._robot.traits.loss_delay_s)
         else:
             waiting.answered.add_done_callback(
                 lambda done: self._on_late_response(waiting, done, corrected)
@@ -158,10 +156,10 @@ class ServiceCalls:
         if waiting.cut.done() or not self._robot.graph.peers:
             return Outcome("unknown", say("call_cut"))
         if waiting.answered.done():
-            return Outcome("unknown", say("call_dropped", service=request.service))
-        hint = "" if request.service in self._answering else say("cyclone_hint")
+            return Outcome("unknown", say(sentences.no_reply, service=request.service))
+        advice = "" if request.service in self._answering else hint(sentences.timeout_hint)
         sentence = say("timed_out", seconds=number(f"{request.timeout_s:g}"))
-        return Outcome("timed_out", joined([sentence, hint]))
+        return Outcome("timed_out", joined([sentence, advice]))
 
     def _on_late_response(
         self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: OnCorrection

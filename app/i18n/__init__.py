@@ -5,7 +5,7 @@ Codes are stable names for tests and logs; `catalogue` has the sentences of each
 """
 
 from app.i18n.catalogue import ENGLISH, sentences
-from app.i18n.text import BETWEEN, Param, Text, TextLike, joined, localized, render, say, text_in
+from app.i18n.text import BETWEEN, Param, Text, TextLike, hint, joined, localized, render, say, text_in
 from app.i18n.values import PanelText, date_and_time, number, time_of_day
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Text",
     "TextLike",
     "date_and_time",
+    "hint",
     "joined",
     "localized",
     "number",

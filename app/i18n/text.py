@@ -86,6 +86,11 @@ def say(code: str, **about: Param) -> Text:
     return Text(code, tuple(sorted(about.items())))
 
 
+def hint(code: str) -> TextLike:
+    """The sentence with this code; "" for none."""
+    return say(code) if code else ""
+
+
 def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> TextLike:
     """Texts in sequence, without those that are ""; a single one is returned as it is. `between` is the
     code of the pattern that joins two of them."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
 
+from app.dialect.peer_traits import EVERY_SENTENCES, PeerSentences
 from app.i18n import joined, number, say
 from app.interfaces import has_key
 from app.panel.interlock import Interlock
@@ -30,8 +31,8 @@ from app.robot.keyed_values import kept_s
 from app.robot.state import Reading, RobotState
 
 # The codes of a `link_verdict` that locks.
-LINK_CODES: Final = frozenset(
-    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
+LINK_CODES: Final = frozenset({"joining", "catching_up"}).union(
+    *(sentences.link_codes for sentences in EVERY_SENTENCES)
 )
 
 MAX_ENDPOINTS: Final = 3
@@ -45,29 +46,30 @@ HISTORY_S: Final = 1.0
 
 def link_verdict(robot: RobotState, now: float) -> Verdict:
     """Whether commands can reach the robot at all."""
+    sentences = robot.traits.sentences
     if not robot.link_up:
-        return _no_link(robot.endpoints)
+        return _unreachable(sentences, robot.endpoints)
     if not robot.graph.peers:
-        return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.title)
+        return locked(sentences.absent_named if robot.name else sentences.absent, name=robot.title)
     if robot.graph.has_silent_peer:
-        return locked("bridge_silent")
+        return locked(sentences.silent)
     if now < robot.settled_at:
         return Verdict(False, "joining", say("joining"), robot.settled_at)
     if not robot.is_responding:
-        return locked("bridge_silent")
+        return locked(sentences.silent)
     if not robot.is_caught_up:
         return locked("catching_up")
     return PERMITTED
 
 
 @lru_cache(maxsize=64)
-def _no_link(endpoints: tuple[str, ...]) -> Verdict:
+def _unreachable(sentences: PeerSentences, endpoints: tuple[str, ...]) -> Verdict:
     """The reason names the configured endpoints, if there are any."""
     if not endpoints:
-        return locked("no_link")
+        return locked(sentences.unreachable)
     named, more = endpoints[:MAX_ENDPOINTS], len(endpoints) - MAX_ENDPOINTS
     where = say("and_more", names=named, number=more) if more > 0 else named
-    return Verdict(False, "no_link", say("no_link_at", where=where))
+    return Verdict(False, sentences.unreachable, say(sentences.unreachable_at, where=where))
 
 
 def interlock_verdict(

@@ -14,13 +14,14 @@ _COUNTERPART: Final[Mapping[TopicRole, TopicRole]] = {"MS": "MP", "MP": "MS"}
 
 
 def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
-    """Why a topic can't be used, by the graph: another type, an incompatible QoS, a bridge that does
-    not route it, another definition. `role` is what the panel does with it: publish ("MP") or
+    """Why a topic can't be used, by the graph: another type, an incompatible QoS, a peer that does
+    not forward it, another definition. `role` is what the panel does with it: publish ("MP") or
     subscribe ("MS")."""
     key, qos = robot.key(of.topic), of.qos.wire_qos
     if role == "MS" and robot.adapts_reliability(key):
         qos = qos._replace(reliable=False)
-    return _misfit(robot.graph, role, key, of.topic, of.type, qos) or definition_mismatch(
+    unrouted = robot.traits.sentences.unrouted
+    return _misfit(robot.graph, role, key, of.topic, of.type, qos, unrouted) or definition_mismatch(
         _COUNTERPART[role], of.topic, robot
     )
 
@@ -34,10 +35,11 @@ def definition_mismatch(role: Role, name: str, robot: RobotState) -> Verdict | N
 
 @cached_until_change
 def _misfit(
-    graph: LiveGraph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+    graph: LiveGraph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos, unrouted: str
 ) -> Verdict | None:
+    """`unrouted` is the code of the lock for a topic that the peer does not forward."""
     if found := graph.mismatched_type(role, key, type_name):
         return locked("wrong_type", topic=topic, found=found, wanted=type_name)
     if code := graph.mismatched_qos(role, key, qos):
         return locked(code, topic=topic)
-    return locked("unheard", topic=topic) if role == "MS" and graph.is_unrouted(key) else None
+    return locked(unrouted, topic=topic) if role == "MS" and graph.is_unrouted(key) else None

@@ -1,10 +1,8 @@
 """Why a service, an action or a parameter can't be used: its server, its node, a response that is
 awaited. Pure."""
 
-from typing import Final
-
 from app.dialect.endpoint import ServerRole
-from app.i18n import TextLike, joined, say
+from app.i18n import TextLike, hint, joined, say
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
 from app.panel.widgets.service_action import ServerCommand
 from app.permission.mismatches import definition_mismatch
@@ -20,10 +18,6 @@ from app.robot.parameter_state import (
 )
 from app.robot.state import RobotState
 
-# From a server's token to routes that carry the first call: a call sent in the same millisecond was
-# lost 2 times in 30, none after 5 ms, with all on one machine.
-SERVER_SETTLE_S: Final = 0.2
-
 
 def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: no server has its name and type, or
@@ -37,7 +31,7 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
         return locked("wrong_type", topic=name, found=found, wanted=call.type)
     if mismatch := _unfit(role, name, robot):
         return mismatch
-    ready_at = robot.graph.since(role, key) + SERVER_SETTLE_S
+    ready_at = robot.graph.since(role, key) + robot.traits.server_settle_s
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
     known = robot.command_status.get(call.id, IDLE)
@@ -47,21 +41,22 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
 
 
 def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:
-    """Why a server of the right type can't be called: it is on a DDS that its bridge does not call, its
+    """Why a server of the right type can't be called: it is on a DDS that its peer does not call, its
     definition is another one, or neither is known yet."""
     graph, key = robot.graph, robot.key(name)
     if robot.nodes_are_read and graph.since(role, key) > graph.nodes_read_at:
         return locked("getting_ready", name=name)
     if vendor := uncallable_dds(graph, role, key):
-        return locked("wrong_rmw", name=name, vendor=vendor)
+        return locked(robot.traits.sentences.uncallable, name=name, vendor=vendor)
     return definition_mismatch(role, name, robot)
 
 
 def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
     """Why a parameter may not be set: its node is not running or has not reported what may be set, or
     a response is awaited."""
+    known = robot.parameters.get(parameter.id, UNKNOWN)
     if mismatch := parameters_offered(parameter.node, robot) or unsettable(
-        parameter, robot.parameters.get(parameter.id, UNKNOWN)
+        parameter, known, robot.traits.sentences.timeout_hint
     ):
         return mismatch
     return locked("busy") if robot.command_status.get(parameter.id, IDLE).busy else None
@@ -80,8 +75,9 @@ def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
     return None
 
 
-def unsettable(parameter: Parameter, known: ParameterState) -> Verdict | None:
-    """Why a parameter can't be set, by what its node says of it."""
+def unsettable(parameter: Parameter, known: ParameterState, timeout_hint: str) -> Verdict | None:
+    """Why a parameter can't be set, by what its node says of it; `timeout_hint` as in
+    `PeerSentences`."""
     code = {
         "waiting": "parameter_waiting",
         "cut": "parameter_waiting",
@@ -92,7 +88,7 @@ def unsettable(parameter: Parameter, known: ParameterState) -> Verdict | None:
     }.get(known.state)
     node, name = parameter.node, parameter.parameter
     if code == "parameter_silent" and known.wall == 0.0:
-        return Verdict(False, code, _silent_parameter(node, name))
+        return Verdict(False, code, _silent_parameter(node, name, timeout_hint))
     if code is not None:
         return locked(code, node=node, name=name, found=known.robot_type, wanted=parameter.type)
     if known.read_only:
@@ -105,5 +101,5 @@ def unsettable(parameter: Parameter, known: ParameterState) -> Verdict | None:
     return None
 
 
-def _silent_parameter(node: str, name: str) -> TextLike:
-    return joined([say("parameter_silent", node=node, name=name), say("cyclone_hint")])
+def _silent_parameter(node: str, name: str, timeout_hint: str) -> TextLike:
+    return joined([say("parameter_silent", node=node, name=name), hint(timeout_hint)])

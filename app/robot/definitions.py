@@ -66,7 +66,7 @@ def is_unhashed(graph: LiveGraph, role: Role, key: str) -> bool:
 
 @cached_until_change
 def uncallable_dds(graph: LiveGraph, role: Role, key: str) -> str:
-    """The DDS of a server that can't be called through its bridge; "" if there is none. Of several
+    """The DDS of a server that can't be called through its peer; "" if there is none. Of several
     servers one is enough: each of them gets the request."""
     vendors = (one.dds for one in graph.node_endpoints(role, key))
     return next((dds for dds in vendors if dds not in CALLABLE), "")

@@ -24,7 +24,7 @@ from app.dialect.endpoint import (
 from app.interfaces.names import Qos
 from app.robot.qos_mismatch import reader_mismatch, writer_mismatch
 
-# The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of the bridge
+# The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of a bridge
 # has one type: that of the endpoint that created it, of the robot or of another panel.
 _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
     # The panel subscribes: the robot's publishers, other panels' subscribers.
@@ -36,7 +36,8 @@ _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A bridge's route for a topic; `has_reader` is False if its DDS reader is missing."""
+    """A peer's route for a topic, as a bridge has them; `has_reader` is False if its DDS reader is
+    missing."""
 
     zid: str
     direction: Direction
@@ -151,7 +152,7 @@ class LiveGraph:
     def update_routes(
         self, routes: Iterable[Route], nodes: Iterable[Endpoint] = (), read_at: float = -math.inf
     ) -> None:
-        """Replaces the bridges' routes, and the endpoints of the nodes behind them, whose types may
+        """Replaces the peers' routes, and the endpoints of the nodes behind them, whose types may
         differ from the route's. `read_at` (monotonic seconds) is when the query of the nodes began."""
         self.cache.clear()
         self.nodes_read_at = read_at
@@ -262,7 +263,7 @@ class LiveGraph:
 
     @cached_until_change
     def is_unrouted(self, key: str) -> bool:
-        """Whether the robot publishes a topic that its bridge does not read for the panel."""
+        """Whether the robot publishes a topic that its peer does not forward to the panel."""
         publishing = {e.zid for e in self._endpoints("MP", key)}
         return any(
             r.direction == "pub" and not r.has_reader and r.zid in publishing

@@ -44,7 +44,7 @@ def updated(values: KeyedValues, paths: Iterable[str], fields: Fields, sample: S
 
 
 def without_source(values: KeyedValues, source: str) -> KeyedValues:
-    """The values that did not come from a bridge."""
+    """The values that did not come from a peer."""
     return {path: one for path, one in values.items() if one.source not in (source, None)}
 
 

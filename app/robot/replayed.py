@@ -1,9 +1,9 @@
 """Messages that may be replayed latched messages of unknown age.
 
-A TRANSIENT_LOCAL publisher keeps its last messages, and DDS sends them to every new reader: when the
-bridge creates its reader, or discovers the publisher, which may take seconds. The bridge stamps them
-with the time of forwarding, as any message, so a replayed message looks like a new one. Only messages
-from the bridge's own cache are known to be replayed.
+A TRANSIENT_LOCAL publisher keeps its last messages, and ROS 2 sends them to every new reader: when a
+bridge creates its reader, or discovers the publisher, which may take seconds. A bridge stamps them with
+the time of forwarding, as any message, so a replayed message looks like a new one. Only messages from a
+peer's own cache are known to be replayed.
 
 So the age of the first message after a new reader or publisher is unknown, whenever it arrives. The
 same holds for all messages within `REPLAY_S` of it, as a publisher may keep several. Later messages of

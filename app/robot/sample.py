@@ -21,8 +21,8 @@ class SkippedPayload(NamedTuple):
 class Sample(NamedTuple):
     """One received message: `at` in monotonic seconds, `wall` in seconds since the epoch.
 
-    `source` is the zid of the bridge that sent it (from its timestamp), None if unknown. `seq` orders
-    samples and losses of bridges as this session received them. `sent` is the timestamp of the sender's
+    `source` is the zid of the peer that sent it (from its timestamp), None if unknown. `seq` orders
+    samples and losses of peers as this session received them. `sent` is the timestamp of the sender's
     clock, in seconds since the epoch. `skipped` is the number of messages just before it that were not
     read; for lossless topics `skipped_payloads` are their payloads, and `overrun` is true if there were
     even more. `cached`: it is from a cache, published at an unknown time.

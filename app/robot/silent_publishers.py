@@ -1,25 +1,22 @@
 """Publishers of an interlock's topic that have appeared and have not published yet.
 
-The first message of a Fast DDS publisher may never reach the bridge, which discovers the publisher up
-to seconds later. So a publisher that appears makes the last value unknown, until a newer one arrives.
+The first message of a publisher may be lost, if it is sent before the peer or the panel has discovered
+the publisher: through a bridge that is up to seconds later. So a publisher that appears makes the last
+value unknown, until a newer one arrives.
 
-The bridge announces a publisher after it has discovered its node. A message that is delivered arrives
-before the token of its publisher: mostly by 5 to 100 ms, sometimes by 3 s (measured, see
+A message that is delivered may arrive before the token of its publisher: a bridge announces a publisher
+after it has discovered its node, mostly 5 to 100 ms later, sometimes 3 s (measured, see
 docs/permissions.md). So the first message since the previous publishers ended counts as that of the new
-one, if it is not older than `TOKEN_DELAY_S`. If it is not older than `TOKEN_DELAY_MOST_S`, it counts as
-soon as the nodes are known, if only one of them publishes the topic. A TRANSIENT_LOCAL publisher loses
-nothing and does not repeat itself: its limit is `TOKEN_DELAY_LATCHED_S`.
+one, if it is not older than `PeerTraits.token_delay_s`. If it is not older than `token_delay_single_s`,
+it counts as soon as the nodes are known, if only one of them publishes the topic. A TRANSIENT_LOCAL
+publisher loses nothing and does not repeat itself: its limit is `token_delay_latched_s`.
 """
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Final
 
 from app.dialect.endpoint import Endpoint
-
-TOKEN_DELAY_S: Final = 0.5  # from a message to the token of its publisher, at most
-TOKEN_DELAY_MOST_S: Final = 4.0  # the same, where no other publisher can have sent it
-TOKEN_DELAY_LATCHED_S: Final = 5.0
+from app.dialect.peer_traits import PeerTraits
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +31,10 @@ class SilentPublishers:
     """The silent publishers of one robot. Sequence numbers order messages and tokens as the session
     received them."""
 
-    def __init__(self, topics: Collection[str]) -> None:
+    def __init__(self, topics: Collection[str], traits: PeerTraits) -> None:
         """`topics` are the keys of the interlocks' topics; all others are ignored."""
         self._topics = frozenset(topics)
+        self._traits = traits
         self._last_messages: dict[tuple[str, str | None], _LastMessage] = {}
         self._last_changes: dict[
             tuple[str, str], int
@@ -63,12 +61,13 @@ class SilentPublishers:
         self._late.discard((key, peer))
         last_change = max(self._last_changes.get((key, peer), 0), lost_before)
         self._last_changes[key, peer] = max(seq, last_change)
-        before_s = TOKEN_DELAY_LATCHED_S if endpoint.transient_local else TOKEN_DELAY_S
+        traits = self._traits
+        delay_s = traits.token_delay_latched_s if endpoint.transient_local else traits.token_delay_s
         for source in (peer, None):
             last = self._last_messages.get((key, source))
-            if last and (last.seq > seq or (last.seq > last_change and at - last.at <= before_s)):
+            if last and (last.seq > seq or (last.seq > last_change and at - last.at <= delay_s)):
                 return
-            if last and last.seq > last_change and at - last.at <= TOKEN_DELAY_MOST_S:
+            if last and last.seq > last_change and at - last.at <= traits.token_delay_single_s:
                 self._late.add((key, peer))
         self._silent[key][peer] = seq
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from app.dialect.dialect import Dialect
 from app.dialect.endpoint import Role
+from app.dialect.peer_traits import PeerTraits
 from app.errors import DecodeError
 from app.i18n import Text, TextLike
 from app.interfaces import Interfaces, has_key
@@ -54,6 +55,7 @@ class RobotState:
         panel: Panel,
         interfaces: Interfaces,
         dialect: Dialect,
+        traits: PeerTraits,
         own_zid: str = "",
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
@@ -62,13 +64,15 @@ class RobotState:
         on_late_reading: Callable[[str, Reading], None] = lambda _key, _reading: None,
         on_entries_decoded: Callable[[str], None] = lambda _key: None,
     ) -> None:
-        """`own_zid` is that of the panel's session. `entry` is this robot's entry if the panel has
-        several robots. `slices` is shared by everything that is decoded on one event loop. `endpoints`
-        are the robot's, as Zenoh names them.
+        """`dialect` and `traits` are those of the peer that the robot is reached by. `own_zid` is that
+        of the panel's session. `entry` is this robot's entry if the panel has several robots. `slices`
+        is shared by everything that is decoded on one event loop. `endpoints` are the robot's, as Zenoh
+        names them.
 
         `on_late_reading` is called with (key, reading) of a message that took more than one turn to
         decode, `on_entries_decoded` with the key of a topic of which the entries in tables changed."""
         self.dialect = dialect
+        self.traits = traits
         self.title: TextLike = entry.name if entry else ""
         self.name = str(self.title)  # for the server's log
         self.namespace = entry.namespace if entry else panel.namespace
@@ -86,7 +90,7 @@ class RobotState:
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
-        self.silent_publishers = SilentPublishers(self._interlock_keys)
+        self.silent_publishers = SilentPublishers(self._interlock_keys, traits)
         self.topic_publishers = TopicPublishers()
         self.replayed = ReplayedMessages()
         self._adaptive_keys = frozenset(map(self.key, panel.adaptive_topics))
@@ -143,17 +147,17 @@ class RobotState:
         return key
 
     def possible_keys(self, topic: str) -> tuple[str, ...]:
-        """All keys that `key` may return for a topic: several of a shared one, as the bridge has it."""
+        """All keys that `key` may return for a topic: several of a shared one, as its peer has it."""
         return self._shared.get(topic) or (self.key(topic),)
 
     def update_shared_topics(self) -> None:
-        """Finds out under which keys the bridges have the shared topics. Call it after a change of the
+        """Finds out under which keys the peers have the shared topics. Call it after a change of the
         graph."""
         for topic, keys in self._shared.items():
             self._keys[topic] = present_key(self.graph, topic, keys)
 
     def adapts_reliability(self, key: str) -> bool:
-        """Whether a topic is read as its publisher offers it, best effort too. Not while the bridge
+        """Whether a topic is read as its publisher offers it, best effort too. Not while the peer
         reads it as reliable for an earlier publisher."""
         return key in self._adaptive_keys and key not in self.reliable_readers
 
@@ -235,7 +239,7 @@ class RobotState:
         self.link_up = False
         self.settled_at = math.inf
         self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
-        self.silent_publishers = SilentPublishers(self._interlock_keys)
+        self.silent_publishers = SilentPublishers(self._interlock_keys, self.traits)
         self.topic_publishers = TopicPublishers()
         self.replayed.begin_all()
         self.presence.clear()

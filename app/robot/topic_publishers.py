@@ -1,4 +1,4 @@
-"""The publishers of the interlocks' topics, as the bridges know them from DDS.
+"""The publishers of the interlocks' topics, as their peers know them.
 
 A bridge announces a topic once, however many nodes publish it, and its messages do not say whose they
 are. Only its admin space has each publisher.
@@ -14,9 +14,9 @@ MAX_NAMES: Final = 4
 
 
 class Publisher(NamedTuple):
-    """A DDS writer behind a bridge, with the nodes that it may belong to."""
+    """A publisher behind a peer (a bridge's DDS writer), with the nodes that it may belong to."""
 
-    bridge: str
+    peer: str
     guid: str
     nodes: tuple[str, ...] = ()
 
@@ -50,10 +50,10 @@ class TopicPublishers:
         return before != self._known[key]
 
     def of_topic(self, key: str, graph: LiveGraph) -> Publishers:
-        """The publishers behind the present bridges. Two bridges of one domain know the same ones; a
-        bridge that knows no DDS has those that it announces."""
-        known = [one for one in self._known.get(key, ()) if one.bridge in graph.peers]
+        """The publishers behind the present peers. Two bridges of one domain know the same ones; a
+        peer that does not know them has those that it announces."""
+        known = [one for one in self._known.get(key, ()) if one.peer in graph.peers]
         nodes = {one.guid: one.nodes for one in sorted(known)}
-        others = graph.peers_with("MP", key) - {one.bridge for one in known}
+        others = graph.peers_with("MP", key) - {one.peer for one in known}
         names = sorted(name for several in nodes.values() for name in several)
         return Publishers(len(nodes) + len(others), tuple(names))

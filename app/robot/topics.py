@@ -129,7 +129,7 @@ class Topic:
             self._values = NO_VALUES
 
     def forget_source(self, source: str) -> None:
-        """A bridge was lost: values of fields with keys that came from it are no longer valid."""
+        """A peer was lost: values of fields with keys that came from it are no longer valid."""
         if self._values:
             self._values = without_source(self._values, source)
             self._last_reading = replace(self._last_reading, keyed=self._values)

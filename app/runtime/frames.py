@@ -1,6 +1,6 @@
 """The newest frame of each camera's topic, while a browser shows it.
 
-A camera's topic is subscribed to only while a browser shows it. The bridge reads a topic only for
+A camera's topic is subscribed to only while a browser shows it. A peer sends a topic only to
 subscribers, so a camera that no browser shows needs no bandwidth. On the link's thread a message
 replaces the last one undecoded; the event loop is woken only if a browser waits for the next frame.
 """

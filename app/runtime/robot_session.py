@@ -163,7 +163,8 @@ class RobotSession:
         """`link_verdict` after a query of its peer, which takes at most a second."""
         if not self.link_verdict.permitted or await self.peer.answers():
             return self.link_verdict
-        return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict
+        verdict, silent = self.link_verdict, self.robot.traits.sentences.silent
+        return locked(silent) if verdict.permitted else verdict
 
     def read_again(self, widget_id: str) -> TextLike:
         """Queries the node of a parameter; returns why it can't be queried, else "". NotFound for other
@@ -172,7 +173,7 @@ class RobotSession:
 
     def reopen(self) -> None:
         """Replaces a working Zenoh session. The old one still sends the stop messages of holds."""
-        self.holds.end_all("hold_by_renewal")
+        self.holds.end_all(self.robot.traits.sentences.renewal)
         self.renew()
 
     def renew(self) -> None:

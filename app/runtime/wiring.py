@@ -126,6 +126,7 @@ def _context(
         panel,
         interfaces,
         access.dialect,
+        access.traits,
         link.zid,
         entry,
         server.slices,

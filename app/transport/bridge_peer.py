@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from app.dialect.bridge_dialect import BridgeDialect
+from app.dialect.peer_traits import BRIDGE_TRAITS
 from app.ros_logging import RobotLog
 from app.transport.bridge_join import GraphMembership
 from app.transport.bridge_liveness import BridgeLiveness
@@ -53,4 +54,4 @@ class BridgePeer:
         return await self._readiness.answers()
 
 
-BRIDGE: Final = RobotAccess(BridgeDialect(), BridgePeer)
+BRIDGE: Final = RobotAccess(BridgeDialect(), BRIDGE_TRAITS, BridgePeer)

@@ -58,7 +58,7 @@ class PublisherWatch:
             self._robot.topic_publishers.update(key, publishers)
             for key, publishers in zip(self._keys, found, strict=True)
         ]
-        known = {(one.bridge, one.guid) for publishers in found for one in publishers}
+        known = {(one.peer, one.guid) for publishers in found for one in publishers}
         self._nodes = {at: n for at, n in self._nodes.items() if (at[0].zid, at[0].guid) in known}
         return any(changed)
 

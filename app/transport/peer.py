@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.dialect.dialect import Dialect
+from app.dialect.peer_traits import PeerTraits
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.robot.state import RobotState
@@ -60,4 +61,5 @@ class RobotAccess:
     """How a kind of robot is reached."""
 
     dialect: Dialect
+    traits: PeerTraits
     peer: Callable[[RobotContext], Peer]

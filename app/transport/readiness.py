@@ -1,4 +1,4 @@
-"""Whether a robot's bridges answer a query now. Requests at the same time share one query."""
+"""Whether a robot's peers answer a query now. Requests at the same time share one query."""
 
 import asyncio
 import logging
@@ -11,7 +11,7 @@ from app.errors import LinkError
 log = logging.getLogger("kiosk.readiness")
 
 EVERY_S: Final = 0.5  # from one query to the next
-WITHIN_S: Final = 0.8  # in which a bridge has to answer
+WITHIN_S: Final = 0.8  # in which a peer has to answer
 LIMIT_S: Final = 1.0  # of a query, even if Zenoh itself does not return
 
 
@@ -19,7 +19,7 @@ class CoalescedQuery:
     """One query at a time. Its result is shared by all calls until the next query is due."""
 
     def __init__(self, ask: Callable[[], Awaitable[bool]]) -> None:
-        """`ask` returns whether all bridges answered; it may raise LinkError."""
+        """`ask` returns whether all peers answered; it may raise LinkError."""
         self._ask = ask
         self._sent_at = -math.inf
         self._asking: asyncio.Task[bool] | None = None

@@ -5,7 +5,7 @@ from typing import Any, Final, Protocol
 import zenoh
 from zenoh.ext import CacheConfig, MissDetectionConfig, declare_advanced_publisher
 
-# BLOCK and RELIABLE: what is put reaches the bridge, or the link is cut. REMOTE: not this session's own
+# BLOCK and RELIABLE: what is put reaches the peer, or the link is cut. REMOTE: not this session's own
 # subscribers.
 SETTINGS: Final[dict[str, Any]] = {
     "congestion_control": zenoh.CongestionControl.BLOCK,

@@ -14,7 +14,8 @@ def camera(widget: Camera, robot: RobotState, now: float) -> tuple[dict[str, Any
     """Attributes: `state` and `note`; and when they change. Unknown while no browser shows it."""
     received = robot.camera_topics.get(robot.key(widget.topic))
     mismatch = topic_mismatch("MS", widget, robot)
-    if mismatch and mismatch.code != "unheard":  # its bridge reads it while a browser shows it
+    unrouted = robot.traits.sentences.unrouted  # the peer forwards it while a browser shows it
+    if mismatch and mismatch.code != unrouted:
         return {"state": "unreadable", "note": mismatch.reason or ""}, math.inf
     if received is None or received.at == -math.inf:
         return {"state": "waiting", "note": say("camera_waiting", topic=widget.topic)}, math.inf

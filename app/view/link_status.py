@@ -1,16 +1,17 @@
 """The three links between browser and robot, each with what it locks: pure, from (panel, robot, time).
 
-Browser to server, server to bridge, bridge to the robot's nodes. The code of a verdict decides to which
-link it belongs.
+Browser to server, server to the peer that the robot is reached by, peer to the robot's nodes. The code
+of a verdict decides to which link it belongs. In the view the peer's link has the key "bridge".
 """
 
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, Literal, TypedDict
 
 from app.clock import format_datetime
+from app.dialect.peer_traits import EVERY_SENTENCES, PeerSentences
 from app.i18n import Text, TextLike, joined, number, say
 from app.i18n.values import longest
 from app.interfaces import has_key
@@ -23,9 +24,9 @@ from app.view.definition_notes import definition_notes
 
 State = Literal["ok", "wait", "bad"]
 
-BRIDGE: Final = LINK_CODES | {"unheard"}
+PEER: Final = LINK_CODES | {sentences.unrouted for sentences in EVERY_SENTENCES}
 GONE: Final = frozenset({"no_publisher", "no_service", "no_parameters"})
-NODE: Final = GONE | {
+NODE: Final = GONE.union(sentences.uncallable for sentences in EVERY_SENTENCES) | {
     "waiting",
     "cut",
     "stale",
@@ -38,7 +39,6 @@ NODE: Final = GONE | {
     "not_a_number",
     "several",
     "wrong_type",
-    "wrong_rmw",
     "definition_differs",
     "publishes_best_effort",
     "publishes_volatile",
@@ -48,15 +48,6 @@ NODE: Final = GONE | {
     "parameter_waiting",
     "parameter_silent",
     "parameter_unreadable",
-}
-BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
-    "no_link": ("bad", "lost"),
-    "no_bridge": ("bad", "absent"),
-    "no_bridge_of": ("bad", "absent"),
-    "bridge_silent": ("bad", "silent"),
-    "joining": ("wait", "pending"),
-    "catching_up": ("wait", "pausing"),
-    "permitted": ("ok", "ok"),
 }
 
 LONGEST_LIST: Final = 120  # characters of labels that are listed; the rest is counted
@@ -79,6 +70,20 @@ class LinkStatus(Lamp):
     reason: TextLike
 
 
+@cache
+def _peer_lamps(sentences: PeerSentences) -> Mapping[str, tuple[State, str]]:
+    """State and text of the lamp of the peer's link, by the code of the link's verdict."""
+    return {
+        sentences.unreachable: ("bad", "lost"),
+        sentences.absent: ("bad", "absent"),
+        sentences.absent_named: ("bad", "absent"),
+        sentences.silent: ("bad", "silent"),
+        "joining": ("wait", "pending"),
+        "catching_up": ("wait", "pausing"),
+        "permitted": ("ok", "ok"),
+    }
+
+
 def link_statuses(
     panel: Panel, robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], now: float
 ) -> tuple[dict[str, LinkStatus], float]:
@@ -86,21 +91,22 @@ def link_statuses(
     all commands, by their ids. The server's link is always "ok": the browser overrides it when the
     server is lost."""
     verdicts = {name: verdict for name, verdict in verdicts.items() if not verdict.permitted}
-    state, text = BRIDGE_LAMPS[passable.code]
+    sentences = robot.traits.sentences
+    state, text = _peer_lamps(sentences)[passable.code]
     silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
-    bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""
+    peer_reason = passable.reason or _first(verdicts, PEER).reason or ""
     node_state, node_text, node_reason = _node(robot, passable, verdicts, silence)
     node_reason = joined([node_reason, definition_notes(robot)], "between_lines")
     links = {
         "server": _link("server", "ok", "ok", ""),
-        "bridge": _link("bridge", state, text, bridge_reason, *labels(panel, verdicts, BRIDGE)),
+        "bridge": _link(sentences.lamp, state, text, peer_reason, *labels(panel, verdicts, PEER)),
         "node": _link("robot", node_state, node_text, node_reason, *labels(panel, verdicts, NODE)),
     }
     return links, until
 
 
 def summary(name: TextLike, link: Mapping[str, Lamp]) -> Lamp:
-    """One lamp for a robot: the bridge's link if it is not ok, else that of its nodes."""
+    """One lamp for a robot: the peer's link if it is not ok, else that of its nodes."""
     shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
     return Lamp(name=name, state=shown["state"], text=shown["text"])
 
@@ -116,17 +122,18 @@ def _link(name: str, state: State, text: str, reason: TextLike, *locked: TextLik
 def _node(
     robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], silence: TextLike
 ) -> tuple[State, str, TextLike]:
-    """State, text and reason of the link from the bridge to the robot's nodes."""
-    if BRIDGE_LAMPS[passable.code][0] == "bad":
-        return "bad", "lost", say("node_unknown")
+    """State, text and reason of the link from the peer to the robot's nodes."""
+    sentences = robot.traits.sentences
+    if _peer_lamps(sentences)[passable.code][0] == "bad":
+        return "bad", "lost", say(sentences.nodes_unknown)
     if silence:
         return "bad", "node_silent", silence
     gone = robot.presence.missing(robot.graph)
     if not robot.presence.any_present(robot.graph):
-        absent = say("node_absent") if passable.permitted else ""
-        return "wait", "no_node", _gone(gone) if gone else absent
+        absent = say(sentences.nodes_absent) if passable.permitted else ""
+        return "wait", "no_node", _gone(sentences, gone) if gone else absent
     if gone and _first(verdicts, GONE).reason:
-        return "ok", "ok", _gone(gone)
+        return "ok", "ok", _gone(sentences, gone)
     return "ok", "ok", _first(verdicts, NODE).reason or ""
 
 
@@ -187,10 +194,10 @@ def _all(verdict: Verdict) -> tuple[Verdict, ...]:
     return (verdict, *verdict.others)
 
 
-def _gone(names: Sequence[str]) -> Text:
+def _gone(sentences: PeerSentences, names: Sequence[str]) -> Text:
     more = len(names) - 1
     name = say("and_count", name=names[0], number=more) if more else names[0]
-    return say("node_gone", name=name)
+    return say(sentences.node_lost, name=name)
 
 
 BROWSERS_OWN = "server"  # each browser measures for itself how long it has been connected

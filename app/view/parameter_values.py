@@ -32,7 +32,6 @@ LOOKS: Final = {
     "unreadable": "unreadable",
 }
 LONGEST_HINT: Final = 200
-NEVER_ASKED: Final = frozenset({"wrong_rmw", "definition_differs"})  # why a node is never queried
 ANY_STEP: Final = {False: "any", True: "1"}
 
 
@@ -106,7 +105,8 @@ def never_received(known: ParameterState) -> bool:
 def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> TextLike:
     time = format_time(known.wall)
     mismatch = parameters_offered(parameter.node, robot)
-    if mismatch is not None and mismatch.code in NEVER_ASKED:
+    never_queried = (robot.traits.sentences.uncallable, "definition_differs")
+    if mismatch is not None and mismatch.code in never_queried:
         return mismatch.reason or ""
     if never_received(known):
         silent = known.state == "silent" and parameter.id not in robot.querying

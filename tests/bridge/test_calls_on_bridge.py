@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from app.commands.service_calls import MAX_UNANSWERED
+from app.dialect.peer_traits import BRIDGE_TRAITS
 from tests.support.browser.pages import widget
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
 from tests.support.panel_text import ADD
@@ -216,7 +216,7 @@ def test_calls_that_wait_hold_up_no_press(
     tmp_path: Path,
     servers: Callable[[Server], Server],
 ) -> None:
-    names = [f"wait_{n}" for n in range(3 * (MAX_UNANSWERED + 1))]
+    names = [f"wait_{n}" for n in range(3 * (BRIDGE_TRAITS.max_unanswered + 1))]
     panel = PANEL + "".join(waiting_widget(*one) for one in enumerate(names))
     kiosk = servers(live_server(cyclone_bridge, tmp_path, panel))
     robot.subscribe(topic="/said", type="std_msgs/msg/String")
@@ -234,8 +234,8 @@ def test_calls_that_wait_hold_up_no_press(
         beside = median(heard_after_s(kiosk, robot, f"beside {n}") for n in range(20))
         assert sum(call.done() for call in calls) == 3, "the others wait all the while"
         outcomes = Counter(call.result().json()["outcome"] for call in calls)
-    assert outcomes == {"timed_out": 3 * MAX_UNANSWERED, "refused": 3}
-    assert len(robot.requests("/slow")) == MAX_UNANSWERED
+    assert outcomes == {"timed_out": 3 * BRIDGE_TRAITS.max_unanswered, "refused": 3}
+    assert len(robot.requests("/slow")) == BRIDGE_TRAITS.max_unanswered
     assert beside < 3 * alone + 0.02, f"{beside * 1000:.1f} ms instead of {alone * 1000:.1f} ms"
 
 

@@ -3,12 +3,13 @@
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from app.commands.actions.goals import GoalTracker
-from app.commands.service_calls import LATE_S, MAX_UNANSWERED, MAX_VALUE_CHARS, ServiceCalls
+from app.commands.service_calls import LATE_S, MAX_VALUE_CHARS, ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.i18n import say
@@ -17,7 +18,7 @@ from app.panel.widgets.service_action import Action, Call
 from app.permission.servers import call_blocked
 from app.robot.command_status import CommandStatus, Outcome
 from app.robot.state import RobotState, Sample
-from tests.support.builders import BRIDGE, INTERFACES, FakeTransport, panel_of, robot_there
+from tests.support.builders import BRIDGE, INTERFACES, TRAITS, FakeTransport, panel_of, robot_there
 from tests.support.words import coded
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -178,11 +179,11 @@ def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
 
 def test_calls_without_an_answer_are_bounded_and_forgotten() -> None:
     async def test(bench: Bench) -> None:
-        for number in range(MAX_UNANSWERED):
+        for number in range(TRAITS.max_unanswered):
             assert (await bench.call(f"p{number}")).outcome == "timed_out"
         one_more = await bench.call("too many")
         assert one_more.outcome == "refused"
-        assert len(bench.line.queries) == MAX_UNANSWERED
+        assert len(bench.line.queries) == TRAITS.max_unanswered
         for _, _, future in bench.line.queries:
             future.set_result(None)
         await asyncio.sleep(0)
@@ -548,18 +549,15 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
     run(test)
 
 
-def test_a_goal_without_any_news_is_queried_only_for_a_while(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("app.commands.actions.client.BRIDGE_LOSS_DELAY_S", 0)
-
+def test_a_goal_without_any_news_is_queried_only_for_a_while() -> None:
     async def test(bench: Bench) -> None:
-        for number in range(MAX_UNANSWERED):
+        bench.robot.traits = replace(TRAITS, loss_delay_s=0.0)
+        for number in range(TRAITS.max_unanswered):
             assert (await bench.send_goal()).outcome == "timed_out"
             await queried(bench, 2 * (number + 1))
         assert bench.line.timeouts[1] == LATE_S
         assert (await bench.send_goal()).outcome == "refused"
-        assert len(bench.line.queries) == 2 * MAX_UNANSWERED
+        assert len(bench.line.queries) == 2 * TRAITS.max_unanswered
         for _, _, future in bench.line.queries:
             if not future.done():
                 future.set_result(None)

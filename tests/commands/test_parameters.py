@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -22,7 +23,16 @@ from app.robot.command_status import Outcome
 from app.robot.parameter_state import UNKNOWN, ParameterState, allowed_range, encode_value, limits_text
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
-from tests.support.builders import BRIDGE, INTERFACES, NOW, FakeTransport, Table, panel_of, robot_there
+from tests.support.builders import (
+    BRIDGE,
+    INTERFACES,
+    NOW,
+    TRAITS,
+    FakeTransport,
+    Table,
+    panel_of,
+    robot_there,
+)
 from tests.support.words import coded, english
 
 SPEED: Table = {
@@ -48,6 +58,10 @@ def descriptor(name: str, kind: int, **more: Any) -> dict[str, Any]:
     return {**empty, "name": name, "type": kind, **more}
 
 
+# A node is queried at once; the confirming query is far away.
+AT_ONCE = replace(TRAITS, server_settle_s=0.0, events_settle_s=60.0)
+
+
 class Line(FakeTransport):
     """A link whose queries are answered by hand."""
 
@@ -70,6 +84,7 @@ class Bench:
     def __init__(self, *widgets: Table) -> None:
         self.panel: Panel = panel_of(*(widgets or (SPEED,)))
         self.robot = robot_there(self.panel)
+        self.robot.traits = AT_ONCE
         self.line = Line()
         calls = ServiceCalls(INTERFACES, self.robot, self.line, lambda: None)
         self.parameters = ParameterSync(
@@ -151,10 +166,8 @@ def change(given: float) -> list[dict[str, Any]]:
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pauses of a test's length; the confirming reading far away."""
+    """Pauses of a test's length."""
     monkeypatch.setattr(sync, "AGAIN_S", 0.01)
-    monkeypatch.setattr(sync, "CONFIRM_S", 60.0)
-    monkeypatch.setattr(sync, "SETTLE_S", 0.0)
 
 
 def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
@@ -174,12 +187,9 @@ def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
     run(test)
 
 
-def test_a_node_that_appeared_is_read_once_more_when_its_events_flow(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(sync, "CONFIRM_S", 0.02)
-
+def test_a_node_that_appeared_is_read_once_more_when_its_events_flow() -> None:
     async def test(bench: Bench) -> None:
+        bench.robot.traits = replace(AT_ONCE, events_settle_s=0.02)
         bench.offer()
         await bench.tell(1, 0.5)
         await bench.tell(3, 0.6)

@@ -16,13 +16,13 @@ from app.audit.store import Store
 from app.commands.actions.goal import goal_id
 from app.commands.actions.recovery import LOOK_BACK_S, GoalRecovery
 from app.commands.actions.results import RESULT_S
-from app.commands.service_calls import LATE_S, MAX_UNANSWERED
+from app.commands.service_calls import LATE_S
 from app.dialect import bridge_dialect
 from app.errors import LogError
 from app.permission.servers import call_blocked
 from app.robot.command_status import IDLE
 from tests.commands.test_calls_and_goals import COUNT, Bench, queried, sample_of, tell_states
-from tests.support.builders import BRIDGE, INTERFACES
+from tests.support.builders import BRIDGE, INTERFACES, TRAITS
 from tests.support.words import english
 
 FROM = Origin(address="10.0.0.7")
@@ -322,12 +322,12 @@ def test_a_press_id_that_was_used_twice_is_of_two_goals(
 
 def test_no_more_are_asked_for_than_may_be_sent_and_the_newest_is_shown(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
-        for number in range(MAX_UNANSWERED + 1):
+        for number in range(TRAITS.max_unanswered + 1):
             await pressed(rig.log, f"n{number}", "timed_out")
-        await rig.started(questions=MAX_UNANSWERED)
-        assert rig.bench.shown.press == f"n{MAX_UNANSWERED}"
+        await rig.started(questions=TRAITS.max_unanswered)
+        assert rig.bench.shown.press == f"n{TRAITS.max_unanswered}"
         await asyncio.sleep(0.02)
-        assert len(rig.bench.line.queries) == MAX_UNANSWERED
+        assert len(rig.bench.line.queries) == TRAITS.max_unanswered
 
     run(tmp_path, test, "accepted")
 

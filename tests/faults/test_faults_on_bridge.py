@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.robot.silent_publishers import TOKEN_DELAY_S
+from app.dialect.peer_traits import BRIDGE_TRAITS
 from tests.support.cyclone import Client
 from tests.support.parts import ROOT, Bridge, RosNode, Server, Stream, live, publish_until, until
 
@@ -214,7 +214,7 @@ def test_a_successor_of_a_required_publisher_has_to_say_it_again(
     until(lambda: "waiting for /operation" in kiosk.widget("operation1")["reason"], "its token is seen")
     until(lambda: own_node.subscribers("/operation_enabled"), "the bridge listens")
     until(lambda: (own_node.publish("/operation_enabled", {"data": True}), permitted(kiosk))[1], "open")
-    time.sleep(TOKEN_DELAY_S)  # no message is under way any more
+    time.sleep(BRIDGE_TRAITS.token_delay_s)  # no message is under way any more
     own_node.withdraw("/operation_enabled")
     until(lambda: not permitted(kiosk), "locked")
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")

@@ -32,6 +32,7 @@ from tests.support.builders import (
     MESSAGE,
     NOW,
     TEXT,
+    TRAITS,
     FakeTransport,
     endpoint,
     panel_of,
@@ -141,7 +142,7 @@ class Panels(RuleBasedStateMachine):
         self.loop = SetLoop()
         self.way = Way()
         self.grounds = ServerConditions(strict)
-        self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
+        self.robot = RobotState(self.panel, INTERFACES, DIALECT, TRAITS, KIOSK)
         self.key = self.robot.key(ENABLED)
         self.calls = ServiceCalls(INTERFACES, self.robot, self.way, lambda: None)
         self.presses = presses_of(

@@ -13,7 +13,6 @@ from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import judged
-from app.permission.servers import SERVER_SETTLE_S
 from app.permission.verdict import Verdict, locked
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
@@ -249,9 +248,9 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     assert judged(call, (), robot, NOW).code == "no_service"
     robot.graph.apply_token(token, True, NOW)
     verdict = judged(call, (), robot, NOW)
-    ready_at = NOW + SERVER_SETTLE_S
+    ready_at = NOW + robot.traits.server_settle_s
     assert verdict == Verdict(False, "getting_ready", say("getting_ready", name="/reset"), ready_at)
-    assert judged(call, (), robot, NOW + SERVER_SETTLE_S).permitted
+    assert judged(call, (), robot, NOW + robot.traits.server_settle_s).permitted
     robot.graph.apply_token(token, False)
     robot.graph.apply_token(token, True, NOW + 9)  # another node of this name
     assert judged(call, (), robot, NOW + 9).code == "getting_ready"

@@ -24,7 +24,7 @@ from app.recording.directory import RecordingDirectory, recording_name
 from app.recording.mcap_file import PRESS_TOPIC, UNFINISHED, Channel, McapFile
 from app.recording.ring_buffer import COPY_BELOW_BYTES, OVERHEAD_BYTES, RingBuffer, to_buffered
 from app.robot.state import RobotState, Sample
-from tests.support.builders import DIALECT, HEARD, INTERFACES, KIOSK, TEXT, panel_of
+from tests.support.builders import DIALECT, HEARD, INTERFACES, KIOSK, TEXT, TRAITS, panel_of
 from tests.support.parts import ROOT
 
 CHANNEL = Channel("/heard", TEXT, "string data\n")
@@ -216,7 +216,7 @@ class Cell:
         self.rules = RecordRules(**{"before_s": 5.0, "after_s": 0.2, "max_mb": 16.0, **rules})
         self.panel = panel_of(HEARD)
         self.recordings = Recordings(folder, self.rules.max_mb, 1)
-        robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
+        robot = RobotState(self.panel, INTERFACES, DIALECT, TRAITS, KIOSK)
         self.recorder = Recorder(self.panel, self.rules, INTERFACES, robot, "", self.recordings)
         self.notified = 0
         self.recordings.add_listener(self._count)

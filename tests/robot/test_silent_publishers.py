@@ -16,12 +16,7 @@ from app.permission.interlocks import interlock_verdict
 from app.permission.verdict import Verdict
 from app.robot.sample import Sample
 from app.robot.sample_handlers import SampleHandlers
-from app.robot.silent_publishers import (
-    TOKEN_DELAY_LATCHED_S,
-    TOKEN_DELAY_MOST_S,
-    TOKEN_DELAY_S,
-    SilentPublishers,
-)
+from app.robot.silent_publishers import SilentPublishers
 from app.robot.state import RobotState
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Inbox
@@ -31,6 +26,7 @@ from tests.support.builders import (
     ENABLED,
     INTERFACES,
     KIOSK,
+    TRAITS,
     FakeTransport,
     robot_there,
     small_panel,
@@ -39,13 +35,14 @@ from tests.support.words import english
 
 KEY = ENABLED[1:]
 OTHER = "b2"
+DELAY_S, SINGLE_S = TRAITS.token_delay_s, TRAITS.token_delay_single_s
 TRUE, FALSE = b"\0\1\0\0\1", b"\0\1\0\0\0"
 PUBLISHER = Endpoint(BRIDGE, "MP", KEY, BOOL)
 
 
 @pytest.fixture
 def known() -> SilentPublishers:
-    return SilentPublishers([KEY])
+    return SilentPublishers([KEY], TRAITS)
 
 
 def silent(known: SilentPublishers, *bridges: str) -> bool:
@@ -71,10 +68,10 @@ def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -
     ("latched", "before_s", "is_silent"),
     [
         (False, 0.0, False),
-        (False, TOKEN_DELAY_S, False),
-        (False, TOKEN_DELAY_S + 0.1, True),
-        (True, TOKEN_DELAY_S + 0.1, False),  # it loses nothing, and says nothing twice
-        (True, TOKEN_DELAY_LATCHED_S + 0.1, True),
+        (False, DELAY_S, False),
+        (False, DELAY_S + 0.1, True),
+        (True, DELAY_S + 0.1, False),  # it loses nothing, and says nothing twice
+        (True, TRAITS.token_delay_latched_s + 0.1, True),
     ],
 )
 def test_a_message_just_before_its_publisher_appears_is_its_own(
@@ -261,7 +258,7 @@ def test_the_panels_own_publisher_is_none_of_the_robots(incoming: Incoming) -> N
     assert incoming.verdict.permitted
 
 
-WINDOW = [(TOKEN_DELAY_S + 0.1, False), (TOKEN_DELAY_MOST_S, False), (TOKEN_DELAY_MOST_S + 0.1, True)]
+WINDOW = [(DELAY_S + 0.1, False), (SINGLE_S, False), (SINGLE_S + 0.1, True)]
 
 
 @pytest.mark.parametrize(("before_s", "is_silent"), WINDOW)

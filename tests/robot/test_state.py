@@ -20,6 +20,7 @@ from tests.support.builders import (
     KIOSK,
     NOW,
     TEXT,
+    TRAITS,
     panel_of,
     robot_there,
     says,
@@ -141,7 +142,7 @@ def robot_of_several(namespace: str) -> RobotState:
     """A robot with a namespace, whose panel has a topic of the cell, which has its own bridge."""
     panel = panel_of({**HEARD, "topic": "//cell/heard"}, LOG)
     entry = RobotEntry(id="r1", name="Robot 1", namespace=namespace)
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, entry)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, entry)
     for zid, of in ((BRIDGE, namespace), (OTHER, "/cell")):
         robot.graph.apply_token(bridge_token(zid), True)
         robot.graph.update_namespaces({zid: of})
@@ -213,7 +214,7 @@ def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
 ) -> None:
     panel = small_panel()
     entry = RobotEntry(id="r1", name="Robot 1", namespace="/r1")
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, entry)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, entry)
     robot.update("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.reading("/heard")
     (record,) = caplog.records

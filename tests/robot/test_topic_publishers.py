@@ -28,7 +28,7 @@ def test_each_writer_is_counted_once_and_a_bridge_without_dds_by_its_token() -> 
     assert not known.update(KEY, [DOOR])
     assert known.of_topic(KEY, graph) == Publishers(1, ("/door",))
     graph.apply_token("@/b2/@ros2_lv", True)
-    known.update(KEY, [DOOR, DOOR._replace(bridge="b2"), ARM])
+    known.update(KEY, [DOOR, DOOR._replace(peer="b2"), ARM])
     assert known.of_topic(KEY, graph) == Publishers(2, ("/arm", "/door"))
     endpoint(robot, "MP", ENABLED, BOOL, "b3")
     graph.apply_token("@/b3/@ros2_lv", True)

@@ -25,6 +25,7 @@ from tests.support.builders import (
     KIOSK,
     MESSAGE,
     NOW,
+    TRAITS,
     Table,
     panel_of,
 )
@@ -63,7 +64,7 @@ class Cell:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
         slices, later = Slices(Clock()), self._read_later
         self.robot = RobotState(
-            self.panel, INTERFACES, DIALECT, KIOSK, None, slices, on_late_reading=later
+            self.panel, INTERFACES, DIALECT, TRAITS, KIOSK, None, slices, on_late_reading=later
         )
         self.robot.link_up, self.robot.settled_at = True, 0.0
         self.robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", True)
@@ -269,7 +270,7 @@ def test_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
     large = KINDS[kind](MEGABYTES)
     assert len(large.data) > 0.99 * MEGABYTES
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK)
     robot.update("heard", Sample(large.data, 1, NOW, NOW, None))
 
     def is_read() -> bool:
@@ -285,7 +286,7 @@ def test_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
 def test_megabytes_of_garbage_hold_up_nothing() -> None:
     large = garbage(MEGABYTES)
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK)
     robot.update("heard", Sample(large.data, 1, NOW, NOW, None))
 
     async def test() -> None:

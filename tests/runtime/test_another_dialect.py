@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
 
@@ -13,6 +14,8 @@ from zenoh.handlers import Callback
 from app.audit import NullLog
 from app.dialect.dialect import DialectName
 from app.dialect.endpoint import Endpoint, OwnEndpoint, Role
+from app.dialect.peer_traits import BRIDGE_TRAITS, PEER_TRAITS
+from app.i18n import say
 from app.interfaces.names import Qos
 from app.runtime.fleet import Fleet
 from app.runtime.robot_access import ROBOT_ACCESS
@@ -23,6 +26,10 @@ from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFAC
 TRIGGER = "std_srvs/srv/Trigger"
 CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
 PANEL = panel_of(MESSAGE, {**GUARDED, "id": "go", "topic": "/go"}, HEARD, CALL)
+TINY_TRAITS = replace(
+    BRIDGE_TRAITS,
+    sentences=replace(BRIDGE_TRAITS.sentences, lamp="robot", absent="no_service"),
+)
 ROLES: dict[str, Role] = {"MP": "MP", "MS": "MS", "SS": "SS"}
 
 
@@ -148,7 +155,8 @@ class TinyRobot:
 
 
 def test_each_dialect_that_a_panel_may_have_is_reached() -> None:
-    assert set(ROBOT_ACCESS) == set(get_args(DialectName))
+    assert set(ROBOT_ACCESS) == set(PEER_TRAITS) == set(get_args(DialectName))
+    assert all(access.traits is PEER_TRAITS[name] for name, access in ROBOT_ACCESS.items())
 
 
 async def when(condition: Callable[[], object]) -> None:
@@ -163,14 +171,16 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
     """Seen, joined, heard, commanded and called, with not one of the bridge's key expressions."""
     endpoint, there = peer
     robot = TinyRobot(there)
-    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, RobotAccess(TinyDialect(), TinyPeer))
+    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, RobotAccess(TinyDialect(), TINY_TRAITS, TinyPeer))
 
     async def scene() -> None:
         fleet = Fleet(PANEL, lambda _: config_to(endpoint), "r1", NullLog())
         one = fleet.first
         await one.start()
         await when(lambda: one.robot.link_up)
-        assert one.link_verdict.code == "no_bridge"
+        assert one.link_verdict.code == "no_service"  # by the sentences of this kind of peer
+        assert one.publisher.view["link"]["bridge"]["name"] == say("robot")
+        assert one.publisher.view["link"]["bridge"]["text"] == say("absent")
         robot.appear()
         await when(lambda: one.link_verdict.permitted)
         assert isinstance(one.peer, TinyPeer)
@@ -202,7 +212,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
         assert one.peer.said == [f"found {robot.zid}"]
         assert shown.view["widgets"]["reset"]["enabled"]
         robot.nodes_alive.pop().undeclare()
-        await when(lambda: one.link_verdict.code == "no_bridge")
+        await when(lambda: one.link_verdict.code == "no_service")
         assert one.peer.said == [f"found {robot.zid}", f"lost {robot.zid}"]
         await one.stop()
 

@@ -36,7 +36,7 @@ from tests.support.builders import (
 SAMPLES = 5_000
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.5}
 PANEL = panel_of(SPEED, JOG, ARM, MESSAGE, {**FREE, "confirm": CONFIRM}, HEARD)
-ACCESS = RobotAccess(BRIDGES.dialect, TinyPeer)
+ACCESS = RobotAccess(BRIDGES.dialect, BRIDGES.traits, TinyPeer)
 
 
 class Cell:
@@ -53,7 +53,7 @@ class Cell:
         self.inbox.set_topics(ingest.immediate, ingest.lossless, ingest.recorded)
         monkeypatch.setattr(self.session.link, "put", lambda *_: None)
         monkeypatch.setattr(self.session.link, "has_reader", lambda _: True)
-        monkeypatch.setattr(self.session.link, "hold", lambda _: None)
+        monkeypatch.setattr(self.session.link, "declare_tokens", lambda _: None)
         self.inbox.transport(BRIDGE, True)
         self.inbox.token(bridge_dialect.bridge_token(BRIDGE), True)
         self.permit(True)

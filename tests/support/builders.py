@@ -18,6 +18,7 @@ from app.commands.transport import Transport
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import TopicRole
+from app.dialect.peer_traits import BRIDGE_TRAITS
 from app.errors import PanelError
 from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
@@ -28,6 +29,7 @@ Table = Mapping[str, Any]
 
 INTERFACES: Final = load_interfaces("jazzy")
 DIALECT: Final = BridgeDialect()
+TRAITS: Final = BRIDGE_TRAITS
 BOOL: Final = "std_msgs/msg/Bool"
 TEXT: Final = "std_msgs/msg/String"
 BRIDGE: Final = "b1"
@@ -87,7 +89,7 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
 
 def robot_there(panel: Panel, **callbacks: Any) -> RobotState:
     """A robot that commands can reach: link and bridge are up. It has not published yet."""
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, **callbacks)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, **callbacks)
     robot.link_up = True
     robot.settled_at = 0.0
     robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)

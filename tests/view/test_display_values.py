@@ -11,7 +11,16 @@ from app.i18n import render
 from app.panel import load_panel
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
-from tests.support.builders import BRIDGE, DIALECT, HEARD, INTERFACES, NOW, panel_of, robot_there
+from tests.support.builders import (
+    BRIDGE,
+    DIALECT,
+    HEARD,
+    INTERFACES,
+    NOW,
+    TRAITS,
+    panel_of,
+    robot_there,
+)
 from tests.support.samples import BATTERY
 from tests.support.words import english
 
@@ -225,7 +234,7 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
 
 def test_time_changes_a_lamp() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8", "max_age_s": 5.0})
-    robot = RobotState(panel, INTERFACES, DIALECT)
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS)
     robot.update(
         "heard", Sample(INTERFACES.encode("std_msgs/msg/UInt8", {"data": 0}), 1, NOW, NOW, None)
     )

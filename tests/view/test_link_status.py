@@ -16,9 +16,9 @@ from app.robot.parameter_state import ParameterState
 from app.robot.state import RobotState
 from app.settings import PACKAGE
 from app.view.link_status import (
-    BRIDGE,
     LONGEST_LIST,
     NODE,
+    PEER,
     LinkStatus,
     LinkTimes,
     labels,
@@ -110,18 +110,18 @@ NO_LINK = frozenset(
 
 
 def test_every_verdict_has_its_link_or_none() -> None:
-    assert len(BRIDGE | NODE | NO_LINK) == len(BRIDGE) + len(NODE) + len(NO_LINK)
+    assert len(PEER | NODE | NO_LINK) == len(PEER) + len(NODE) + len(NO_LINK)
     made = codes_of("permission/interlocks")
-    assert {"no_link", "stale", "forbidden", "joining"} <= made
-    assert made - {"", "cyclone_hint", "no_link_at"} <= BRIDGE | NODE | NO_LINK
+    assert {"stale", "forbidden", "joining"} <= made
+    assert made - {""} <= PEER | NODE | NO_LINK
 
 
-@pytest.mark.parametrize("code", sorted(BRIDGE | NODE | NO_LINK))
+@pytest.mark.parametrize("code", sorted(PEER | NODE | NO_LINK))
 def test_a_verdict_locks_by_its_link_only(code: str) -> None:
     panel = panel_of(FREE)
     verdicts = {"free": Verdict(code == "permitted", code)}
-    by = [labels(panel, verdicts, codes) for codes in (BRIDGE, NODE)]
-    assert by == [["Free"] if code in codes else [] for codes in (BRIDGE, NODE)]
+    by = [labels(panel, verdicts, codes) for codes in (PEER, NODE)]
+    assert by == [["Free"] if code in codes else [] for codes in (PEER, NODE)]
 
 
 def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:

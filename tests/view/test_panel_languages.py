@@ -18,7 +18,7 @@ from app.robot.parameter_state import ParameterState
 from app.robot.state import RobotState
 from app.view.link_status import LONGEST_LIST, locks
 from app.view.view import build_view
-from tests.support.builders import DIALECT, FREE, INTERFACES, KIOSK, NOW, panel_of
+from tests.support.builders import DIALECT, FREE, INTERFACES, KIOSK, NOW, TRAITS, panel_of
 from tests.support.catalogues import write_catalogue
 
 
@@ -93,7 +93,7 @@ def test_a_robots_name_is_in_the_language_of_who_reads_it() -> None:
         FREE,
         robot=[{"id": "left", "name": {"en": "Left arm", "de": "Linker Arm"}, "namespace": "/left"}],
     )
-    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, panel.robots[0])
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, panel.robots[0])
     assert robot.name == "Left arm"
     built = build_view(panel, robot, NOW)
     assert isinstance(built.robot["name"], Text)

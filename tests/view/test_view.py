@@ -23,6 +23,7 @@ from tests.support.builders import (
     HEARD,
     INTERFACES,
     NOW,
+    TRAITS,
     endpoint,
     panel_of,
     permits,
@@ -90,7 +91,7 @@ def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: RobotState
 
 
 def test_the_banner_of_a_demo_is_there_while_nothing_is_connected() -> None:
-    view = view_of(RobotState(PANEL, INTERFACES, DIALECT), simulated=True)
+    view = view_of(RobotState(PANEL, INTERFACES, DIALECT, TRAITS), simulated=True)
     assert english(view["notice"]["banner"]) == "SIMULATED ROBOT"
 
 

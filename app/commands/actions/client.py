@@ -11,10 +11,9 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.commands.actions.goal import Goal
-from app.commands.service_calls import BRIDGE_LOSS_DELAY_S
 from app.commands.transport import Transport
 from app.errors import DecodeError
-from app.i18n import Text, joined, number, say
+from app.i18n import Text, hint, joined, number, say
 from app.interfaces import Fields, Interfaces
 from app.interfaces.names import of_action
 from app.panel.template import response_paths
@@ -74,14 +73,13 @@ class ActionClient:
         return self._transport.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
-        """The reply; None at a timeout, or if the bridge was lost in the meantime."""
+        """The reply; None at a timeout, or if the peer was lost in the meantime."""
         ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None
         if reply is None:
-            await asyncio.wait(
-                {goal.cut}, timeout=BRIDGE_LOSS_DELAY_S
-            )  # the bridge's token may end a little later
+            # The peer's token may end a little later.
+            await asyncio.wait({goal.cut}, timeout=self._robot.traits.loss_delay_s)
         return reply
 
     def goal_response(self, goal: Goal, reply: bytes | None) -> Outcome:
@@ -98,7 +96,7 @@ class ActionClient:
         if goal.cut.done():
             return Outcome("unknown", goal.cut.result() or say("call_cut"))
         sentence = say("timed_out", seconds=number(f"{widget.timeout_s:g}"))
-        return Outcome("timed_out", joined([sentence, say("cyclone_hint")]))
+        return Outcome("timed_out", joined([sentence, hint(self._robot.traits.sentences.timeout_hint)]))
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
         """The response of `cancel_goal`: a message with `return_code` and `goals_canceling`."""

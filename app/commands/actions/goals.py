@@ -14,7 +14,6 @@ from app.clock import format_time
 from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
 from app.commands.actions.results import ResultWaiter
-from app.commands.service_calls import MAX_UNANSWERED
 from app.commands.transport import Transport
 from app.errors import DecodeError
 from app.i18n import TextLike, say
@@ -62,15 +61,15 @@ class GoalTracker:
             handlers.add(names.status(key), status)
 
     def on_graph_change(self) -> None:
-        """Cuts off goals whose action server or bridge is lost. Call it after every change of the
+        """Cuts off goals whose action server or peer is lost. Call it after every change of the
         graph."""
-        bridge = bool(self._robot.graph.peers)
-        if not bridge:
+        is_reached = bool(self._robot.graph.peers)
+        if not is_reached:
             self._states.clear()
         for goal in (*self._latest.values(), *self._results.goals):
-            if not goal.cut.done() and not (bridge and self._services.is_offered(goal.widget)):
+            if not goal.cut.done() and not (is_reached and self._services.is_offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
-                goal.cut.set_result(gone if bridge else "")
+                goal.cut.set_result(gone if is_reached else "")
                 if goal.doubt:
                     self._set_status(goal, goal.doubt_status)
 
@@ -125,7 +124,7 @@ class GoalTracker:
     def full(self, action: str) -> TextLike:
         """Why no further goal of an action may be sent, "" if it may."""
         count = sum(goal.widget.action == action for goal in self._results.goals)
-        return say("too_many", service=action) if count >= MAX_UNANSWERED else ""
+        return say("too_many", service=action) if count >= self._robot.traits.max_unanswered else ""
 
     def _cancelable(self, widget: Action, press_id: str) -> Goal | None:
         latest, shown = self._latest.get(widget.id), self._robot.command_status.get(widget.id, IDLE)

@@ -13,7 +13,6 @@ from app.commands.service_calls import LATE_S, with_fields, with_reply
 from app.concurrency import spawn_logged
 from app.errors import LinkError
 from app.i18n import TextLike, number, say
-from app.permission.servers import SERVER_SETTLE_S
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
@@ -90,10 +89,10 @@ class ResultWaiter:
         self._finished(goal, answer)
 
     async def _until_offered(self, goal: Goal) -> None:
-        key = self._robot.key(goal.widget.action)
+        key, settle_s = self._robot.key(goal.widget.action), self._robot.traits.server_settle_s
         while not (
             self._services.is_offered(goal.widget)
-            and time.monotonic() >= self._robot.graph.since("AS", key) + SERVER_SETTLE_S
+            and time.monotonic() >= self._robot.graph.since("AS", key) + settle_s
         ):
             await asyncio.sleep(ASK_AGAIN_S)
 

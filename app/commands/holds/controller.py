@@ -56,7 +56,7 @@ class HoldController:
         self._robot = robot
         self._loop = loop
         self._messages = messages
-        self._receipts = HoldReceipts(robot.name, recorder)
+        self._receipts = HoldReceipts(robot.name, robot.traits.sentences, recorder)
         self._arrivals = latest
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, HoldCommand)}
@@ -65,7 +65,7 @@ class HoldController:
         self._closed = False
 
     def unconfirmed(self, receipt: Receipt) -> Receipt:
-        """The receipt of a hold whose stop message may not have reached the bridge."""
+        """The receipt of a hold whose stop message may not have reached the peer."""
         return self._receipts.unconfirmed(receipt)
 
     def widget(self, widget_id: str) -> HoldCommand:

@@ -20,6 +20,7 @@ from app.commands.receipts import (
     outcome_text,
     receipt_of,
 )
+from app.dialect.peer_traits import PeerSentences
 from app.errors import Cause
 from app.i18n import Text, TextLike, joined, number, say
 from app.panel.template import needed_inputs
@@ -68,8 +69,10 @@ def refused(
 class HoldReceipts:
     """The hold receipts of one robot."""
 
-    def __init__(self, robot: str, recorder: PressRecorder | None) -> None:
+    def __init__(self, robot: str, sentences: PeerSentences, recorder: PressRecorder | None) -> None:
+        """`robot` is its name, `sentences` are those about its peer."""
         self._log = RobotLog(log, robot)
+        self._sentences = sentences
         self._recorder = recorder
 
     def record_begin(self, holding: ActiveHold) -> None:
@@ -118,8 +121,8 @@ class HoldReceipts:
         return self._recorded(receipt)
 
     def unconfirmed(self, receipt: Receipt) -> Receipt:
-        """The receipt of a hold whose stop message may not have reached the bridge."""
-        unconfirmed = say("hold_unanswered")
+        """The receipt of a hold whose stop message may not have reached the peer."""
+        unconfirmed = say(self._sentences.stop_unconfirmed)
         self._log.warning("hold %s of %s: %s", receipt.id, receipt.widget, unconfirmed)
         reason = joined([receipt.reason, unconfirmed])
         return self._recorded(replace(receipt, outcome="unknown", reason=reason))

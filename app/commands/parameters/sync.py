@@ -3,7 +3,7 @@
 A node is queried when its services appear in the graph, once more when its events surely arrive, after
 a set, and if an event may have been missed; never twice at a time. A node that did not respond is
 queried again only on demand: each request makes a node on Fast DDS print an error. Responses by way of
-a bridge or node that was lost in the meantime are ignored.
+a peer or node that was lost in the meantime are ignored.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ from app.interfaces import Interfaces
 from app.interfaces.names import PARAMETER_EVENTS
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, EVENTS, GET, SET, Parameter, Value
-from app.permission.servers import SERVER_SETTLE_S, parameters_offered
+from app.permission.servers import parameters_offered
 from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.parameter_state import read_parameter_state
 from app.robot.sample_handlers import SampleHandler, SampleHandlers
@@ -40,8 +40,6 @@ log = logging.getLogger("kiosk.parameters")
 Read = Literal["whole", "partly", "silent"]
 
 FAILED: Final = "updating a node's parameters failed"
-SETTLE_S: Final = SERVER_SETTLE_S  # earlier requests to a node that has just appeared may be lost
-CONFIRM_S: Final = 3.0  # after this time the bridge surely forwards the events of a new node
 AGAIN_S: Final = 1.0  # at least between two queries, and before the first retry
 AGAIN_MOST_S: Final = 600.0  # the pause between retries doubles up to this
 
@@ -135,8 +133,8 @@ class ParameterSync:
             self._log.debug("%s", error)
             self._query_all()
             return
-        of_bridge = f"/{key}".removesuffix(PARAMETER_EVENTS)  # its namespace
-        node = self._nodes_by_full_name.get(f"{of_bridge}{event.node}")
+        peer_namespace = f"/{key}".removesuffix(PARAMETER_EVENTS)
+        node = self._nodes_by_full_name.get(f"{peer_namespace}{event.node}")
         if node is not None and node.task is not None:
             self._apply_event(node, event, sample.wall)
 
@@ -160,8 +158,8 @@ class ParameterSync:
 
     async def _keep_updated(self, node: Node) -> None:
         """Queries a node whenever needed, until the task is canceled."""
-        confirmed, pause = False, AGAIN_S
-        await asyncio.sleep(SETTLE_S)
+        traits, confirmed, pause = self._robot.traits, False, AGAIN_S
+        await asyncio.sleep(traits.server_settle_s)  # earlier requests to a new node may be lost
         while True:
             node.begin_query()
             read = await self._read(node)
@@ -173,7 +171,7 @@ class ParameterSync:
                     await within(node.query_needed, pause)
                     pause = min(2 * pause, AGAIN_MOST_S)
                 case "whole":
-                    await within(node.query_needed, None if confirmed else CONFIRM_S)
+                    await within(node.query_needed, None if confirmed else traits.events_settle_s)
                     confirmed, pause = True, AGAIN_S
 
     async def _read(self, node: Node) -> Read:

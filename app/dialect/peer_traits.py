@@ -1,0 +1,92 @@
+"""What depends on the kind of peer that a robot is reached by: times, limits and sentences. A row for
+each dialect. No I/O."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from app.dialect.dialect import DialectName
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeerSentences:
+    """The sentences that are about a kind of peer: codes of the catalogue (`app.i18n`).
+
+    Those of locks are the codes of their verdicts too. Of the others, "" is for a kind of peer that
+    needs none.
+    """
+
+    lamp: str  # the name of the lamp for the link to the peer
+    # Why the link locks all commands.
+    unreachable: str
+    unreachable_at: str  # the same with `where`: the endpoints that the configuration names
+    absent: str
+    absent_named: str  # the same with the robot's `name`
+    silent: str
+    # Why it locks some of them.
+    unrouted: str  # `topic` is not forwarded
+    uncallable: str  # the server `name` is on the DDS `vendor`, which can't be called
+    # The state of the robot's nodes.
+    nodes_unknown: str
+    nodes_absent: str
+    node_lost: str  # `name` was there before
+    # The results of commands.
+    no_reply: str  # a call of `service` ended without a reply
+    timeout_hint: str  # why there may be no response in time; "" for no hint
+    press_unconfirmed: str  # a message on `topic`, at `time`, may not have arrived
+    stop_unconfirmed: str  # the same for the stop message of a hold
+    renewal: str  # why a hold ended: the session with the peer is replaced
+
+    @property
+    def link_codes(self) -> frozenset[str]:
+        """The codes of the verdicts that lock all commands because of this peer."""
+        return frozenset({self.unreachable, self.absent, self.absent_named, self.silent})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeerTraits:
+    """What the panel has to expect from a kind of peer. Times in seconds."""
+
+    server_settle_s: float  # from a server's token to routes that carry the first call
+    loss_delay_s: float  # from the end of a query to the end of the lost peer's token, at most
+    events_settle_s: float  # from a node's token until its parameter events surely arrive
+    max_unanswered: int  # requests of one service that may be open at a time
+    # From a message to the token of its publisher, at most; see `robot.silent_publishers`.
+    token_delay_s: float
+    token_delay_single_s: float  # where no other publisher can have sent the message
+    token_delay_latched_s: float  # of a TRANSIENT_LOCAL publisher
+    sentences: PeerSentences
+
+
+# Measured with zenoh-bridge-ros2dds 1.10. A call sent in the same millisecond as the server's token
+# appeared was lost 2 times in 30, none after 5 ms, with all on one machine. The bridge keeps ten
+# requests of a service. Token delays: docs/permissions.md.
+BRIDGE_TRAITS: Final = PeerTraits(
+    server_settle_s=0.2,
+    loss_delay_s=0.3,
+    events_settle_s=3.0,
+    max_unanswered=8,
+    token_delay_s=0.5,
+    token_delay_single_s=4.0,
+    token_delay_latched_s=5.0,
+    sentences=PeerSentences(
+        lamp="bridge",
+        unreachable="no_link",
+        unreachable_at="no_link_at",
+        absent="no_bridge",
+        absent_named="no_bridge_of",
+        silent="bridge_silent",
+        unrouted="unheard",
+        uncallable="wrong_rmw",
+        nodes_unknown="node_unknown",
+        nodes_absent="node_absent",
+        node_lost="node_gone",
+        no_reply="call_dropped",
+        timeout_hint="cyclone_hint",
+        press_unconfirmed="sent_unanswered",
+        stop_unconfirmed="hold_unanswered",
+        renewal="hold_by_renewal",
+    ),
+)
+PEER_TRAITS: Final[Mapping[DialectName, PeerTraits]] = {"bridge": BRIDGE_TRAITS}
+EVERY_SENTENCES: Final = tuple(traits.sentences for traits in PEER_TRAITS.values())
