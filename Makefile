@@ -1,6 +1,7 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000
 # make test  everything, on the real bridge, real ROS 2 nodes and a real browser
 # make check  types and style
+# make format  writes the style that `make check` checks
 # make docs  the documentation as a site, in build/docs; a dead link is an error
 # make faults  every fault in its long form; writes the results as a table into docs/reliability.md
 # make screenshots  every page at every size, theme and language, in build/screenshots; the README's pictures
@@ -15,11 +16,12 @@ CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
 PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hashes --no-deps -r
 
 BENCH := $(CACHE)/bench
+FRONTEND := $(CACHE)/frontend
 export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev docs wheel release faults screenshots soak bench bench-setup test-parts bridge lock clean
+.PHONY: run test check format dev docs wheel release faults screenshots soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
@@ -50,12 +52,22 @@ else
 	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && exit $$first
 endif
 
-check: .venv/test
-	.venv/bin/ruff check app tests bench deploy docs
-	.venv/bin/ruff format --check app tests bench deploy docs
+PYTHON_FOLDERS := app tests bench deploy docs
+FRONTEND_FOLDERS := static bench docs/examples
+BIOME := $(FRONTEND)/node_modules/.bin/biome
+BIOME_OPTIONS := --config-path=tests/frontend
+check: .venv/test $(FRONTEND)/ready
+	.venv/bin/ruff check $(PYTHON_FOLDERS)
+	.venv/bin/ruff format --check $(PYTHON_FOLDERS)
+	$(BIOME) ci $(BIOME_OPTIONS) $(FRONTEND_FOLDERS)
 	.venv/bin/mypy
 	.venv/bin/python -m app.i18n
 	.venv/bin/python -m docs._generate --check
+
+format: .venv/test $(FRONTEND)/ready
+	.venv/bin/ruff check --fix $(PYTHON_FOLDERS)
+	.venv/bin/ruff format $(PYTHON_FOLDERS)
+	$(BIOME) check --write $(BIOME_OPTIONS) $(FRONTEND_FOLDERS)
 
 # Warnings are errors. The generated parts of the pages are written first.
 docs: .venv-docs/ready
@@ -142,6 +154,15 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	@echo "installing the packages of the tests into .venv: once, up to two minutes"
 	@.venv/bin/python $(PIP_INSTALL) $<
 	@touch $@ .venv/run .venv/build
+
+# `ready` is a copy of the lock file that was installed: checkouts with the same lock share the packages.
+$(FRONTEND)/ready: tests/frontend/package.json tests/frontend/package-lock.json
+	@sh tests/system.sh npm
+	@cmp -s tests/frontend/package-lock.json $@ || { \
+		echo "installing what checks scripts and style sheets: once, some seconds" && mkdir -p $(@D) && \
+		cp tests/frontend/package.json tests/frontend/package-lock.json $(@D) && \
+		npm ci --prefix $(@D) --ignore-scripts --no-audit --no-fund --loglevel=error; }
+	@cp tests/frontend/package-lock.json $@
 
 FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
 

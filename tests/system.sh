@@ -46,7 +46,7 @@ need util-linux nsenter --version
 need curl curl --version
 need sqlite3 sqlite3 --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
-[ "$only" != npm ] || need npm npm --version # for the benchmark's rivals alone
+[ "$only" != npm ] || need npm npm --version # for `make check` and the benchmark's rivals
 [ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust $RUST or later (cargo)" >&2; exit 1; }
 if [ -z "$only" ]; then
     has=$(cargo --version | cut -d" " -f2)

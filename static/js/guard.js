@@ -9,11 +9,23 @@
   var main = document.querySelector("script[data-src]").getAttribute("data-src");
   var started = false;
   var reloading = false;
-  var guard = (window.pageGuard = { isBroken: false, fail: fail, started: onStarted, reload: reload, recall: recall, keep: keep });
+  var guard = (window.pageGuard = {
+    isBroken: false,
+    fail: fail,
+    started: onStarted,
+    reload: reload,
+    recall: recall,
+    keep: keep,
+  });
 
   // What the modules and the stylesheets need: with these all else is there.
   function isNewEnough() {
-    return "popover" in HTMLElement.prototype && "CSSLayerBlockRule" in window && CSS.supports("selector(:has(a))") && CSS.supports("container-type: inline-size");
+    return (
+      "popover" in HTMLElement.prototype &&
+      "CSSLayerBlockRule" in window &&
+      CSS.supports("selector(:has(a))") &&
+      CSS.supports("container-type: inline-size")
+    );
   }
 
   function onParsed(act) {
@@ -37,7 +49,9 @@
     script.onerror = fail;
     script.src = main;
     document.head.appendChild(script);
-    setTimeout(function () { if (!started) fail("the page did not start"); }, STARTS_WITHIN_MS);
+    setTimeout(function () {
+      if (!started) fail("the page did not start");
+    }, STARTS_WITHIN_MS);
   }
 
   function onStarted() {
@@ -53,7 +67,11 @@
     if (guard.onFail) guard.onFail();
     onParsed(function () {
       lock();
-      new MutationObserver(lock).observe(document.body, { subtree: true, childList: true, attributeFilter: ["disabled", "open"] });
+      new MutationObserver(lock).observe(document.body, {
+        subtree: true,
+        childList: true,
+        attributeFilter: ["disabled", "open"],
+      });
     });
     addEventListener("submit", refuse, true); // by a program: buttons are disabled
     reload();
@@ -104,13 +122,15 @@
 
   // Without a server the browser would show a page of its own.
   function probe() {
-    fetch(main, { cache: "no-store" }).then(function (answer) {
-      if ([502, 503, 504].indexOf(answer.status) < 0) return location.reload();
-      throw answer.status;
-    }).catch(function () {
-      reloading = false;
-      reload();
-    });
+    fetch(main, { cache: "no-store" })
+      .then(function (answer) {
+        if ([502, 503, 504].indexOf(answer.status) < 0) return location.reload();
+        throw answer.status;
+      })
+      .catch(function () {
+        reloading = false;
+        reload();
+      });
   }
 
   // What this tab keeps over a reload; in the history where a browser permits no storage.
@@ -139,9 +159,11 @@
   addEventListener("unhandledrejection", function (event) {
     if (!started) fail(event.reason);
   });
-  window.matchMedia = window.matchMedia || function () {
-    return { matches: false, addEventListener: function () {} }; // a mouse
-  };
+  window.matchMedia =
+    window.matchMedia ||
+    function () {
+      return { matches: false, addEventListener: function () {} }; // a mouse
+    };
   if (isNewEnough()) onParsed(startModules);
   else {
     document.documentElement.hidden = true;

@@ -30,7 +30,12 @@ export class Holding {
     // A long touch must not open a menu; pointer events arrive all the same.
     this.button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     this.button.addEventListener("dragstart", (event) => event.preventDefault());
-    listenForEnd(this.button, () => this.pointer, () => this.key, (why) => this.end(why));
+    listenForEnd(
+      this.button,
+      () => this.pointer,
+      () => this.key,
+      (why) => this.end(why),
+    );
   }
 
   // What each heartbeat has in it; a joystick has its deflection.
@@ -87,7 +92,8 @@ export class Holding {
   // Between the regular ones too, where there is news.
   beat(socket = this.#socket) {
     if (performance.now() - this.#stampedAt > SILENCE_MS) this.end("silence");
-    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.heartbeatData() });
+    else if (this.#lease)
+      this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.heartbeatData() });
   }
 
   #held(socket, { lease, moves }) {

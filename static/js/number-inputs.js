@@ -24,7 +24,9 @@ export function enter(input, plain) {
 // What a press sends: a number, or the text as it is, which the server refuses; of a list its numbers.
 export function sentNumber(input) {
   if (input.matches("[data-list]")) return readNumbers(input.value, limitsOf(input).isWhole);
-  return input.type === "range" ? Number(input.value) : (readNumber(input.value, limitsOf(input).isWhole) ?? input.value.trim());
+  return input.type === "range"
+    ? Number(input.value)
+    : (readNumber(input.value, limitsOf(input).isWhole) ?? input.value.trim());
 }
 
 // A typed number as plain text, null if it is none, and what is wrong with it.
@@ -42,7 +44,9 @@ export function judged(text, { min, max, step, isWhole }) {
 export function entered(input) {
   const limits = limitsOf(input);
   const texts = input.matches("[data-list]") ? elementsOf(input.value) : [entryText(input)];
-  return texts?.map((text) => judged(text, limits)) ?? [{ plain: null, problem: limits.isWhole ? "noWhole" : "noNumber" }];
+  return (
+    texts?.map((text) => judged(text, limits)) ?? [{ plain: null, problem: limits.isWhole ? "noWhole" : "noNumber" }]
+  );
 }
 
 // Independent of the language: plain text, or that of each number of a list; null if it can't be sent as it is.
@@ -58,7 +62,10 @@ const isPermitted = (plain, limits) => typeof plain === "string" && judged(numbe
 export function enterPortable(input, value) {
   const isList = input.matches("[data-list]");
   const limits = limitsOf(input);
-  if (isList ? !Array.isArray(value) || !value.every((plain) => isPermitted(plain, limits)) : !isPermitted(value, limits)) return false;
+  if (
+    isList ? !Array.isArray(value) || !value.every((plain) => isPermitted(plain, limits)) : !isPermitted(value, limits)
+  )
+    return false;
   if (isList) input.value = listText(value);
   else enter(input, value);
   return true;

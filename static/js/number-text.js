@@ -22,7 +22,10 @@ const SIGNS = signs();
 
 // What each character stands for; a separator of another language stands for none.
 function signs() {
-  const own = new Map([[DECIMAL, "."], [MINUS, "-"]]);
+  const own = new Map([
+    [DECIMAL, "."],
+    [MINUS, "-"],
+  ]);
   for (const sign of ALIKE.find((alike) => alike.includes(group)) ?? group) if (!own.has(sign)) own.set(sign, ",");
   const all = new Map([[".", "?"], [",", "?"], ...own]);
   for (const sign of "0123456789+-") all.set(sign, sign);

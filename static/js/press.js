@@ -31,7 +31,11 @@ export class Presser {
     if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     // A key that is held down is one press.
-    addEventListener("keydown", (event) => event.repeat && event.target.closest?.("button") && event.preventDefault(), true);
+    addEventListener(
+      "keydown",
+      (event) => event.repeat && event.target.closest?.("button") && event.preventDefault(),
+      true,
+    );
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
     }
@@ -76,7 +80,8 @@ export class Presser {
   // By a pointer, a key or a program. Only a pointer has a "down" before.
   #begin(event, root, button) {
     // The robot's response arrives as an event.
-    if (button.matches(".read")) return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
+    if (button.matches(".read"))
+      return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
     const byPointer = event.detail > 0;
     const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
     const isCancel = button.matches(".cancel");
@@ -98,7 +103,11 @@ export class Presser {
   #open() {
     clearTimeout(this.#untouchedTimer);
     this.#untouchedTimer = setTimeout(() => this.close(), UNTOUCHED_MS);
-    if (!this.#socket) import("./press-socket.js").then(({ PressSocket }) => this.#connect(PressSocket), () => {});
+    if (!this.#socket)
+      import("./press-socket.js").then(
+        ({ PressSocket }) => this.#connect(PressSocket),
+        () => {},
+      );
   }
 
   #connect(PressSocket) {

@@ -18,5 +18,6 @@ function sound() {
 const receipts = new MutationObserver((changes) => {
   if (changes.some(({ target }) => target.dataset.outcome === "refused")) sound();
 });
-for (const receipt of document.querySelectorAll(".receipt")) receipts.observe(receipt, { attributeFilter: ["data-outcome"] });
+for (const receipt of document.querySelectorAll(".receipt"))
+  receipts.observe(receipt, { attributeFilter: ["data-outcome"] });
 document.documentElement.dataset.sound = ""; // refusals are heard from now on

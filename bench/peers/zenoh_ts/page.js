@@ -21,13 +21,17 @@ function cdrOf(text) {
 const port = new URLSearchParams(location.search).get("port");
 const session = await Session.open(new Config(`ws/127.0.0.1:${port}`));
 await session.declareSubscriber("operation_enabled", {
-  handler: (sample) => { button.disabled = sample.payload().toBytes()[4] === 0; },
+  handler: (sample) => {
+    button.disabled = sample.payload().toBytes()[4] === 0;
+  },
 });
 const publisher = await session.declarePublisher("operation1");
 button.addEventListener("click", () => publisher.put(cdrOf(text.value)));
 
 for (const shown of document.querySelectorAll("[data-topic]")) {
   await session.declareSubscriber(shown.dataset.topic.slice(1), {
-    handler: (sample) => { shown.textContent = textOf(sample.payload().toBytes()); },
+    handler: (sample) => {
+      shown.textContent = textOf(sample.payload().toBytes());
+    },
   });
 }

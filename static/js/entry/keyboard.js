@@ -103,7 +103,9 @@ export class Entry {
     shift.disabled = this.#signs;
     root.querySelector("[data-key=signs]").setAttribute("aria-pressed", String(this.#signs));
     const letters = this.#signs ? SIGNS : layoutOf(document.documentElement.lang);
-    const rows = letters.map((row) => [...row].map((one) => keyOf(this.#shift === "off" || this.#signs ? one : capital(one))));
+    const rows = letters.map((row) =>
+      [...row].map((one) => keyOf(this.#shift === "off" || this.#signs ? one : capital(one))),
+    );
     rows[0].push(erase);
     rows.at(-1).unshift(shift);
     root.querySelector(".rows").replaceChildren(...rows.map(rowOf));

@@ -63,13 +63,17 @@ export class Entry {
     setText(this.#find("h2"), named.textContent);
     setText(this.#find(".sheet-head b"), entryText(this.input));
     setText(this.#find("small"), this.input.dataset.unit ?? "");
-    for (const [name, limit, end] of [["min", min, ".low"], ["max", max, ".high"]]) {
+    for (const [name, limit, end] of [
+      ["min", min, ".low"],
+      ["max", max, ".high"],
+    ]) {
       const key = this.#find(`[data-key=${name}]`);
       key.disabled = limit === "";
       for (const place of [key.querySelector("b"), this.#find(end)]) setText(place, numberText(limit));
     }
     // A parameter is set by the page's own key of that name.
-    if (this.input.matches("[data-entry]")) for (const label of [".name", ".label"]) setText(this.#find(`.finish ${label}`), this.#sheet.root.dataset.enter);
+    if (this.input.matches("[data-entry]"))
+      for (const label of [".name", ".label"]) setText(this.#find(`.finish ${label}`), this.#sheet.root.dataset.enter);
     this.#find("[data-key=sign]").disabled = min !== "" && min >= 0;
     this.#find('[data-key="."]').disabled = isWhole;
     this.#find(".scale").hidden = min === "" || max === "";

@@ -6,7 +6,7 @@ export const LAYOUTS = {
   de: [`${DIGITS}ß`, "qwertzuiopü", "asdfghjklöä", "yxcvbnm,.-"],
 };
 
-export const SIGNS = [DIGITS, "!\"#$%&/()=", "+*'~^@€°<>", "?:;_|\\[]{}"];
+export const SIGNS = [DIGITS, '!"#$%&/()=', "+*'~^@€°<>", "?:;_|\\[]{}"];
 
 // Capitals that are no capital letter of the same key.
 const CAPITALS = { ß: "ẞ", ",": ";", ".": ":", "-": "_" };

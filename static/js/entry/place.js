@@ -88,5 +88,11 @@ function spotOf(sheet, fields, shapes) {
 function lowest(sheet, field, area) {
   const { height } = sheet.getBoundingClientRect();
   const top = Math.max(area.top, area.bottom - height);
-  return { left: area.left, top, lift: top - GAP_PX - field.bottom, side: "top", point: (field.left + field.right) / 2 - area.left };
+  return {
+    left: area.left,
+    top,
+    lift: top - GAP_PX - field.bottom,
+    side: "top",
+    point: (field.left + field.right) / 2 - area.left,
+  };
 }

@@ -42,5 +42,9 @@ function typed(event) {
 
 addEventListener("keydown", typed, true);
 // The press of a space comes when it goes up.
-addEventListener("keyup", (event) => event.key === " " && burst.length > 1 && event.target.matches?.("button") && swallow(event), true);
+addEventListener(
+  "keyup",
+  (event) => event.key === " " && burst.length > 1 && event.target.matches?.("button") && swallow(event),
+  true,
+);
 document.documentElement.dataset.scans = ""; // codes are read from now on

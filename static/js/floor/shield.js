@@ -3,8 +3,21 @@ import { TAP_AGAIN_MS } from "../press.js";
 
 const POINTERS = ["pointerdown", "pointerup", "pointercancel", "pointermove"];
 const OTHERS = [
-  "touchstart", "touchmove", "touchend", "mousedown", "mouseup", "click", "dblclick", "auxclick", "contextmenu", "wheel",
-  "keydown", "keyup", "beforeinput", "dragstart", "submit",
+  "touchstart",
+  "touchmove",
+  "touchend",
+  "mousedown",
+  "mouseup",
+  "click",
+  "dblclick",
+  "auxclick",
+  "contextmenu",
+  "wheel",
+  "keydown",
+  "keyup",
+  "beforeinput",
+  "dragstart",
+  "submit",
 ];
 
 class Shield {
@@ -16,7 +29,8 @@ class Shield {
 
   constructor() {
     // Listeners that the window has already still get what is swallowed.
-    for (const name of [...POINTERS, ...OTHERS]) addEventListener(name, (event) => this.#swallow(event), { capture: true, passive: false });
+    for (const name of [...POINTERS, ...OTHERS])
+      addEventListener(name, (event) => this.#swallow(event), { capture: true, passive: false });
   }
 
   get up() {

@@ -29,7 +29,8 @@ class Joystick extends Holding {
   }
 
   onResponse(moves) {
-    for (const [axis, text] of Object.entries(moves)) this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
+    for (const [axis, text] of Object.entries(moves))
+      this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
   }
 
   onEnd() {

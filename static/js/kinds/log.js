@@ -71,7 +71,12 @@ class Log {
     this.#queriedAt = performance.now();
     const request = (this.#request = new AbortController());
     const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
-    const query = new URLSearchParams({ level: of("level"), node: of("node"), search: of("search"), after: whole ? 0 : this.#last });
+    const query = new URLSearchParams({
+      level: of("level"),
+      node: of("node"),
+      search: of("search"),
+      after: whole ? 0 : this.#last,
+    });
     try {
       const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
       const answer = await fetch(path, { signal: request.signal });

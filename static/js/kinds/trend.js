@@ -99,7 +99,16 @@ class Trend {
     const begin = end - this.#span;
     const isBefore = (number) => (number + 1) * width < begin;
     this.#columns = answer.pens.map((items, i) => merged(this.#columns[i], items, since, isBefore));
-    this.#drawn = { begin, end: this.#end ?? end, width, zone, offset, shift, span: this.#span, live: live && this.#end === null };
+    this.#drawn = {
+      begin,
+      end: this.#end ?? end,
+      width,
+      zone,
+      offset,
+      shift,
+      span: this.#span,
+      live: live && this.#end === null,
+    };
     this.#plot.draw(this.#drawn, this.#columns);
     this.#cursor.show(this.#drawn, this.#columns);
     this.#showState();
@@ -112,7 +121,8 @@ class Trend {
     if (what === "pause") this.#end = this.#drawn?.end ?? end;
     else if (what === "live") this.#end = null;
     else if (what === "back") this.#end = Math.max(end - this.#span / 2, this.#oldest);
-    else if (what === "forward") this.#end = end + this.#span / 2 >= this.#now - SETTLED_S ? null : end + this.#span / 2;
+    else if (what === "forward")
+      this.#end = end + this.#span / 2 >= this.#now - SETTLED_S ? null : end + this.#span / 2;
     else if (what === "longer") this.#span = this.#windows[window + 1] ?? this.#span;
     else if (what === "shorter") this.#span = this.#windows[window - 1] ?? this.#span;
     else return;
@@ -129,7 +139,12 @@ class Trend {
     const window = this.#windows.indexOf(this.#span);
     const live = this.#end === null;
     this.#root.toggleAttribute("data-paused", !live);
-    const keys = { back: (this.#end ?? this.#now) <= this.#oldest, forward: live, longer: window >= this.#windows.length - 1, shorter: window <= 0 };
+    const keys = {
+      back: (this.#end ?? this.#now) <= this.#oldest,
+      forward: live,
+      longer: window >= this.#windows.length - 1,
+      shorter: window <= 0,
+    };
     for (const [name, off] of Object.entries(keys)) {
       const key = this.#root.querySelector(`[data-do="${name}"]`);
       if (key) key.disabled = off;

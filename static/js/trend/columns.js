@@ -6,7 +6,8 @@ export function merged(old, items, since, isBefore) {
   const columns = since ? old.filter(([number]) => number < since) : [];
   let starts = false;
   for (const item of items) {
-    if (item && item[0] >= since) columns.push(item.length === 2 ? [item[0], item[1], item[1], item[1], starts] : [...item, starts]);
+    if (item && item[0] >= since)
+      columns.push(item.length === 2 ? [item[0], item[1], item[1], item[1], starts] : [...item, starts]);
     starts = item === null;
   }
   const first = columns.findIndex(([number]) => !isBefore(number));

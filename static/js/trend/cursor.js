@@ -61,9 +61,14 @@ export class Cursor {
     const place = (this.#time - begin) / (end - begin);
     for (const name of ["x1", "x2"]) line.setAttribute(name, `${place * 100}%`);
     box.dataset.side = place < 0.5 ? "right" : "left";
-    const values = this.#plot.pens.flatMap((pen, i) => [["span", pen.name], ["span", this.#valueAt(pen, this.#columns[i])]]);
+    const values = this.#plot.pens.flatMap((pen, i) => [
+      ["span", pen.name],
+      ["span", this.#valueAt(pen, this.#columns[i])],
+    ]);
     const texts = [["b", this.#plot.clockOf(this.#time)], ...values];
-    box.replaceChildren(...texts.map(([tag, text]) => Object.assign(document.createElement(tag), { textContent: text })));
+    box.replaceChildren(
+      ...texts.map(([tag, text]) => Object.assign(document.createElement(tag), { textContent: text })),
+    );
   }
 
   #valueAt(pen, columns) {
@@ -71,7 +76,8 @@ export class Cursor {
     const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);
     if (!nearest || distance(nearest) > this.#drawn.width + NEAR * this.#drawn.span) return NOTHING;
     const [, low, high] = nearest;
-    const text = (value) => numberText(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
+    const text = (value) =>
+      numberText(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
     return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();
   }
 }

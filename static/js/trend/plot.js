@@ -8,7 +8,9 @@ const PER_COLUMN_PX = 1.5;
 const VALUE_TICK_PX = 45;
 const NAME_ROOM = 12; // percent of the height that the name of a limit takes
 const TIME_TICK_PX = 90;
-const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800];
+const STEPS = [
+  1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800,
+];
 
 // The name of a limit stands outside of what the limits enclose, if that is drawn.
 const isNamedAbove = (letter, place) => (letter === "H" ? place >= NAME_ROOM : place > 100 - NAME_ROOM);
@@ -49,14 +51,40 @@ export class Plot {
     const part = (name) => this.#root.querySelector(name);
     const values = [...valueTicks(low, high, Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX)))];
     const times = [...this.#timeTicks()];
-    part(".grid-lines").innerHTML = values.map(([value]) => `<path d="M0 ${y(value)}h${SIZE}"/>`).join("") + times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
-    part(".values").innerHTML = values.map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${numberText(text)}</text>`).join("");
-    part(".times").innerHTML = times.map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`).join("");
-    const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
+    part(".grid-lines").innerHTML =
+      values.map(([value]) => `<path d="M0 ${y(value)}h${SIZE}"/>`).join("") +
+      times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
+    part(".values").innerHTML = values
+      .map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${numberText(text)}</text>`)
+      .join("");
+    part(".times").innerHTML = times
+      .map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`)
+      .join("");
+    const limits = this.pens.flatMap((pen, i) =>
+      [
+        ["H", pen.high],
+        ["L", pen.low],
+      ]
+        .filter(([, at]) => at !== undefined)
+        .map(([letter, at]) => ({ letter, at, i })),
+    );
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
-    const named = limits.map((limit) => ({ ...limit, place: y(limit.at) / 10 })).filter(({ place }) => place >= 0 && place <= 100);
-    part(".limit-names").innerHTML = named.map(({ letter, at, place }) => `<text x="6" y="${place}%" dy="${isNamedAbove(letter, place) ? -5 : 15}">${letter} ${numberText(String(at))}</text>`).join("");
-    part(".bands").innerHTML = this.pens.filter((pen) => pen.normal).map(({ normal: [from, to] }) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`).join("");
+    const named = limits
+      .map((limit) => ({ ...limit, place: y(limit.at) / 10 }))
+      .filter(({ place }) => place >= 0 && place <= 100);
+    part(".limit-names").innerHTML = named
+      .map(
+        ({ letter, at, place }) =>
+          `<text x="6" y="${place}%" dy="${isNamedAbove(letter, place) ? -5 : 15}">${letter} ${numberText(String(at))}</text>`,
+      )
+      .join("");
+    part(".bands").innerHTML = this.pens
+      .filter((pen) => pen.normal)
+      .map(
+        ({ normal: [from, to] }) =>
+          `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`,
+      )
+      .join("");
     for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
   }
 
@@ -89,7 +117,9 @@ export class Plot {
   }
 
   #range(columns) {
-    const fixed = this.pens.flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])]).filter((value) => value !== undefined);
+    const fixed = this.pens
+      .flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])])
+      .filter((value) => value !== undefined);
     const { min, max } = this.#root.dataset;
     const ends = (index, pick, none) => [...columns.flat().map((column) => column[index]), ...fixed].reduce(pick, none);
     const low = ends(1, (a, b) => Math.min(a, b), Infinity);
@@ -100,7 +130,8 @@ export class Plot {
 
   *#timeTicks() {
     const { begin, end, zone } = this.#view;
-    const step = STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? STEPS.at(-1);
+    const step =
+      STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? STEPS.at(-1);
     for (let number = Math.ceil((begin + zone) / step); number * step - zone <= end; number++) {
       const time = number * step - zone;
       const [from, to] = step < 60 ? [11, 19] : step < 86400 ? [11, 16] : [5, 10];
