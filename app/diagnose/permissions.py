@@ -8,10 +8,10 @@ from app.diagnose.findings import Report
 from app.diagnose.names import NamesBehindBridge
 from app.diagnose.observation import Observation
 from app.errors import DecodeError
-from app.i18n import TextLike, render, say
+from app.i18n import render
 from app.interfaces import Interfaces, has_key
 from app.panel.interlock import Interlock
-from app.permission.conditions import permits, unmet
+from app.permission.conditions import permits, refusal
 from app.robot.sample import Sample
 from app.survey.model import TopicEndpoint
 
@@ -91,13 +91,7 @@ def _check_value(
         return
     if permits(interlock, value):
         return
-    reason: TextLike
-    if value is None:
-        reason = say("missing", field=interlock.field, topic=interlock.topic)
-    elif interlock.conditions:
-        reason = unmet(interlock, value)
-    else:
-        reason = say("forbidden", name=interlock.name)
+    reason = refusal(interlock, value).reason or ""
     report.find("permission_refused", interlock.topic, robot=behind.robot.id, detail=render(reason))
 
 

@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeVar
 
 from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field_name, parent_path
 from app.interfaces.validation import fitting_constants, format_value, unknown_constant
-from app.panel.interlock import Interlock
+from app.panel.condition import Condition
 from app.panel.number_range import to_float32
+
+Resolved = TypeVar("Resolved", bound=Condition)
 
 NUMBERS: Final = frozenset({*INTEGER_RANGES, "float32", "float64"})
 
 
 class HasField(Protocol):
-    """An interlock or a display."""
+    """A condition or a display."""
 
     @property
     def type(self) -> str: ...
@@ -32,7 +34,7 @@ def _parent_type(type_name: str, field: str, interfaces: Interfaces) -> str:
 
 
 def resolve_constant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
-    """The value of an interlock's condition. A text is a constant's name if the field is no text; an
+    """The value of a comparison. A text is a constant's name if the field is no text; an
     unknown name is returned as it is.
     """
     named = isinstance(given, str) and kind.name not in STRING_TYPES
@@ -80,27 +82,27 @@ def resolve_names(given: Any, kind: Type, interfaces: Interfaces, names: Mapping
     return resolve_constant(given, kind, names)
 
 
-def resolve_interlock(interlock: Interlock, interfaces: Interfaces) -> Interlock:
-    """The interlock with values in place of constants' names in its conditions."""
-    kind = interfaces.type_at(interlock.type, interlock.field)
-    constants = interfaces.constants(parent_type(interlock, interfaces))
+def resolve_condition(condition: Resolved, interfaces: Interfaces) -> Resolved:
+    """The condition with values in place of constants' names in its comparisons."""
+    kind = interfaces.type_at(condition.type, condition.field)
+    constants = interfaces.constants(parent_type(condition, interfaces))
     values = {
         key: tuple(comparison_value(one, kind, constants) for one in given)
         if key == "one_of"
         else comparison_value(given, kind, constants)
-        for key, given in interlock.conditions.items()
+        for key, given in condition.comparisons.items()
     }
-    return interlock.with_constants(values, _constant_names(interlock, kind, constants))
+    return condition.with_constants(values, _constant_names(condition, kind, constants))
 
 
-def _constant_names(interlock: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
-    """Value → name of the constants with the same prefix as those in the conditions, without values
+def _constant_names(condition: Condition, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
+    """Value → name of the constants with the same prefix as those in the comparisons, without values
     that several constants have. The prefix is removed if it is the field's name."""
-    given = [one for key in interlock.conditions for one in _as_tuple(getattr(interlock, key))]
+    given = [one for key in condition.comparisons for one in _as_tuple(getattr(condition, key))]
     named = [one for one in given if isinstance(one, str) and kind.name not in STRING_TYPES]
     if not named:
         return {}
-    own = f"{field_name(interlock.field)}_".upper()
+    own = f"{field_name(condition.field)}_".upper()
     alike = own if all(name.startswith(own) for name in named) else _common_prefix(named)
     found: dict[Any, list[str]] = {}
     for name, value in constants.items():

@@ -11,7 +11,7 @@ from app.i18n import ENGLISH
 from app.interfaces import Interfaces, load_interfaces
 from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
-from app.panel.constants import resolve_interlock
+from app.panel.constants import resolve_condition
 from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
@@ -85,7 +85,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
             group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
         ]
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
-    interlocks = tuple(resolve_interlock(one, interfaces) for one in panel.interlocks)
+    interlocks = tuple(resolve_condition(one, interfaces) for one in panel.interlocks)
     return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
 
 

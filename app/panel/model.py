@@ -22,6 +22,7 @@ from app.panel.base import (
     TopicQos,
     parse_namespace,
 )
+from app.panel.condition import Condition
 from app.panel.demo import DemoEntry
 from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
@@ -193,6 +194,12 @@ class Panel(Description):
     def interlock(self, interlock_id: str) -> Interlock | None:
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions that are judged: each message on their topics counts, and a value of unknown
+        age is known to be one."""
+        return self.interlocks
+
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """The interlocks that must permit a press, in the widget's order."""
         known = {one.id: one for one in self.interlocks}
@@ -229,9 +236,10 @@ class Panel(Description):
                 yield widget.confirm
 
     def monitored(self) -> Iterator[TopicSource]:
-        """What interlocks and displays listen to."""
-        for one in self.interlocks:
-            yield TopicSource(one.topic, one.type, one.qos, (one.field,))
+        """What conditions and displays listen to."""
+        for condition in self.conditions:
+            field = (condition.field,)
+            yield TopicSource(condition.topic, condition.type, condition.qos, field)
         for display in self.displays:
             yield from display.sources()
         for command in self.commands:
@@ -262,7 +270,7 @@ class Panel(Description):
         publisher."""
         needed = [source for command in self.commands for source in command.sources()]
         given = [source for source in self.monitored() if source.qos.reliability is not None]
-        strict = {interlock.topic for interlock in self.interlocks}
+        strict = {condition.topic for condition in self.conditions}
         strict |= {source.topic for source in (*needed, *given)}
         return frozenset(source.topic for source in self.monitored()) - strict
 

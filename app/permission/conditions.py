@@ -1,15 +1,27 @@
-"""Whether the value of an interlock's field permits, and the sentence if it does not: pure."""
+"""Whether a condition is met: the value that its field has now, what it must be, and the verdict.
+
+Pure functions from (condition, robot, time). Unknown means not met: a value that was never received, is
+stale or cut off has a reason of its own.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
-from app.i18n import PanelText, Text, TextLike, number, render, say
+from app.i18n import PanelText, Text, TextLike, joined, number, render, say
 from app.i18n.values import after_space, with_unit
-from app.panel.interlock import Interlock
+from app.interfaces import has_key
+from app.panel.condition import Condition
 from app.panel.number_range import decimal_text, shortest_float
 from app.panel.values import same_value
+from app.permission.mismatches import topic_mismatch
+from app.permission.verdict import PERMITTED, Verdict, locked
+from app.robot.keyed_values import kept_s
+from app.robot.state import Reading, RobotState
 
+# Messages that arrive this soon after joining may be replayed, with values of any age.
+HISTORY_S: Final = 1.0
 LONGEST_TEXT: Final = 40  # characters of a text that stands in a reason
 DIGITS: Final = (6, 9)  # a float32 has nine at most
 
@@ -18,23 +30,120 @@ HOLDS: Final[Mapping[str, Callable[[Any, Any], bool]]] = {
     "not_equals": lambda value, other: value == value and not same_value(value, other),
     "min": lambda value, lowest: value >= lowest,
     "max": lambda value, highest: value <= highest,
-    "one_of": lambda value, values: any(same_value(value, one) for one in values),
+    "one_of": lambda value, values: any(same_value(value, other) for other in values),
 }
 
 
-def permits(interlock: Interlock, value: Any) -> bool:
-    """Whether this value permits. None, a value that is missing, never does; nor does NaN."""
-    conditions = interlock.conditions
-    if not conditions:
+@dataclass(frozen=True, slots=True)
+class ConditionState:
+    """A condition at one moment: the value as text, "" if it is unknown; the `need`, which is what it
+    must be; and the verdict, which is not permitted while the condition is not known to be met."""
+
+    value: TextLike
+    need: TextLike
+    verdict: Verdict
+
+
+def condition_state(
+    condition: Condition, robot: RobotState, now: float, link: Verdict
+) -> ConditionState:
+    """The value, need and verdict at `now` (monotonic seconds). `link` is the link's verdict."""
+    verdict, wanted = condition_verdict(condition, robot, now, link), need(condition)
+    reading = _reading(condition, robot)
+    value = reading.value(condition.field) if reading.status == "message" else None
+    text = "" if value is None else _received_text(condition, value, wanted)
+    return ConditionState(text, wanted, verdict)
+
+
+def condition_verdict(condition: Condition, robot: RobotState, now: float, link: Verdict) -> Verdict:
+    """Whether a condition is met at `now`: the robot can be reached, the topic has the type and QoS,
+    and the value is fresh and meets the comparisons. `until` is when time alone changes that."""
+    if not link.permitted:
+        return link
+    return topic_mismatch("MS", condition, robot) or value_verdict(condition, robot, now)
+
+
+def value_verdict(
+    condition: Condition, robot: RobotState, now: float, *, single_publisher: bool = False
+) -> Verdict:
+    """Whether the latest value meets the condition, for a robot and a topic that can be read.
+    `single_publisher`: each message has every element that the topic has."""
+    topic, key = condition.topic, robot.key(condition.topic)
+    reading = _reading(condition, robot, single_publisher=single_publisher)
+    if reading.status != "message":
+        return locked(reading.status, topic=topic, wanted=condition.type)
+    if robot.silent_publishers.has_silent(key, robot.peers_of(key)):
+        reason = say("new_publisher", topic=topic)
+        which = robot.publishers(key).sentence(topic) if robot.graph.has_endpoint("MP", key) else ""
+        return Verdict(False, "new_publisher", joined([reason, which]))
+    value = reading.value(condition.field)
+    if not permits(condition, value):
+        return refusal(condition, value, is_ambiguous=reading.is_ambiguous(condition.field))
+    if condition.max_age_s is None:
+        return PERMITTED
+    if reading.at < _fresh_since(robot, key):
+        return locked("waiting", topic=topic)
+    stale_at = reading.at + condition.max_age_s
+    if now >= stale_at:
+        return stale(topic, condition.field, condition.max_age_s)
+    return Verdict(True, until=stale_at)
+
+
+def refusal(condition: Condition, value: Any, *, is_ambiguous: bool = False) -> Verdict:
+    """The verdict for a value that does not meet the condition, None for one that is missing.
+    `is_ambiguous`: several elements have the key of its field."""
+    if is_ambiguous:
+        return locked("several", field=condition.field, topic=condition.topic)
+    if value is None:
+        return locked("missing", field=condition.field, topic=condition.topic)
+    if not condition.comparisons:
+        return locked("forbidden", name=condition.name)
+    return Verdict(False, "unmet", unmet(condition, value))
+
+
+def stale(topic: str, field: str, max_age_s: float) -> Verdict:
+    """The lock for a value that is too old; one with a key may be older than the last message."""
+    limit = number(f"{max_age_s:g}")
+    if has_key(field):
+        return locked("stale_entry", topic=topic, field=field, limit=limit)
+    return locked("stale", topic=topic, limit=limit)
+
+
+def _reading(condition: Condition, robot: RobotState, *, single_publisher: bool = False) -> Reading:
+    lacking_s = kept_s(condition.max_age_s, single_publisher=single_publisher)
+    return robot.reading(condition.topic).of_field(condition.field, lacking_s)
+
+
+def _fresh_since(robot: RobotState, key: str) -> float:
+    """From when on a received message is a new one, not one that was replayed on joining. Where a
+    publisher is, or may be, transient local, that is known only some time after its first message."""
+    joined_at = robot.settled_at + HISTORY_S
+    is_volatile = robot.graph.is_volatile(key)
+    return joined_at if is_volatile else max(joined_at, robot.replayed.known_since(key))
+
+
+def permits(condition: Condition, value: Any) -> bool:
+    """Whether this value meets the condition. None, a value that is missing, never does; nor does
+    NaN."""
+    comparisons = condition.comparisons
+    if not comparisons:
         return value is True
-    return value is not None and all(HOLDS[key](value, wanted) for key, wanted in conditions.items())
+    return value is not None and all(HOLDS[key](value, other) for key, other in comparisons.items())
 
 
-def unmet(interlock: Interlock, value: Any) -> Text:
-    """The sentence for a value that does not meet the conditions."""
-    wanted = list(_wanted(interlock))
-    must = wanted[0] if len(wanted) == 1 else say("both", one=wanted[0], other=wanted[1])
-    return say("unmet", name=interlock.name, value=_now(interlock, value, must), wanted=must)
+def unmet(condition: Condition, value: Any) -> Text:
+    """The sentence for a value that does not meet the comparisons."""
+    wanted = need(condition)
+    value_text = _received_text(condition, value, wanted)
+    return say("unmet", name=condition.name, value=value_text, wanted=wanted)
+
+
+def need(condition: Condition) -> TextLike:
+    """What the value must be, as text: "5 bar or more", "CHARGING or FULL"."""
+    if not condition.comparisons:
+        return _written(condition, True)
+    first, *others = _needs(condition)
+    return say("both", one=first, other=others[0]) if others else first
 
 
 def not_finite(value: float) -> Text:
@@ -42,49 +151,52 @@ def not_finite(value: float) -> Text:
     return say("value_nan") if math.isnan(value) else say("value_infinite")
 
 
-def _wanted(interlock: Interlock) -> Iterator[TextLike]:
-    if interlock.equals is not None:
-        yield _value_text(interlock, interlock.equals, interlock.unit)
-    if interlock.one_of is not None:
-        *all_but_last, last = (_value_text(interlock, one, interlock.unit) for one in interlock.one_of)
+def _needs(condition: Condition) -> Iterator[TextLike]:
+    if condition.equals is not None:
+        yield _value_text(condition, condition.equals, condition.unit)
+    if condition.one_of is not None:
+        *all_but_last, last = (
+            _value_text(condition, value, condition.unit) for value in condition.one_of
+        )
         yield say("either", first=tuple(all_but_last), last=last) if all_but_last else last
-    if interlock.min is not None or interlock.max is not None:
-        yield _limits(interlock)
-    if interlock.not_equals is not None:
-        yield say("not_value", value=_value_text(interlock, interlock.not_equals, interlock.unit))
+    if condition.min is not None or condition.max is not None:
+        yield _limits(condition)
+    if condition.not_equals is not None:
+        yield say("not_value", value=_value_text(condition, condition.not_equals, condition.unit))
 
 
-def _limits(interlock: Interlock) -> Text:
+def _limits(condition: Condition) -> Text:
     low, high = (
-        "" if one is None else _value_text(interlock, one, "") for one in (interlock.min, interlock.max)
+        "" if limit is None else _value_text(condition, limit, "")
+        for limit in (condition.min, condition.max)
     )
     code = "limits_both" if low and high else "limits_low" if low else "limits_high"
-    return say(code, low=low, high=high, unit=after_space(interlock.unit))
+    return say(code, low=low, high=high, unit=after_space(condition.unit))
 
 
-def _now(interlock: Interlock, value: Any, must: TextLike) -> TextLike:
+def _received_text(condition: Condition, value: Any, wanted: TextLike) -> TextLike:
     """The value that was received, in as few digits as distinguish it from the one that is needed."""
     if not isinstance(value, float):
-        return _value_text(interlock, value, interlock.unit)
+        return _value_text(condition, value, condition.unit)
     if math.isnan(value):
         return not_finite(value)
     rounded = (float(f"{value:.{digits}g}") for digits in DIGITS)
-    candidates = [_value_text(interlock, one, interlock.unit) for one in (*rounded, value)]
-    written = render(must)  # its numbers have the same digits in every language
+    candidates = [_value_text(condition, near, condition.unit) for near in (*rounded, value)]
+    written = render(wanted)  # its numbers have the same digits in every language
     return next((text for text in candidates if render(text) not in written), candidates[-1])
 
 
-def _value_text(interlock: Interlock, value: Any, unit: str | PanelText) -> TextLike:
-    text = _written(interlock, value)
-    known = isinstance(value, bool | str) or value in interlock.constants
+def _value_text(condition: Condition, value: Any, unit: str | PanelText) -> TextLike:
+    text = _written(condition, value)
+    known = isinstance(value, bool | str) or value in condition.constants
     return with_unit(text, unit) if known else number(text, unit)
 
 
-def _written(interlock: Interlock, value: Any) -> str:
+def _written(condition: Condition, value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return f'"{value}"' if len(value) <= LONGEST_TEXT else f'"{value[: LONGEST_TEXT - 1]}…"'
-    if value in interlock.constants:
-        return interlock.constants[value]
+    if value in condition.constants:
+        return condition.constants[value]
     return decimal_text(shortest_float(value) if isinstance(value, float) else value)

@@ -22,13 +22,13 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
-from app.permission.conditions import not_finite, permits, unmet
+from app.permission.conditions import not_finite, stale, value_verdict
 from app.permission.mismatches import topic_mismatch
 from app.permission.servers import call_blocked, set_blocked
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.command_status import IDLE
 from app.robot.keyed_values import kept_s
-from app.robot.state import Reading, RobotState
+from app.robot.state import RobotState
 
 # The codes of a `link_verdict` that locks.
 LINK_CODES: Final = frozenset({"joining", "catching_up"}).union(
@@ -39,9 +39,6 @@ MAX_ENDPOINTS: Final = 3
 SEVERAL: Final = 2  # publishers
 # The codes of locks that the robot's value decides.
 BY_VALUE: Final = frozenset({"forbidden", "unmet", "missing", "several"})
-
-# What comes so soon after joining may be a value of any age, sent again.
-HISTORY_S: Final = 1.0
 
 
 def link_verdict(robot: RobotState, now: float) -> Verdict:
@@ -76,45 +73,28 @@ def interlock_verdict(
     interlock: Interlock, robot: RobotState, now: float, link: Verdict | None = None
 ) -> Verdict:
     """Whether an interlock permits: its topic has the type and QoS, a publisher where that is required,
-    and a value that is fresh and meets its conditions. `link` is the link's verdict at `now` if it is
+    and a value that is fresh and meets its comparisons. `link` is the link's verdict at `now` if it is
     known already."""
     link = link or link_verdict(robot, now)
     if not link.permitted:
         return link
-    verdict = _verdict(interlock, robot, now)
+    verdict = (
+        topic_mismatch("MS", interlock, robot)
+        or _publishers_lock(interlock, robot)
+        or value_verdict(interlock, robot, now, single_publisher=interlock.publishers == "one")
+    )
     if verdict.code in BY_VALUE and not has_key(interlock.field):
         return _with_publishers(verdict, interlock, robot)
     return verdict
 
 
-def _verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
-    """The verdict of an interlock of a robot that can be reached."""
-    topic, key = interlock.topic, robot.key(interlock.topic)
-    if mismatch := topic_mismatch("MS", interlock, robot):
-        return mismatch
-    if interlock.require_publisher and not robot.graph.has_endpoint("MP", key):
+def _publishers_lock(interlock: Interlock, robot: RobotState) -> Verdict | None:
+    """The lock for a topic with fewer or more publishers than the interlock demands; None if there are
+    as many."""
+    topic = interlock.topic
+    if interlock.require_publisher and not robot.graph.has_endpoint("MP", robot.key(topic)):
         return locked("no_publisher", topic=topic)
-    is_single = interlock.publishers == "one"
-    if is_single and (mismatch := several_publishers(interlock, robot)):
-        return mismatch
-    lacking_s = kept_s(interlock.max_age_s, single_publisher=is_single)
-    reading = robot.reading(topic).of_field(interlock.field, lacking_s)
-    if reading.status != "message":
-        return locked(reading.status, topic=topic, wanted=interlock.type)
-    if robot.silent_publishers.has_silent(key, robot.peers_of(key)):
-        reason = say("new_publisher", topic=topic)
-        which = robot.publishers(key).sentence(topic) if robot.graph.has_endpoint("MP", key) else ""
-        return Verdict(False, "new_publisher", joined([reason, which]))
-    if not permits(interlock, reading.value(interlock.field)):
-        return _forbidden(interlock, reading)
-    if interlock.max_age_s is None:
-        return PERMITTED
-    if reading.at < _fresh_since(robot, key):
-        return locked("waiting", topic=topic)
-    stale_at = reading.at + interlock.max_age_s
-    if now >= stale_at:
-        return stale(topic, interlock.field, interlock.max_age_s)
-    return Verdict(True, until=stale_at)
+    return several_publishers(interlock, robot) if interlock.publishers == "one" else None
 
 
 def several_publishers(interlock: Interlock, robot: RobotState) -> Verdict | None:
@@ -135,32 +115,6 @@ def _with_publishers(verdict: Verdict, interlock: Interlock, robot: RobotState) 
     if publishers.number < SEVERAL or verdict.reason is None:
         return verdict
     return replace(verdict, reason=joined([verdict.reason, publishers.sentence(interlock.topic)]))
-
-
-def stale(topic: str, field: str, max_age_s: float) -> Verdict:
-    """The lock for a value that is too old; one with a key may be older than the last message."""
-    limit = number(f"{max_age_s:g}")
-    if has_key(field):
-        return locked("stale_entry", topic=topic, field=field, limit=limit)
-    return locked("stale", topic=topic, limit=limit)
-
-
-def _fresh_since(robot: RobotState, key: str) -> float:
-    """From when on a received message is a new one, not one that was replayed on joining. Where a
-    publisher is, or may be, transient local, that is known only some time after its first message."""
-    joined = robot.settled_at + HISTORY_S
-    return joined if robot.graph.is_volatile(key) else max(joined, robot.replayed.known_since(key))
-
-
-def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
-    value = reading.value(interlock.field)
-    if reading.is_ambiguous(interlock.field):
-        return locked("several", field=interlock.field, topic=interlock.topic)
-    if value is None:
-        return locked("missing", field=interlock.field, topic=interlock.topic)
-    if not interlock.conditions:
-        return locked("forbidden", name=interlock.name)
-    return Verdict(False, "unmet", unmet(interlock, value))
 
 
 def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:

@@ -89,8 +89,8 @@ class RobotState:
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
-        self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
-        self.silent_publishers = SilentPublishers(self._interlock_keys, traits)
+        self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
+        self.silent_publishers = SilentPublishers(self._condition_keys, traits)
         self.topic_publishers = TopicPublishers()
         self.replayed = ReplayedMessages()
         self._adaptive_keys = frozenset(map(self.key, panel.adaptive_topics))
@@ -124,7 +124,7 @@ class RobotState:
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
         """(key, topic) of each topic that the panel subscribes to."""
         fields = panel.subscribed_fields()
-        lossless = {one.topic for one in panel.interlocks}
+        lossless = {condition.topic for condition in panel.conditions}
         lossless |= {one.topic for one in panel.confirmations()}
         subscribed = panel.subscriptions()
         for topic, key in ((one, key) for one in subscribed for key in self.possible_keys(one)):
@@ -178,7 +178,7 @@ class RobotState:
         """A newer sample of a topic."""
         if self.is_misread(key):
             return
-        if key in self._interlock_keys:
+        if key in self._condition_keys:
             self.silent_publishers.record_message(key, sample.source, sample.seq, sample.at)
             self.replayed.record_message(key, sample.at, self.settled_at, sample.cached)
         if (topic := self._topics.get(key)) is not None:
@@ -213,13 +213,13 @@ class RobotState:
     def update_nodes(self) -> None:
         """Call after the nodes of the graph have been read: what they are may be known now."""
         self.drop_misread()
-        for key in self._interlock_keys:
+        for key in self._condition_keys:
             is_known = self.graph.since("MP", key) <= self.graph.nodes_read_at
             if is_known and self.publishers(key).number == 1:
                 self.silent_publishers.mark_single(key)
 
     def publishers(self, key: str) -> Publishers:
-        """The publishers of an interlock's topic, as they are known now."""
+        """The publishers of a condition's topic, as they are known now."""
         known = self.topic_publishers.of_topic(key, self.graph)
         nodes = {one.node for one in self.graph.node_endpoints("MP", key)}
         return Publishers(max(known.number, len(nodes)), tuple(sorted({*known.nodes, *nodes})))
@@ -239,7 +239,7 @@ class RobotState:
         self.link_up = False
         self.settled_at = math.inf
         self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
-        self.silent_publishers = SilentPublishers(self._interlock_keys, self.traits)
+        self.silent_publishers = SilentPublishers(self._condition_keys, self.traits)
         self.topic_publishers = TopicPublishers()
         self.replayed.begin_all()
         self.presence.clear()

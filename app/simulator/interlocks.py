@@ -59,7 +59,7 @@ def permitting(
 
 def satisfies(interlock: Interlock, value: Any) -> bool:
     """Whether a value meets all conditions; without any, whether it is true."""
-    given = interlock.conditions
+    given = interlock.comparisons
     if not given:
         return value is True
     return (
@@ -78,7 +78,7 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
         return
     numeric = kind in INTEGER_RANGES or kind in FLOAT_TYPES
     for interlock in interlocks:
-        given = interlock.conditions
+        given = interlock.comparisons
         for one in (given.get("equals"), *given.get("one_of", ())):
             if one is not None:
                 yield one
@@ -88,12 +88,12 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
             yield from ((low + high) / 2, low - span / 4, high + span / 4, low, high)
     yield from others
     for interlock in interlocks if numeric else ():
-        for one in interlock.conditions.values():
+        for one in interlock.comparisons.values():
             near = one if isinstance(one, tuple) else (one,)
             for value in near:
                 yield from (value + 1, value - 1)
     for interlock in interlocks:
-        if "not_equals" in interlock.conditions:
+        if "not_equals" in interlock.comparisons:
             yield interlock.not_equals
     if not numeric:
         yield from ("ready", "not ready")
@@ -101,7 +101,7 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
 
 def _limits(interlock: Interlock) -> tuple[float, float]:
     """Both limits: one that is not given is a fifth of the other away."""
-    low, high = interlock.conditions.get("min"), interlock.conditions.get("max")
+    low, high = interlock.comparisons.get("min"), interlock.comparisons.get("max")
     if low is None:
         assert high is not None
         return high - max(abs(high) / 5, 4), high
@@ -110,7 +110,7 @@ def _limits(interlock: Interlock) -> tuple[float, float]:
 
 def _moving(interlocks: Sequence[Interlock], kind: str) -> Signal | None:
     """A number that moves inside the limits, if there are any."""
-    limits = [_limits(one) for one in interlocks if {"min", "max"} & one.conditions.keys()]
+    limits = [_limits(one) for one in interlocks if {"min", "max"} & one.comparisons.keys()]
     if not limits:
         return None
     low, high = max(one[0] for one in limits), min(one[1] for one in limits)

@@ -50,7 +50,7 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:
     lines = [["Key", "Value", "Default", "Example", "What it means"], ["---"] * 5]
-    for key, prop in table["properties"].items():
+    for key, prop in sorted(table["properties"].items(), key=lambda row: row[0] != "id"):
         needed = key in table.get("required", ())
         default = "**required**" if needed else _code(prop["default"]) if "default" in prop else "–"
         example = "–" if _is_table(prop) else _code(examples[f"{name}.{key}"])

@@ -1,4 +1,4 @@
-"""What an interlock permits: conditions beside a bool, checked as the panel file is loaded."""
+"""Conditions, those of interlocks too: checked when the panel file is loaded, met or not met."""
 
 import math
 from pathlib import Path
@@ -8,6 +8,8 @@ import pytest
 
 from app.errors import PanelError
 from app.panel import load_panel
+from app.panel.checks.conditions import condition_faults
+from app.panel.condition import Condition
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits
 from app.permission.interlocks import interlock_verdict
@@ -177,15 +179,33 @@ def test_a_condition_that_can_not_hold_is_a_fault(
 
 
 @pytest.mark.parametrize("value", [None, "true", 1, 1.0, [True], b"\1"])
-def test_without_a_condition_nothing_permits_but_true(value: Any) -> None:
-    assert permits(Interlock(id="a", topic="/a"), True)
-    assert not permits(Interlock(id="a", topic="/a"), value)
+def test_without_comparisons_only_true_meets_a_condition(value: Any) -> None:
+    assert permits(Condition(topic="/a"), True)
+    assert not permits(Condition(topic="/a"), value)
 
 
-def test_what_is_not_there_permits_by_no_condition() -> None:
-    for conditions in ({"not_equals": 0}, {"min": 0}, {"one_of": [0]}):
-        made = Interlock.model_validate({"id": "a", "topic": "/a", **conditions})
-        assert not permits(made, None)
+def test_a_missing_value_meets_no_condition() -> None:
+    for comparisons in ({"not_equals": 0}, {"min": 0}, {"one_of": [0]}):
+        assert not permits(Condition.model_validate({"topic": "/a", **comparisons}), None)
+
+
+@pytest.mark.parametrize(
+    ("keys", "place", "fault"),
+    [
+        ({}, "field", '"data" is float64: a condition needs a bool, or conditions'),
+        ({"min": 3, "max": 2}, "max", "2 is less than min (3): no value permits"),
+        ({"equals": "ON"}, "equals", 'the name of a constant of std_msgs/msg/Float64, not "ON"'),
+        ({"field": "dat", "min": 1}, "field", "dat"),
+        ({"max": 1, "qos": {"reliability": "best_effort"}}, "max_age_s", "is missing"),
+    ],
+)
+def test_a_condition_without_an_interlock_is_checked_at_its_place(
+    keys: Table, place: str, fault: str
+) -> None:
+    condition = Condition.model_validate({"topic": "/a", "type": "std_msgs/msg/Float64", **keys})
+    faults = list(condition_faults("alarm[2]", condition, INTERFACES))
+    assert [one.place for one in faults] == [f"alarm[2].{place}"]
+    assert fault in faults[0].message
 
 
 def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path: Path) -> None:

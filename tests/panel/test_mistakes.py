@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from app.errors import Fault, PanelError
 from app.panel import load_panel
+from app.panel.condition import COMPARISONS
 from app.panel.faults.table_keys import inner_model, known_keys
-from app.panel.interlock import CONDITIONS
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
@@ -107,7 +107,7 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
 
 def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsOf) -> None:
     assert faults_of(GOOD) == []
-    conditions = [f"interlock.{key}" for key in (*CONDITIONS, "unit")]  # not all fit one interlock
+    conditions = [f"interlock.{key}" for key in (*COMPARISONS, "unit")]  # not all fit one interlock
     # There are robots, which have their own namespaces.
     assert list(lacking(TABLES, Panel)) == ["namespace", *conditions]
     pages, groups = TABLES["page"], [one for page in TABLES["page"] for one in page.get("group", ())]

@@ -17,7 +17,8 @@ from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.panel.model import Panel
-from app.permission.interlocks import HISTORY_S, interlock_verdict
+from app.permission.conditions import HISTORY_S
+from app.permission.interlocks import interlock_verdict
 from app.robot.graph import Route
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (

@@ -111,7 +111,7 @@ NO_LINK = frozenset(
 
 def test_every_verdict_has_its_link_or_none() -> None:
     assert len(PEER | NODE | NO_LINK) == len(PEER) + len(NODE) + len(NO_LINK)
-    made = codes_of("permission/interlocks")
+    made = codes_of("permission/interlocks") | codes_of("permission/conditions")
     assert {"stale", "forbidden", "joining"} <= made
     assert made - {""} <= PEER | NODE | NO_LINK
 

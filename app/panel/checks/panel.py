@@ -7,7 +7,7 @@ from itertools import islice
 from app.errors import Fault, InterfaceError
 from app.i18n.values import alike
 from app.interfaces import Interfaces
-from app.panel.checks.interlocks import interlock_faults
+from app.panel.checks.conditions import condition_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
@@ -140,7 +140,7 @@ def _input_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
 
 def _interlock_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
     for i, interlock in enumerate(panel.interlocks):
-        yield from interlock_faults(f"interlock[{i}]", interlock, interfaces)
+        yield from condition_faults(f"interlock[{i}]", interlock, interfaces)
 
 
 def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:

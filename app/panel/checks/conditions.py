@@ -1,0 +1,122 @@
+"""Checks of conditions: the field's type, and comparisons that no value meets."""
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, Final
+
+from app.errors import Fault, FieldError
+from app.interfaces import INTEGER_RANGES, Interfaces, Type
+from app.interfaces.validation import format_value, scalar_check, unknown_constant
+from app.panel.checks.types import field_faults
+from app.panel.condition import Condition
+from app.panel.constants import (
+    NUMBERS,
+    comparison_value,
+    parent_type,
+    resolve_constant,
+)
+from app.panel.values import same_value
+
+BEST_EFFORT: Final = (
+    "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
+    "give the age in seconds after which it locks"
+)
+EXCLUSIVE: Final = ("equals", "one_of")  # exclude all other comparisons
+NEEDS: Final = "needs a bool, or conditions: equals, not_equals, min and max, or one_of"
+
+
+def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -> Iterator[Fault]:
+    """Faults of one condition, which is the table at `place`."""
+    if condition.qos.reliability == "best_effort" and condition.max_age_s is None:
+        yield Fault(f"{place}.max_age_s", BEST_EFFORT)
+    faults = list(field_faults(place, condition.type, condition.field, interfaces))
+    yield from faults
+    if faults:
+        return
+    kind = interfaces.type_at(condition.type, condition.field)
+    if re.search(r"[/\]]", str(kind)):
+        reason = f'"{condition.field}" is {kind}: {condition.noun} judges one value of it'
+        yield Fault(f"{place}.field", reason)
+    elif not condition.comparisons and kind.name != "bool":
+        reason = f'"{condition.field}" is {kind}: {condition.noun} {NEEDS}'
+        yield Fault(f"{place}.field", reason)
+    else:
+        yield from _comparison_faults(place, condition, kind, interfaces)
+
+
+def _comparison_faults(
+    place: str, condition: Condition, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
+    numeric = kind.name in NUMBERS
+    if condition.unit and not numeric:
+        yield _number_only_fault(place, "unit", condition, kind)
+    alone = next((key for key in EXCLUSIVE if key in condition.comparisons), None)
+    if alone and (others := [key for key in condition.comparisons if key != alone]):
+        reason = f"has no meaning beside {alone}, which says all: leave it out"
+        yield from (Fault(f"{place}.{key}", reason, cause=f"alone {place}") for key in others)
+        return
+    faults = list(_value_faults(place, condition, kind, interfaces))
+    yield from faults
+    if numeric and not faults:
+        yield from _unsatisfiable_faults(place, condition, kind, interfaces)
+
+
+def _value_faults(
+    place: str, condition: Condition, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
+    """Faults of values that the field can't have."""
+    type_name = parent_type(condition, interfaces)
+    constants = interfaces.constants(type_name)
+    for key, compared in condition.comparisons.items():
+        if key in ("min", "max") and kind.name not in NUMBERS:
+            yield _number_only_fault(place, key, condition, kind)
+            continue
+        seen: list[Any] = []
+        for i, written in enumerate(compared if key == "one_of" else (compared,)):
+            at = f"{place}.{key}[{i}]" if key == "one_of" else f"{place}.{key}"
+            value = resolve_constant(written, kind, constants)
+            cause = f"condition {place}"
+            if isinstance(value, str) and kind.name in NUMBERS:
+                yield Fault(at, unknown_constant(value, kind, type_name, constants), cause=cause)
+            elif fault := _value_mismatch(value, kind):
+                yield Fault(at, fault, cause=cause)
+            elif any(same_value(value, other) for other in seen):
+                yield Fault(at, f"{format_value(written)} is there already")
+            seen.append(value)
+
+
+def _number_only_fault(place: str, key: str, condition: Condition, kind: Type) -> Fault:
+    return Fault(
+        f"{place}.{key}", f'is for numbers; "{condition.field}" is {kind}', cause=f"number {place}"
+    )
+
+
+def _value_mismatch(value: Any, kind: Type) -> str | None:
+    """Why the field can't have this value; None if it can."""
+    try:
+        scalar_check(kind)(value)
+    except FieldError as error:
+        return error.message
+    return None
+
+
+def _unsatisfiable_faults(
+    place: str, condition: Condition, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
+    constants = interfaces.constants(parent_type(condition, interfaces))
+    lowest, highest = INTEGER_RANGES.get(kind.name, (-math.inf, math.inf))
+    low, high, excluded = (
+        default if compared is None else comparison_value(compared, kind, constants)
+        for compared, default in (
+            (condition.min, lowest),
+            (condition.max, highest),
+            (condition.not_equals, math.nan),
+        )
+    )
+    if low > high:
+        low_text, high_text = format_value(condition.min), format_value(condition.max)
+        yield Fault(f"{place}.max", f"{high_text} is less than min ({low_text}): no value permits")
+    elif low == high == excluded:
+        reason = f"{format_value(condition.not_equals)} is all that the limits leave: no value permits"
+        yield Fault(f"{place}.not_equals", reason)

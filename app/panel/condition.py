@@ -1,0 +1,77 @@
+"""The description of a condition: a field of a topic, and the values of it that meet the condition."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Final, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
+
+from app.i18n import TextLike
+from app.interfaces.validation import format_value
+from app.panel.base import Description, FieldPath, Label, Seconds, Topic, TopicQos, Type
+from app.panel.widgets.numbers import Unit
+
+COMPARISONS: Final = ("equals", "not_equals", "min", "max", "one_of")
+
+
+def _check_value(value: Any) -> Any:
+    if not isinstance(value, bool | int | float | str):
+        raise ValueError(f"must be a number, true or false, or text, not {format_value(value)}")
+    if value != value:
+        raise ValueError("NaN is no value that could permit")
+    return value
+
+
+def _non_empty(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not values:
+        raise ValueError("is empty: it must have one value at least")
+    return values
+
+
+# A value of the field's type, or the name of a constant of the message around it.
+ComparedValue = Annotated[bool | int | float | str, BeforeValidator(_check_value)]
+
+
+class Condition(Description):
+    """A field of a topic: a bool that must be true or, with comparisons, a value that must meet all of
+    them. A value that was never received, is stale or cut off does not meet it."""
+
+    noun: ClassVar[str] = "a condition"  # in faults
+
+    label: Label | None = None
+    topic: Topic
+    type: Type = "std_msgs/msg/Bool"
+    field: FieldPath = "data"
+    equals: ComparedValue | None = None
+    not_equals: ComparedValue | None = None
+    min: ComparedValue | None = None
+    max: ComparedValue | None = None
+    one_of: (
+        Annotated[tuple[ComparedValue, ...], Field(strict=False), AfterValidator(_non_empty)] | None
+    ) = None
+    unit: Unit = ""
+    max_age_s: Seconds | None = None
+    qos: TopicQos = TopicQos()
+    _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
+
+    @property
+    def name(self) -> TextLike:
+        """What sentences call it."""
+        return self.label or self.topic
+
+    @cached_property
+    def comparisons(self) -> Mapping[str, Any]:
+        """Key → value of the comparisons; empty if the value must be true."""
+        values = {key: getattr(self, key) for key in COMPARISONS}
+        return {key: value for key, value in values.items() if value is not None}
+
+    @property
+    def constants(self) -> Mapping[Any, str]:
+        """Value → name of the constants by which the field's values are shown; set on load."""
+        return self._constants
+
+    def with_constants(self, comparisons: Mapping[str, Any], constants: Mapping[Any, str]) -> Self:
+        """The condition with values in place of constants' names in its comparisons."""
+        resolved = self.model_copy(update=dict(comparisons))
+        resolved._constants = constants
+        return resolved

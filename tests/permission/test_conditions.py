@@ -1,0 +1,172 @@
+"""The state of a condition without an interlock: its value, what the value must be, and the verdict."""
+
+import math
+
+import pytest
+
+from app.i18n import TextLike, render
+from app.panel.condition import Condition
+from app.panel.constants import resolve_condition
+from app.panel.model import Panel
+from app.permission.conditions import ConditionState, condition_state
+from app.permission.interlocks import interlock_verdict, link_verdict
+from app.permission.verdict import Verdict, locked
+from app.robot.state import RobotState, Sample
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    INTERFACES,
+    NOTHING,
+    NOW,
+    TEXT,
+    Table,
+    endpoint,
+    permits,
+    robot_there,
+    says,
+    small_panel,
+)
+from tests.support.samples import BATTERY
+
+FLOAT = "std_msgs/msg/Float64"
+BATTERY_TYPE = "sensor_msgs/msg/BatteryState"
+
+
+def air(**keys: object) -> Condition:
+    """An air pressure of 5 bar or more."""
+    pressure = {"label": "Air pressure", "topic": ENABLED, "type": FLOAT, "min": 5, "unit": "bar"}
+    return Condition.model_validate(pressure | keys)
+
+
+def panel_on(type_name: str, comparison: Table = NOTHING) -> Panel:
+    """A panel that subscribes to the topic with this type."""
+    return small_panel({"type": type_name, **comparison})
+
+
+def state_of(condition: Condition, robot: RobotState, now: float = NOW) -> ConditionState:
+    return condition_state(condition, robot, now, link_verdict(robot, now))
+
+
+def texts(state: ConditionState) -> tuple[str, str, bool]:
+    def english(text: TextLike) -> str:
+        return render(text)
+
+    return english(state.value), english(state.need), state.verdict.permitted
+
+
+@pytest.fixture
+def robot() -> RobotState:
+    """Its air pressure is 6 bar."""
+    cell = robot_there(panel_on(FLOAT, {"min": 5.0}))
+    says(cell, ENABLED, 6.0, FLOAT)
+    return cell
+
+
+@pytest.mark.parametrize(
+    ("value", "shown", "met"),
+    [
+        (6.0, "6 bar", True),
+        (5.0, "5 bar", True),
+        (3.2, "3.2 bar", False),
+        (4.99999999, "4.99999999 bar", False),
+        (math.nan, "not a number (NaN)", False),
+    ],
+)
+def test_a_state_has_the_value_and_its_need_whether_met_or_not(
+    robot: RobotState, value: float, shown: str, met: bool
+) -> None:
+    says(robot, ENABLED, value, FLOAT)
+    assert texts(state_of(air(), robot)) == (shown, "5 bar or more", met)
+
+
+def test_the_reason_of_an_unmet_condition_names_it(robot: RobotState) -> None:
+    says(robot, ENABLED, 3.2, FLOAT)
+    reason = state_of(air(), robot).verdict.reason
+    assert render(reason or "") == "Air pressure is 3.2 bar: it must be 5 bar or more."
+
+
+@pytest.mark.parametrize(("label", "name"), [(None, ENABLED), ("Operation", "Operation")])
+def test_without_a_label_a_condition_is_named_by_its_topic(label: str | None, name: str) -> None:
+    robot = robot_there(small_panel())
+    permits(robot, False)
+    verdict = state_of(Condition(topic=ENABLED, label=label), robot).verdict
+    assert verdict == locked("forbidden", name=name)
+
+
+@pytest.mark.parametrize(("value", "shown"), [(True, "true"), (False, "false")])
+def test_without_comparisons_the_value_must_be_true(value: bool, shown: str) -> None:
+    robot = robot_there(small_panel())
+    permits(robot, value)
+    assert texts(state_of(Condition(topic=ENABLED), robot)) == (shown, "true", value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "wanted", "met"),
+    [
+        ({"equals": 6.0}, "6 bar", True),
+        ({"not_equals": 6.0}, "not 6 bar", False),
+        ({"max": 5.5}, "5.5 bar or less", False),
+        ({"min": 5, "max": 8}, "5 to 8 bar", True),
+        ({"min": 5, "not_equals": 6}, "5 bar or more and not 6 bar", False),
+        ({"one_of": [1, 6, 7]}, "1 bar, 6 bar or 7 bar", True),
+    ],
+)
+def test_each_comparison_says_what_the_value_must_be(
+    robot: RobotState, keys: Table, wanted: str, met: bool
+) -> None:
+    assert texts(state_of(air(**{"min": None, **keys}), robot)) == ("6 bar", wanted, met)
+
+
+def test_constants_are_shown_by_their_names() -> None:
+    path = {"field": "power_supply_status", "equals": 1}
+    robot = robot_there(panel_on(BATTERY_TYPE, path))
+    table = {"topic": ENABLED, "type": BATTERY_TYPE, **path, "equals": "POWER_SUPPLY_STATUS_FULL"}
+    full = resolve_condition(Condition.model_validate(table), INTERFACES)
+    payload = INTERFACES.encode(BATTERY_TYPE, {**BATTERY, "power_supply_status": 2})
+    robot.update(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
+    assert texts(state_of(full, robot)) == ("DISCHARGING", "FULL", False)
+
+
+def test_a_value_that_never_arrived_is_unknown() -> None:
+    state = state_of(air(), robot_there(panel_on(FLOAT, {"min": 5.0})))
+    assert texts(state) == ("", "5 bar or more", False)
+    assert state.verdict == locked("waiting", topic=ENABLED, wanted=FLOAT)
+
+
+def test_a_stale_value_is_shown_but_does_not_count(robot: RobotState) -> None:
+    endpoint(robot, "MP", ENABLED, FLOAT)
+    fresh = state_of(air(max_age_s=2), robot, NOW + 1.9)
+    assert fresh.verdict == Verdict(True, until=NOW + 2)
+    state = state_of(air(max_age_s=2), robot, NOW + 2)
+    assert texts(state) == ("6 bar", "5 bar or more", False)
+    assert state.verdict == locked("stale", topic=ENABLED, limit="2")
+
+
+def test_a_value_before_a_cut_is_unknown(robot: RobotState) -> None:
+    robot.mark_peer_lost(BRIDGE, 2)
+    state = state_of(air(), robot)
+    assert (state.value, state.verdict) == ("", locked("cut", topic=ENABLED, wanted=FLOAT))
+
+
+def test_without_a_link_no_condition_is_met(robot: RobotState) -> None:
+    robot.link_up = False
+    assert state_of(air(), robot).verdict == locked("no_link")
+
+
+def test_a_topic_of_another_type_does_not_meet_a_condition(robot: RobotState) -> None:
+    endpoint(robot, "MP", ENABLED, TEXT)
+    verdict = state_of(air(), robot).verdict
+    assert verdict == locked("wrong_type", topic=ENABLED, found=TEXT, wanted=FLOAT)
+
+
+@pytest.mark.parametrize("value", [True, False])
+@pytest.mark.parametrize("age", [0.0, 1.5, 2.5])
+def test_an_interlock_has_the_verdict_of_its_condition(value: bool, age: float) -> None:
+    panel = small_panel({"label": "Operation", "max_age_s": 2.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot, value)
+    condition = Condition(topic=ENABLED, label="Operation", max_age_s=2.0)
+    verdict = interlock_verdict(panel.interlocks[0], robot, NOW + age)
+    assert state_of(condition, robot, NOW + age).verdict == verdict
