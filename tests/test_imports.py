@@ -78,12 +78,6 @@ SPEAK_ZENOH = {
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {
     "app.cli.bridge_config",
-    "app.cli.robot.link",
-    "app.cli.robot.survey",
-    "app.cli.robot.topic_reader",
-    "app.diagnose.link",
-    "app.diagnose.robot",
-    "app.diagnose.observation",
     "app.runtime.robot_access",
     "app.simulator.zenoh_peer",
     "app.simulator.zenoh_robot",

@@ -1,33 +1,29 @@
-"""The bridges of a robot: there, responding, of the right namespace, domain and version. Pure."""
+"""The peers of a robot: bridges that respond, of the right namespace, domain and version, and nodes. Of
+a robot without bridges, only its nodes. Pure."""
 
 from collections.abc import Sequence
 from typing import Final
 
 from app.diagnose.findings import Report, few
-from app.diagnose.names import NamesBehindBridge
+from app.diagnose.names import PanelNames
 from app.dialect.endpoint import DEMO_VERSION
 from app.survey.model import Bridge, GraphSnapshot
 
 TESTED: Final = "1.10.2"  # zenoh-plugin-ros2dds; see docs/compatibility.md
 
 
-def check_bridges(
-    report: Report, graph: GraphSnapshot, behind: NamesBehindBridge, endpoints: Sequence[str]
-) -> bool:
-    """Whether there is something to be said of the topics behind them."""
+def check_graph(report: Report, graph: GraphSnapshot, behind: PanelNames) -> bool:
+    """Whether there is something to be said of the robot's topics."""
     robot = behind.robot
-    if not graph.bridges:
-        report.find("no_bridge", ", ".join(endpoints), robot=robot.id)
-        return False
     if not behind.graphs:
-        theirs = graph.bridges[0].namespace
+        theirs = graph.robots[0].namespace
         report.find("bridge_namespace", robot=robot.id, theirs=theirs, ours=robot.namespace)
         return False
     bridges = [bridge for one in behind.graphs for bridge in one.bridges]
     for bridge in bridges:
         _check_bridge(report, bridge, robot.id)
     _check_several(report, behind, robot.id)
-    if not any(bridge.answers for bridge in bridges):
+    if not any(graph.answers for graph in behind.graphs):
         return False
     return _check_nodes(report, behind, bridges)
 
@@ -45,7 +41,7 @@ def _check_bridge(report: Report, bridge: Bridge, robot: str) -> None:
     report.fact(f"bridge {bridge.zid} is version {version}, {where}")
 
 
-def _check_several(report: Report, behind: NamesBehindBridge, robot: str) -> None:
+def _check_several(report: Report, behind: PanelNames, robot: str) -> None:
     """Whether two bridges forward the same for the same namespace."""
     found = {}
     for name in sorted(behind.robot.needed()):
@@ -59,20 +55,21 @@ def _check_several(report: Report, behind: NamesBehindBridge, robot: str) -> Non
         report.find("bridges_two", few([*found]), robot=robot, number=len(bridges), zids=few(bridges))
 
 
-def _check_nodes(report: Report, behind: NamesBehindBridge, bridges: Sequence[Bridge]) -> bool:
+def _check_nodes(report: Report, behind: PanelNames, bridges: Sequence[Bridge]) -> bool:
     """Whether the bridges see nodes, and any of what the panel needs."""
     topics = sum(len(one.topics) for one in behind.graphs)
     nodes = behind.nodes()
     domain = few(sorted({str(bridge.domain) for bridge in bridges}))
     # Limited to its machine and on another interface than the nodes, it learns their names at most.
-    forwarded = any(topic.announced for one in behind.graphs for topic in one.topics)
+    forwarded = any(topic.announced for graph in behind.graphs for topic in graph.topics)
     if any(map(_is_limited, bridges)) and not forwarded:
         report.find("bridge_localhost", robot=behind.robot.id, domain=domain)
         return False
     if not topics and not nodes:
         report.find("bridge_domain", robot=behind.robot.id, domain=domain)
         return False
-    report.fact(f"domain {domain} has nodes: {len(nodes)}, and topics: {topics}")
+    where = f"domain {domain}" if bridges else "the robot"
+    report.fact(f"{where} has nodes: {len(nodes)}, and topics: {topics}")
     needed = behind.robot.needed()
     there = any(behind.topics(n) or behind.offers(n) or behind.has_node(n) for n in needed)
     if not there and (found := next(behind.elsewhere(needed), None)) is not None:

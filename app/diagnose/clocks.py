@@ -8,7 +8,7 @@ from typing import Final
 
 from app.diagnose.findings import Report
 from app.diagnose.names import PanelRobot
-from app.diagnose.observation import Observation
+from app.diagnose.received import ReceivedSamples
 from app.errors import DecodeError, InterfaceError
 from app.interfaces import Interfaces
 from app.robot.sample import Sample
@@ -19,7 +19,7 @@ STAMP: Final = ("header.stamp.sec", "header.stamp.nanosec")
 
 
 def check_clocks(
-    report: Report, robot: PanelRobot, observed: Observation, interfaces: Interfaces
+    report: Report, robot: PanelRobot, observed: ReceivedSamples, interfaces: Interfaces
 ) -> None:
     types = robot.panel.subscriptions()
     live = {

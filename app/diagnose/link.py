@@ -1,4 +1,4 @@
-"""The way to a robot's Zenoh router or bridge: name, TCP, Zenoh's handshake, versions of Zenoh."""
+"""The way to a robot's Zenoh router or peer: name, TCP, Zenoh's handshake, versions of Zenoh."""
 
 import asyncio
 import json
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from app.diagnose.findings import Report
-from app.dialect.bridge_dialect import BridgeDialect
+from app.dialect.dialect import Dialect
 from app.errors import LinkError, SettingsError
 from app.transport.admin_space import AdminSpace
 from app.transport.zenoh_config import config_from, endpoints_of
@@ -47,12 +47,14 @@ def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) 
     return found
 
 
-async def check_link(report: Report, zenoh: Path, endpoints: Sequence[str], robot: str) -> list[str]:
+async def check_link(
+    report: Report, zenoh: Path, endpoints: Sequence[str], robot: str, dialect: Dialect
+) -> list[str]:
     """The endpoints at which Zenoh answers."""
     answering = []
     for endpoint in endpoints:
         there = await asyncio.to_thread(connects, report, endpoint, robot)
-        if there and await _shakes_hands(report, zenoh, endpoint, robot):
+        if there and await _shakes_hands(report, zenoh, endpoint, robot, dialect):
             answering.append(endpoint)
     return answering
 
@@ -77,9 +79,11 @@ def connects(report: Report, endpoint: str, robot: str) -> bool:
     return False
 
 
-async def _shakes_hands(report: Report, zenoh: Path, endpoint: str, robot: str) -> bool:
+async def _shakes_hands(
+    report: Report, zenoh: Path, endpoint: str, robot: str, dialect: Dialect
+) -> bool:
     session = await asyncio.to_thread(
-        ZenohSession, config_from(zenoh, [endpoint]), lambda _: None, BridgeDialect()
+        ZenohSession, config_from(zenoh, [endpoint]), lambda _: None, dialect
     )
     try:
         if not await session.connected(HANDSHAKE_S):

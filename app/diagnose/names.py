@@ -1,9 +1,10 @@
-"""The names that a panel uses of one robot, found in the ROS graph behind its bridges. Pure."""
+"""The names that a panel uses of one robot, found in the ROS graph. Pure."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from app.dialect.dialect import DialectName
 from app.dialect.endpoint import within
 from app.interfaces.names import GLOBAL, PARAMETER_EVENTS, SHARED_TOPICS, key_of, possible_keys
 from app.panel.model import Panel, RobotEntry
@@ -38,6 +39,10 @@ class PanelRobot:
         return self.entry.id if self.entry else ""
 
     @property
+    def dialect(self) -> DialectName:
+        return (self.entry or self.panel).dialect
+
+    @property
     def namespace(self) -> str:
         return self.entry.namespace if self.entry else self.panel.namespace
 
@@ -57,15 +62,14 @@ class PanelRobot:
 
 
 @dataclass(frozen=True, slots=True)
-class NamesBehindBridge:
-    """The graphs behind those bridges of a link that may be this robot's, queried by the panel's
-    names."""
+class PanelNames:
+    """Those graphs of a link that may be this robot's, queried by the panel's names."""
 
     robot: PanelRobot
     graphs: tuple[RobotGraph, ...]
 
     @classmethod
-    def of(cls, robot: PanelRobot, graph: GraphSnapshot) -> "NamesBehindBridge":
+    def of(cls, robot: PanelRobot, graph: GraphSnapshot) -> "PanelNames":
         elsewhere = [f"/{robot.key(one)}" for one in robot.needed() if one.startswith(GLOBAL)]
         names = (robot.namespace, *elsewhere)
         own = (one for one in graph.robots if any(within(name, one.namespace) for name in names))

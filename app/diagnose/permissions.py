@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from app.diagnose.findings import Report
-from app.diagnose.names import NamesBehindBridge
-from app.diagnose.observation import Observation
+from app.diagnose.names import PanelNames
+from app.diagnose.received import ReceivedSamples
 from app.errors import DecodeError
 from app.i18n import render
 from app.interfaces import Interfaces, has_key
@@ -19,7 +19,7 @@ REGULAR: Final = 2  # messages while one listens
 
 
 def check_permissions(
-    report: Report, behind: NamesBehindBridge, observed: Observation, interfaces: Interfaces
+    report: Report, behind: PanelNames, observed: ReceivedSamples, interfaces: Interfaces
 ) -> None:
     for topic in dict.fromkeys(one.topic for one in behind.robot.panel.interlocks):
         _check_topic(report, behind, observed, topic)
@@ -27,7 +27,7 @@ def check_permissions(
         _check_value(report, behind, observed, interlock, interfaces)
 
 
-def _check_topic(report: Report, behind: NamesBehindBridge, observed: Observation, topic: str) -> None:
+def _check_topic(report: Report, behind: PanelNames, observed: ReceivedSamples, topic: str) -> None:
     """Whether its publisher stays, and a panel that starts later would get a permission."""
     using = [one for one in behind.robot.panel.interlocks if one.topic == topic]
     key, ids = behind.robot.key(topic), ", ".join(one.id for one in using)
@@ -76,8 +76,8 @@ def _check_publishers(
 
 def _check_value(
     report: Report,
-    behind: NamesBehindBridge,
-    observed: Observation,
+    behind: PanelNames,
+    observed: ReceivedSamples,
     interlock: Interlock,
     interfaces: Interfaces,
 ) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from app.diagnose.findings import Report
-from app.diagnose.names import NamesBehindBridge
+from app.diagnose.names import PanelNames
 from app.interfaces import Interfaces
 from app.interfaces.names import Qos
 from app.panel.widgets.parameter import DESCRIBE, EVENTS, GET, SET
@@ -26,9 +26,9 @@ class TopicChecks:
     def __init__(
         self,
         report: Report,
-        behind: NamesBehindBridge,
+        behind: PanelNames,
         interfaces: Interfaces,
-        earlier: NamesBehindBridge | None = None,
+        earlier: PanelNames | None = None,
     ) -> None:
         """`earlier` is what was there some seconds before: a bridge announces a new publisher late."""
         self._report = report

@@ -1,11 +1,12 @@
 """The protocol of a dialect: how the names of a robot's ROS graph are written in Zenoh."""
 
 from collections.abc import Iterable
-from typing import Literal, Protocol
+from typing import Final, Literal, Protocol
 
 from app.dialect.endpoint import Endpoint, OwnEndpoint
 
 DialectName = Literal["bridge"]
+DEFAULT_DIALECT: Final[DialectName] = "bridge"  # where the panel file does not say
 
 
 class Dialect(Protocol):

@@ -12,8 +12,8 @@ from app.dialect.dialect import DialectName
 class PeerSentences:
     """The sentences that are about a kind of peer: codes of the catalogue (`app.i18n`).
 
-    Those of locks are the codes of their verdicts too. Of the others, "" is for a kind of peer that
-    needs none.
+    Those of locks are the codes of their verdicts too. `absent` and `silent` are also the codes of the
+    doctor's findings.
     """
 
     lamp: str  # the name of the lamp for the link to the peer
@@ -55,6 +55,10 @@ class PeerTraits:
     token_delay_s: float
     token_delay_single_s: float  # where no other publisher can have sent the message
     token_delay_latched_s: float  # of a TRANSIENT_LOCAL publisher
+    # For commands on a terminal, in English.
+    title: str
+    start_hint: str  # what to do if there is none
+    elsewhere_hint: str  # more to do if it is on another machine; "" for none
     sentences: PeerSentences
 
 
@@ -69,6 +73,11 @@ BRIDGE_TRAITS: Final = PeerTraits(
     token_delay_s=0.5,
     token_delay_single_s=4.0,
     token_delay_latched_s=5.0,
+    title="bridge to ROS 2",
+    start_hint="start zenoh-bridge-ros2dds on the robot, or name its place with --connect"
+    " tcp/HOST:7447",
+    elsewhere_hint=". As shipped, the bridge accepts connections from its own machine only: put this"
+    " address into `listen` of its file",
     sentences=PeerSentences(
         lamp="bridge",
         unreachable="no_link",

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from app.dialect.dialect import DialectName
+from app.dialect.dialect import DEFAULT_DIALECT, DialectName
 from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
@@ -79,7 +79,7 @@ class RobotEntry(Description):
     @property
     def dialect(self) -> DialectName:
         """By which dialect the robot is reached."""
-        return "bridge"
+        return DEFAULT_DIALECT
 
 
 Kind = TypeVar("Kind", bound=BaseWidget)
@@ -123,7 +123,7 @@ class Panel(Description):
     @property
     def dialect(self) -> DialectName:
         """By which dialect the robot is reached if it is the only one."""
-        return "bridge"
+        return DEFAULT_DIALECT
 
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:

@@ -1,1 +1,1 @@
-"""A survey of robots: the ROS graph of each at one moment, as their bridges report it."""
+"""A survey of robots: the ROS graph of each at one moment, as their peers report it."""

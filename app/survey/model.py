@@ -1,8 +1,9 @@
-"""Descriptions of bridges, nodes, topics, services, actions and parameters. Frozen; no I/O.
+"""Descriptions of nodes, topics, services and actions, and of bridges if there are some. Frozen.
 
 Names are as on the robot ("/speed"). A bridge may put its namespace before them, that is
 `RobotGraph.namespace`, "" for none. A `key` is the name behind that namespace without its first slash
-("robot1/speed").
+("robot1/speed"). The fields `bridge` are the ids of bridges; of a robot that is reached without one,
+those of its nodes' Zenoh sessions.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -195,7 +196,8 @@ Entry = TypeVar("Entry", bound=_Named)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotGraph:
-    """The part of a graph behind the bridges of one namespace. Each list is sorted by name."""
+    """What is on one robot: all that is behind the bridges of one namespace, or that is reached without
+    a bridge. `bridges` and `routes` are empty for a robot without one. Each list is sorted by name."""
 
     namespace: str = ""
     bridges: tuple[Bridge, ...] = ()
@@ -204,6 +206,11 @@ class RobotGraph:
     services: tuple[Server, ...] = ()
     actions: tuple[Server, ...] = ()
     routes: tuple[BridgeRoute, ...] = ()
+
+    @property
+    def answers(self) -> bool:
+        """False if it is behind bridges of which none answers."""
+        return not self.bridges or any(bridge.answers for bridge in self.bridges)
 
     def topic(self, name: str) -> Topic | None:
         return find(self.topics, name)
@@ -234,6 +241,11 @@ class GraphSnapshot:
     @property
     def bridges(self) -> tuple[Bridge, ...]:
         return tuple(bridge for robot in self.robots for bridge in robot.bridges)
+
+    def silent_since(self, earlier: "GraphSnapshot") -> list[str]:
+        """The ids of the bridges that answered for an earlier graph and not for this one."""
+        answering = {bridge.zid for bridge in self.bridges if bridge.answers}
+        return sorted({bridge.zid for bridge in earlier.bridges if bridge.answers} - answering)
 
     def robot(self, namespace: str) -> RobotGraph | None:
         """The robot whose bridges have this namespace ("" for none)."""

@@ -19,29 +19,24 @@ POLL_S: Final = 0.02
 MOST_VERSION: Final = 40  # characters
 
 
-async def first_graph(link: GraphLink, zid: str) -> GraphSnapshot:
-    """`read_graph` in a new session: a router announces the bridges some time after the connection.
-    Without a bridge this takes `ANNOUNCED_WITHIN_S`."""
-    return await _read_until(link, zid, lambda graph: bool(graph.bridges), ANNOUNCED_WITHIN_S)
+async def observe_bridges(
+    link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
+) -> GraphSnapshot:
+    """The `Observe` of robots behind bridges.
 
-
-async def later_graph(link: GraphLink, zid: str, earlier: GraphSnapshot) -> GraphSnapshot:
-    """`read_graph` again. A bridge that answered earlier has `ANSWERED_WITHIN_S` to answer again and to
-    announce what it still has: on a busy machine it stalls for seconds and loses its link."""
+    In a new session, a router announces the bridges some time after the connection: without a bridge
+    it takes `ANNOUNCED_WITHIN_S`. A bridge that answered for the `earlier` graph has
+    `ANSWERED_WITHIN_S` to answer again and to announce what it still has: on a busy machine it stalls
+    for seconds and loses its link.
+    """
 
     def is_whole(graph: GraphSnapshot) -> bool:
-        return not silent(earlier, graph) and not _unannounced(earlier, graph)
+        if earlier is None:
+            return bool(graph.bridges)
+        return not graph.silent_since(earlier) and not _unannounced(earlier, graph)
 
-    return await _read_until(link, zid, is_whole, ANSWERED_WITHIN_S)
-
-
-def silent(earlier: GraphSnapshot, graph: GraphSnapshot) -> list[str]:
-    """The ids of the bridges that answered for the earlier graph and not for this one."""
-    return sorted({one.zid for one in earlier.bridges if one.answers} - _answering(graph))
-
-
-def _answering(graph: GraphSnapshot) -> set[str]:
-    return {one.zid for one in graph.bridges if one.answers}
+    within_s = ANNOUNCED_WITHIN_S if earlier is None else ANSWERED_WITHIN_S
+    return await _read_until(link, zid, is_whole, within_s)
 
 
 def _unannounced(earlier: GraphSnapshot, graph: GraphSnapshot) -> set[str]:

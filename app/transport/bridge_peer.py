@@ -7,6 +7,7 @@ from typing import Final
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.peer_traits import BRIDGE_TRAITS
 from app.ros_logging import RobotLog
+from app.transport.bridge_graph_reader import observe_bridges
 from app.transport.bridge_join import GraphMembership
 from app.transport.bridge_liveness import BridgeLiveness
 from app.transport.peer import RobotAccess, RobotContext
@@ -54,4 +55,4 @@ class BridgePeer:
         return await self._readiness.answers()
 
 
-BRIDGE: Final = RobotAccess(BridgeDialect(), BRIDGE_TRAITS, BridgePeer)
+BRIDGE: Final = RobotAccess(BridgeDialect(), BRIDGE_TRAITS, BridgePeer, observe_bridges)

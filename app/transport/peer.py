@@ -9,6 +9,8 @@ from app.dialect.peer_traits import PeerTraits
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.survey.model import GraphSnapshot
+from app.transport.admin_space import GraphLink
 from app.transport.robot_signals import RobotSignals
 from app.transport.zenoh_session import ZenohSession
 
@@ -45,6 +47,19 @@ class Peer(Protocol):
         """Whether it answers a query now. Takes a second at most."""
 
 
+class Observe(Protocol):
+    """Reads what is on the robots of a link, without a panel: nodes, topics, services and actions with
+    their types. What only this kind of peer has, such as bridges and their routes, is in fields that
+    are empty otherwise."""
+
+    async def __call__(
+        self, link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
+    ) -> GraphSnapshot:
+        """The graph now; `zid` is that of the link's session. Waits, for some seconds at most, until a
+        robot is there; with an `earlier` graph, until the peers that were in it have answered again.
+        Empty without a robot. LinkError without a link."""
+
+
 @dataclass(frozen=True)
 class RobotContext:
     """One robot of a panel, the link to it, and what its parts signal to each other."""
@@ -58,8 +73,9 @@ class RobotContext:
 
 @dataclass(frozen=True, slots=True)
 class RobotAccess:
-    """How a kind of robot is reached."""
+    """How a kind of robot is reached: `peer` makes the peer of one robot of a panel."""
 
     dialect: Dialect
     traits: PeerTraits
     peer: Callable[[RobotContext], Peer]
+    observe: Observe

@@ -18,7 +18,8 @@ from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
 from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
 from app.survey.model import GraphSnapshot, Node
 from app.survey.node_services import NodeParameter, NodeServices
-from app.transport.bridge_observer import CONNECT_S, BridgeObserver
+from app.transport.bridge_peer import BRIDGE
+from app.transport.robot_observer import CONNECT_S, RobotObserver
 from app.transport.zenoh_config import Config, config_to
 from tests.support.cyclone import NODE, CycloneRobot
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, live, until
@@ -29,9 +30,9 @@ BOOL = "std_msgs/msg/Bool"
 
 
 @asynccontextmanager
-async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterator[BridgeObserver]:
+async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterator[RobotObserver]:
     """A connected observer, closed at the end."""
-    observer = BridgeObserver(config)
+    observer = RobotObserver(config, BRIDGE)
     try:
         await observer.connect(within_s)
         yield observer
@@ -42,7 +43,7 @@ async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterato
 def graph_at(endpoint: str) -> GraphSnapshot:
     async def read() -> GraphSnapshot:
         async with observing(config_to(endpoint)) as observer:
-            return await observer.graph()
+            return await observer.observe()
 
     return asyncio.run(read())
 
@@ -261,7 +262,7 @@ def test_a_listener_holds_a_route_only_where_it_is_to(
             own = OwnEndpoint("MS", topic.key, BOOL, Qos(transient_local=True))
             async for _, sample in observer.listen([own], hold=hold):
                 async with observing(config_to(own_bridge.endpoint)) as other:
-                    (found,) = (await other.graph()).robots
+                    (found,) = (await other.observe()).robots
                 used = [r for r in found.routes if r.key == "heard" and r.direction == "pub"]
                 return bytes(sample.payload), used[0].remote
         raise AssertionError("it ended")

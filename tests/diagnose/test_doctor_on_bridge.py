@@ -17,7 +17,8 @@ import zenoh
 from app.cli.command import main
 from app.cli.doctor import as_text
 from app.diagnose import link
-from app.diagnose.observation import Observation, observe
+from app.diagnose.received import ReceivedSamples, receive
+from app.dialect.dialect import Dialect
 from app.transport import bridge_graph_reader
 from app.transport.inbox import Changes
 from app.transport.zenoh_session import ZenohSession
@@ -194,11 +195,15 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
 ]
 
 
-async def observe_all(
-    session: ZenohSession, topics: Mapping[str, str], _: Iterable[str], longest_s: float
-) -> Observation:
+async def receive_all(
+    session: ZenohSession,
+    dialect: Dialect,
+    topics: Mapping[str, str],
+    _: Iterable[str],
+    longest_s: float,
+) -> ReceivedSamples:
     """Waits for messages on every topic."""
-    return await observe(session, topics, topics, longest_s)
+    return await receive(session, dialect, topics, topics, longest_s)
 
 
 @pytest.mark.parametrize(("text", "expected"), [b[1:] for b in BROKEN], ids=[b[0] for b in BROKEN])
@@ -215,7 +220,7 @@ def test_what_is_broken_is_named_and_nothing_else(
         listen_s = LONGEST_S
     elif expected[0][0] in {"clock_differs", "simulated_time"}:
         listen_s = ENOUGH_S
-        monkeypatch.setattr("app.diagnose.robot.observe", observe_all)
+        monkeypatch.setattr("app.diagnose.robot.receive", receive_all)
     found = setup.findings(text, shared.endpoint, listen_s)
     assert named(found) == expected
     assert all(one.what and one.do for one in found)
@@ -242,9 +247,7 @@ def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
         return changes
 
     monkeypatch.setattr(ZenohSession, "drain", drained)
-    monkeypatch.setattr(
-        "app.diagnose.observation.ENOUGH", 1000
-    )  # it waits for the end of the publisher
+    monkeypatch.setattr("app.diagnose.received.ENOUGH", 1000)  # it waits for the end of the publisher
     with ThreadPoolExecutor() as pool:
         published = pool.submit(publish_and_go, robot, "/hasty", BOOL, {"data": True}, heard.is_set)
         found = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
@@ -339,13 +342,13 @@ def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
 ) -> None:
     thaw = threading.Timer(frozen_s, shared.thaw)
 
-    async def observed(*arguments: Any) -> Observation:
-        found = await observe(*arguments)
+    async def received(*arguments: Any) -> ReceivedSamples:
+        found = await receive(*arguments)
         shared.freeze()
         thaw.start()
         return found
 
-    monkeypatch.setattr("app.diagnose.robot.observe", observed)
+    monkeypatch.setattr("app.diagnose.robot.receive", received)
     text = panel_of(call("/system_controller/list_parameters", LIST_PARAMETERS))
     try:
         found = setup.findings(text, shared.endpoint, listen_s=0.2)

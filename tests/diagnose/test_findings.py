@@ -8,7 +8,8 @@ import pytest
 
 from app.cli.doctor import as_text
 from app.diagnose.findings import KINDS, MOST_ALIKE, MOST_TEXT, Report
-from app.diagnose.observation import copies
+from app.diagnose.received import copies
+from app.dialect.peer_traits import EVERY_SENTENCES
 from app.robot.sample import Sample
 from app.settings import PACKAGE
 from tests.support.parts import TESTS
@@ -22,6 +23,7 @@ TESTED: Final = "".join(path.read_text() for path in (TESTS / "diagnose").glob("
 def test_each_finding_is_made_by_a_check(code: str) -> None:
     made = set(re.findall(r'"([a-z_]+)"', CODE)) | {"service_type", "service_absent"}
     made |= {"action_type", "action_absent"}  # of f"{what}_type" and f"{what}_absent"
+    made |= {code for sentences in EVERY_SENTENCES for code in (sentences.absent, sentences.silent)}
     assert code in made
 
 

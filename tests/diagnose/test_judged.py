@@ -12,12 +12,12 @@ import pytest
 
 from app.cli.doctor import as_text
 from app.diagnose import link
-from app.diagnose.bridges import check_bridges
+from app.diagnose.bridges import check_graph
 from app.diagnose.clocks import check_clocks
 from app.diagnose.findings import Report
-from app.diagnose.names import NamesBehindBridge, PanelRobot
-from app.diagnose.observation import Observation
+from app.diagnose.names import PanelNames, PanelRobot
 from app.diagnose.permissions import check_permissions
+from app.diagnose.received import ReceivedSamples
 from app.diagnose.robot import check_copies
 from app.diagnose.topics import TopicChecks
 from app.interfaces import load_interfaces
@@ -69,9 +69,7 @@ def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> Topic:
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
     report = Report()
-    behind = NamesBehindBridge.of(
-        robot, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), **graph),))
-    )
+    behind = PanelNames.of(robot, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
     TopicChecks(report, behind, INTERFACES).check()
     return report
 
@@ -107,12 +105,10 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(readout("/words")))
     lost = replace(topic("/words"), announced=False)
     assert judged(here, topics=(lost,)).codes() == ["topic_unrouted"]
-    new = NamesBehindBridge.of(
-        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
-    )
+    new = PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
     report, before = (
         Report(),
-        NamesBehindBridge.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,)),))),
+        PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,)),))),
     )
     TopicChecks(report, new, INTERFACES, before).check()
     assert report.codes() == []
@@ -138,18 +134,16 @@ def test_servers_that_the_bridge_has_lost_or_denies(
     bridge = replace(BRIDGE, config=config)
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), nodes=(node,)),))
     report = Report()
-    TopicChecks(report, NamesBehindBridge.of(here, graph), INTERFACES).check()
+    TopicChecks(report, PanelNames.of(here, graph), INTERFACES).check()
     assert named(report.findings) == [(code, "/home"), (code, "/count"), (code, PARAMETERS[0])]
 
 
 def test_a_permission_that_the_bridge_has_lost_is_not_called_stale(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(interlock("/permission", max_age_s=1.0)))
     lost = replace(topic("/permission", BOOL), announced=False)
-    behind = NamesBehindBridge.of(
-        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
-    )
+    behind = PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
     report = Report()
-    check_permissions(report, behind, Observation(began=0.0, ended=5.0), INTERFACES)
+    check_permissions(report, behind, ReceivedSamples(began=0.0, ended=5.0), INTERFACES)
     TopicChecks(report, behind, INTERFACES).check()
     assert named(report.findings) == [("topic_unrouted", "/permission")]
 
@@ -181,7 +175,7 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
     bridged = RobotGraph(namespace="/robot1", bridges=(BRIDGE,), topics=(topic("/words"),))
     other = RobotGraph(namespace="/robot2", bridges=(BRIDGE,), topics=(topic("/words", BOOL),))
     report = Report()
-    behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
+    behind = PanelNames.of(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
     TopicChecks(report, behind, INTERFACES).check()
     assert report.codes() == []
 
@@ -201,7 +195,7 @@ def test_names_outside_of_the_namespace_and_the_nodes_log_are_found(tmp_path: Pa
     own = RobotGraph(namespace="/amr", bridges=(BRIDGE,), topics=(topic("/rosout", LOG_TYPE),))
     cell = RobotGraph(namespace="/cell", bridges=(BRIDGE,), topics=(topic("/words"),))
     report = Report()
-    behind = NamesBehindBridge.of(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
+    behind = PanelNames.of(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
     TopicChecks(report, behind, INTERFACES).check()
     assert named(report.findings) == []
 
@@ -219,8 +213,8 @@ def test_a_bridge_that_reaches_no_node(config: dict[str, Any], code: str, tmp_pa
     bridge = replace(BRIDGE, config={**BRIDGE.config, **config})
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,)),))
     report = Report()
-    behind = NamesBehindBridge.of(robot(tmp_path, panel_of(readout("/words"))), graph)
-    check_bridges(report, graph, behind, ["tcp/127.0.0.1:7447"])
+    behind = PanelNames.of(robot(tmp_path, panel_of(readout("/words"))), graph)
+    check_graph(report, graph, behind)
     assert [one.code for one in report.findings] == [code]
     assert ("CYCLONEDDS_URI" in as_text(report)) is (code == "bridge_localhost")
 
@@ -243,9 +237,9 @@ def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> Non
     assert denies([Bridge(zid="b1", config=config)], "publishers", "/words") is expected
 
 
-def observed(*samples: tuple[float, float | None]) -> Observation:
+def observed(*samples: tuple[float, float | None]) -> ReceivedSamples:
     """Of /words: (when it came, by the sender's clock)."""
-    found = Observation(began=0.0, ended=3.0)
+    found = ReceivedSamples(began=0.0, ended=3.0)
     found.samples["words"] = [Sample(SENT, 0, at, at, "b1", sent=sent) for at, sent in samples]
     return found
 
@@ -314,9 +308,9 @@ def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: 
     lock = interlock("/joints", type=state, field="position[name=lift]", max=0.5)
     here = robot(tmp_path, panel_of(lock, button("/go")))
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(topic("/joints", state),)),))
-    behind = NamesBehindBridge.of(here, graph)
+    behind = PanelNames.of(here, graph)
     for lift, codes in ((0.25, []), (0.75, ["permission_refused"])):
-        report, observed = Report(), Observation()
+        report, observed = Report(), ReceivedSamples()
         for name, position in (("lift", lift), ("finger", 0.9)):
             payload = INTERFACES.encode(state, {"name": [name], "position": [position]})
             observed.samples["joints"].append(Sample(payload, 1, 0.0, 0.0, "b1"))
@@ -345,6 +339,6 @@ def test_the_publishers_of_a_permission_are_named_if_there_are_several(
     known = (Topic(name="/permit", key="permit", publishers=ends),)
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
     report = Report()
-    check_permissions(report, NamesBehindBridge.of(here, graph), Observation(), INTERFACES)
+    check_permissions(report, PanelNames.of(here, graph), ReceivedSamples(), INTERFACES)
     found = [one.details["nodes"] for one in report.findings if one.code == "permission_publishers"]
     assert found == ([] if nodes is None else [nodes])

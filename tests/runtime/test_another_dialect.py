@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
@@ -12,6 +13,12 @@ import zenoh
 from zenoh.handlers import Callback
 
 from app.audit import NullLog
+from app.cli.robot.link import GONE
+from app.cli.robot.scaffold import main as scaffold
+from app.cli.robot.topics import main as topics
+from app.diagnose.findings import Report
+from app.diagnose.names import PanelRobot
+from app.diagnose.robot import check_robot
 from app.dialect.dialect import DialectName
 from app.dialect.endpoint import Endpoint, OwnEndpoint, Role
 from app.dialect.peer_traits import BRIDGE_TRAITS, PEER_TRAITS
@@ -19,6 +26,16 @@ from app.i18n import say
 from app.interfaces.names import Qos
 from app.runtime.fleet import Fleet
 from app.runtime.robot_access import ROBOT_ACCESS
+from app.survey.model import (
+    EndpointQos,
+    GraphSnapshot,
+    Node,
+    RobotGraph,
+    Server,
+    Topic,
+    TopicEndpoint,
+)
+from app.transport.admin_space import GraphLink
 from app.transport.peer import RobotAccess, RobotContext
 from app.transport.zenoh_config import config_to
 from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFACES, MESSAGE, panel_of
@@ -103,6 +120,33 @@ class TinyPeer:
         return True
 
 
+async def observe_tiny(
+    link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
+) -> GraphSnapshot:
+    """One robot, of all nodes on the link."""
+    tokens = await link.tokens()
+    found = [e for e in map(TinyDialect().endpoint, tokens) if e is not None and e.zid != zid]
+    names = [token.rpartition("/")[2] for token in tokens if "/node/" in token]
+    nodes = [Node(name=f"/{name}", bridge="") for name in sorted(names)]
+    topics = [
+        Topic(
+            name=f"/{e.key}",
+            key=e.key,
+            publishers=(TopicEndpoint(type=e.type, qos=EndpointQos(), bridge=e.zid),),
+        )
+        for e in found
+        if e.role == "MP"
+    ]
+    servers = [
+        Server(name=f"/{e.key}", key=e.key, type=e.type, bridge=e.zid) for e in found if e.role == "SS"
+    ]
+    robot = RobotGraph(nodes=tuple(nodes), topics=tuple(topics), services=tuple(servers))
+    return GraphSnapshot(robots=(robot,) if nodes else ())
+
+
+TINY = RobotAccess(TinyDialect(), TINY_TRAITS, TinyPeer, observe_tiny)
+
+
 class TinyRobot:
     """A node on Zenoh that permits, listens to `/go` and serves `/reset`."""
 
@@ -171,7 +215,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
     """Seen, joined, heard, commanded and called, with not one of the bridge's key expressions."""
     endpoint, there = peer
     robot = TinyRobot(there)
-    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, RobotAccess(TinyDialect(), TINY_TRAITS, TinyPeer))
+    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, TINY)
 
     async def scene() -> None:
         fleet = Fleet(PANEL, lambda _: config_to(endpoint), "r1", NullLog())
@@ -217,3 +261,31 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
         await one.stop()
 
     asyncio.run(scene())
+
+
+def test_commands_and_the_doctor_read_what_is_on_a_robot_without_a_bridge(
+    peer: tuple[str, zenoh.Session],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    endpoint, there = peer
+    monkeypatch.setitem(ROBOT_ACCESS, PANEL.dialect, TINY)
+    assert topics(["--connect", endpoint]) == GONE
+    assert f"no {TINY_TRAITS.title} is there: {TINY_TRAITS.start_hint}" in capsys.readouterr().err
+    robot = TinyRobot(there)
+    robot.appear()
+    assert topics(["--connect", endpoint, "-t"]) == 0
+    assert capsys.readouterr().out == f"/operation_enabled [{BOOL}]\n"
+    panel = tmp_path / "cell.toml"
+    assert scaffold(["--connect", endpoint, "--listen", "0.1", "-o", str(panel)]) == 0
+    assert ENABLED in panel.read_text()
+
+    zenoh_file = tmp_path / "zenoh.json5"
+    zenoh_file.write_text(f'{{ mode: "client", connect: {{ endpoints: ["{endpoint}"] }} }}')
+    report = Report()
+    graph = asyncio.run(check_robot(report, PanelRobot(PANEL), zenoh_file, 0.2))
+    assert graph is not None
+    assert [node.name for node in graph.robots[0].nodes] == ["/arm", "/gripper"]
+    assert "the robot has nodes: 2, and topics: 1" in report.facts
+    assert not [code for code in report.codes() if code.startswith("bridge")]

@@ -36,7 +36,7 @@ from tests.support.builders import (
 SAMPLES = 5_000
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.5}
 PANEL = panel_of(SPEED, JOG, ARM, MESSAGE, {**FREE, "confirm": CONFIRM}, HEARD)
-ACCESS = RobotAccess(BRIDGES.dialect, BRIDGES.traits, TinyPeer)
+ACCESS = RobotAccess(BRIDGES.dialect, BRIDGES.traits, TinyPeer, BRIDGES.observe)
 
 
 class Cell:

@@ -15,30 +15,26 @@ from typing import Any, Final
 
 from app.cli.arguments import seconds
 from app.diagnose.findings import Finding, few
+from app.dialect.dialect import DEFAULT_DIALECT, DialectName
 from app.dialect.endpoint import within
 from app.errors import KioskError, LinkError
 from app.interfaces import DISTROS
 from app.interfaces.names import GLOBAL, NAMESPACE
 from app.panel import load_panel
+from app.runtime.robot_access import ROBOT_ACCESS
 from app.settings import LOOPBACK_HOSTS, Settings
 from app.survey.model import GraphSnapshot, RobotGraph, Topic, near
-from app.transport.bridge_observer import CONNECT_S, BridgeObserver
+from app.transport.robot_observer import CONNECT_S, RobotObserver
 from app.transport.zenoh_config import config_from
 
 GONE, USAGE = 1, 2
 DEFAULT_DISTRO: Final = "jazzy"
-BRIDGE_HINT: Final = (
-    "start zenoh-bridge-ros2dds on the robot, or name its place with --connect tcp/HOST:7447"
-)
-ELSEWHERE_HINT: Final = (
-    ". As shipped, the bridge accepts connections from its own machine only: put this address into"
-    " `listen` of its file"
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where to look, by the command line: `namespace` is "" for all robots. `robots` are the namespaces
+    """Where to look, by the command line: `namespace` is "" for all robots. `dialect` is that of all of
+    them. `robots` are the namespaces
     of the panel's robots, and `bridges` how many bridges they have at least; 0: one an endpoint."""
 
     zenoh: Path
@@ -49,6 +45,7 @@ class Place:
     distro: str = DEFAULT_DISTRO
     interfaces: tuple[Path, ...] = ()
     within_s: float = CONNECT_S
+    dialect: DialectName = DEFAULT_DIALECT
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -104,10 +101,11 @@ def place_of(given: Any) -> Place:
     connect, named = tuple(given.connect or ()), given.namespace
     distro, folders = given.distro, tuple(given.interfaces or ())
     namespaces: tuple[str, ...] = ()
-    bridges = 0
+    bridges, dialect = 0, DEFAULT_DIALECT
     if given.panel is not None:
         panel = load_panel(given.panel)
         robots = panel.robots
+        dialect = robots[0].dialect if robots else panel.dialect
         if not connect:
             connect = tuple(dict.fromkeys(e for robot in robots for e in robot.connect))
             bridges = len({robot.connect for robot in robots if robot.connect})
@@ -124,6 +122,7 @@ def place_of(given: Any) -> Place:
         distro=distro or DEFAULT_DISTRO,
         interfaces=tuple(folders),
         within_s=given.wait,
+        dialect=dialect,
     )
 
 
@@ -133,20 +132,22 @@ def _is_elsewhere(endpoint: str) -> bool:
 
 
 @asynccontextmanager
-async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, GraphSnapshot]]:
+async def opened(place: Place) -> AsyncIterator[tuple[RobotObserver, GraphSnapshot]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
-    observer = BridgeObserver(config_from(place.zenoh, place.connect))
+    access = ROBOT_ACCESS[place.dialect]
+    observer, traits = RobotObserver(config_from(place.zenoh, place.connect), access), access.traits
     try:
         try:
             await observer.connect(place.within_s)
         except LinkError as error:
-            elsewhere = ELSEWHERE_HINT if any(map(_is_elsewhere, observer.endpoints)) else ""
-            raise LinkError(f"{error}: {BRIDGE_HINT}{elsewhere}") from error
-        graph = await observer.graph()
+            elsewhere = traits.elsewhere_hint if any(map(_is_elsewhere, observer.endpoints)) else ""
+            raise LinkError(f"{error}: {traits.start_hint}{elsewhere}") from error
+        graph = await observer.observe()
         where = ", ".join(observer.endpoints)
-        if not graph.bridges:
-            raise LinkError(f"Zenoh answers at {where}, but no bridge to ROS 2 is there: {BRIDGE_HINT}")
-        if not any(bridge.answers for bridge in graph.bridges):
+        if not graph.robots:
+            hint = traits.start_hint
+            raise LinkError(f"Zenoh answers at {where}, but no {traits.title} is there: {hint}")
+        if not any(robot.answers for robot in graph.robots):
             raise LinkError(f"the bridge at {where} does not answer: it hangs; restart it")
         yield observer, graph
     finally:
@@ -156,6 +157,8 @@ async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, GraphSnaps
 def nothing_there(robots: Sequence[RobotGraph], below: str) -> str:
     """The sentence about a domain without nodes."""
     where = f" below {below}" if below else ""
+    if not any(robot.bridges for robot in robots):
+        return f"there is no topic{where}: start the robot's nodes"
     domains = few(sorted({str(bridge.domain) for robot in robots for bridge in robot.bridges}))
     return (
         f"the bridge sees no topic{where} in domain {domains}: start the robot's nodes, and set"
@@ -164,8 +167,8 @@ def nothing_there(robots: Sequence[RobotGraph], below: str) -> str:
 
 
 def absent_robots(graph: GraphSnapshot, place: Place) -> list[str]:
-    """The namespaces of the panel's robots without a bridge that answers."""
-    there = [one.namespace for one in graph.robots if any(bridge.answers for bridge in one.bridges)]
+    """The namespaces of the panel's robots that are not in the graph, or do not answer."""
+    there = [robot.namespace for robot in graph.robots if robot.answers]
     return [name for name in place.robots if not any(within(name, outer) for outer in there)]
 
 
@@ -189,7 +192,7 @@ def check_namespace(graph: GraphSnapshot, below: str) -> None:
     if below and not shown_topics(graph, below):
         robots = [robot.namespace for robot in graph.robots if robot.namespace]
         hint = f": the bridges have {few(robots)}" if robots else ": no bridge has a namespace"
-        raise LinkError(f"there are no topics below {below}{hint}")
+        raise LinkError(f"there are no topics below {below}{hint if graph.bridges else ''}")
 
 
 def report_lost(names: Sequence[str], code: str = "topic_unrouted") -> int:

@@ -23,8 +23,8 @@ from app.cli.robot.link import (
     place_of,
     report_lost,
 )
+from app.cli.robot.scaffold_input import read_scaffold_input, robot_at, usable
 from app.cli.robot.settled_graph import settled_graph
-from app.cli.robot.survey import robot_at, survey, usable
 from app.diagnose.findings import few
 from app.errors import KioskError
 from app.interfaces import load_interfaces
@@ -65,7 +65,7 @@ async def _scaffold(given: Any) -> int:
         if not graph.robots:
             raise ScaffoldError("no bridge has a namespace of ROS 2: correct `namespace` in its file")
         robot, below = robot_at(graph, place.namespace)
-        known = await survey(observer, robot, below, interfaces, given.listen)
+        known = await read_scaffold_input(observer, robot, below, interfaces, given.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
         raise ScaffoldError(nothing_there([robot], f"{robot.namespace}{below}"))
     base = _base(place, graph, f"{robot.namespace}{below}", target)

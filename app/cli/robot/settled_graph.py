@@ -1,4 +1,4 @@
-"""The graph of robots whose bridges, or whose nodes, may have started just now.
+"""The graph of robots whose peers, or whose nodes, may have started just now.
 
 A bridge knows a topic some time before it announces it, nodes are discovered one after the other, and
 of several bridges one may be connected before the others.
@@ -20,7 +20,7 @@ class GraphReader(Protocol):
     @property
     def endpoints(self) -> Sequence[str]: ...
 
-    async def graph(self) -> GraphSnapshot: ...
+    async def observe(self) -> GraphSnapshot: ...
 
 
 async def settled_graph(
@@ -40,7 +40,7 @@ async def settled_graph(
     before, now = first, first
     while not is_enough(now) and clock() < end:
         await asyncio.sleep(every_s)
-        before, now = now, await reader.graph()
+        before, now = now, await reader.observe()
         if _topics(now) and _topics(now) == _topics(before) and _is_whole(now, place, bridges):
             break
     return now
@@ -52,7 +52,7 @@ def _topics(graph: GraphSnapshot) -> set[str]:
 
 def _is_whole(graph: GraphSnapshot, place: Place, bridges: int) -> bool:
     return (
-        sum(one.answers for one in graph.bridges) >= bridges
+        (not graph.bridges or sum(bridge.answers for bridge in graph.bridges) >= bridges)
         and not absent_robots(graph, place)
         and not any(any(lost_topics(robot)) for robot in graph.robots)
     )

@@ -17,7 +17,7 @@ from app.robot.sample import Sample
 from app.survey.forwarding import topic_forwarding
 from app.survey.model import GraphSnapshot, RobotGraph, Topic
 from app.survey.node_services import NodeServices
-from app.transport.bridge_observer import BridgeObserver
+from app.transport.robot_observer import RobotObserver
 
 DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost
 HOW: Final = "give the folder of its package with --interfaces (a workspace's install/, or its source)"
@@ -34,7 +34,7 @@ def endpoint_for(topic: Topic, type_name: str) -> OwnEndpoint:
 class TopicReader:
     """A topic that is there, with its one type."""
 
-    observer: BridgeObserver
+    observer: RobotObserver
     robot: RobotGraph
     topic: Topic
     type: str
@@ -42,7 +42,7 @@ class TopicReader:
     @classmethod
     async def find(
         cls,
-        observer: BridgeObserver,
+        observer: RobotObserver,
         graph: GraphSnapshot,
         place: Place,
         name: str,

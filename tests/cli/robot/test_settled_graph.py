@@ -24,7 +24,7 @@ class Reader:
         self.read = 0
         self.endpoints = ("tcp/127.0.0.1:7447",)
 
-    async def graph(self) -> GraphSnapshot:
+    async def observe(self) -> GraphSnapshot:
         self.read += 1
         return self._graphs.pop(0) if len(self._graphs) > 1 else self._graphs[0]
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.cli.robot.scaffold import _base
-from app.cli.robot.survey import MOST_ROBOTS, Heard, survey, usable
+from app.cli.robot.scaffold_input import MOST_ROBOTS, Heard, read_scaffold_input, usable
 from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
 from tests.cli.robot.test_link import place_below
 from tests.support.builders import INTERFACES
@@ -49,7 +49,7 @@ def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
     )
     robot = RobotGraph(bridges=(Bridge(zid="a", version="v1", config={}),), topics=topics)
     observer: Any = None  # nothing is listened to: no type is known
-    known = asyncio.run(survey(observer, robot, "/amr", INTERFACES, 0))
+    known = asyncio.run(read_scaffold_input(observer, robot, "/amr", INTERFACES, 0))
     assert [one.name for one in known.topics] == ["/speed", "//diagnostics", "/rosout"]
     assert [one.key for one in known.topics] == ["amr/speed", "diagnostics", "rosout"]
 

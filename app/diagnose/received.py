@@ -1,4 +1,4 @@
-"""Observes a robot's topics for some seconds: which samples are received, when, and how many copies."""
+"""Listens to a robot's topics for some seconds: which samples arrive, when, and how many copies."""
 
 import asyncio
 import time
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final
 
-from app.dialect import bridge_dialect
+from app.dialect.dialect import Dialect
 from app.robot.sample import Sample
 from app.transport.declarations import Declarations
 from app.transport.inbox import Changes
@@ -22,7 +22,7 @@ APART: Final = 3  # times `COPIES_WITHIN_S`: the least time between messages tha
 
 
 @dataclass(slots=True)
-class Observation:
+class ReceivedSamples:
     """The samples received on each topic within `window_s`, by key. `began` and `ended` are in
     monotonic seconds. `lost` are the keys of topics whose publisher ended."""
 
@@ -45,37 +45,41 @@ class Observation:
         return max((b - a for a, b in pairwise([*times, self.ended])), default=self.window_s)
 
 
-async def observe(
-    session: ZenohSession, topics: Mapping[str, str], wanted: Iterable[str], longest_s: float
-) -> Observation:
+async def receive(
+    session: ZenohSession,
+    dialect: Dialect,
+    topics: Mapping[str, str],
+    wanted: Iterable[str],
+    longest_s: float,
+) -> ReceivedSamples:
     """Subscribes to the topics (key → key expression) until `ENOUGH` samples of each of `wanted` have
     been received, `longest_s` at most."""
-    found = Observation(began=time.monotonic())
+    received = ReceivedSamples(began=time.monotonic())
     session.start(Declarations(subscribe=topics, recorded=topics.keys()))
     waited_for = set(wanted)
-    end = found.began + longest_s
+    end = received.began + longest_s
     while (now := time.monotonic()) < end:
         await asyncio.sleep(POLL_S)
         changes = session.drain()
         for key, sample in changes.kept:
-            found.samples[key].append(sample)
-        found.lost |= {key for key in map(_published, _lost(changes)) if key}
-        if now - found.began >= min(LEAST_S, longest_s):
-            heard = {key for key in waited_for if len(found.live(key)) >= ENOUGH}
-            waited_for -= heard | found.lost
+            received.samples[key].append(sample)
+        received.lost |= {key for token in _lost(changes) if (key := _published(dialect, token))}
+        if now - received.began >= min(LEAST_S, longest_s):
+            heard = {key for key in waited_for if len(received.live(key)) >= ENOUGH}
+            waited_for -= heard | received.lost
             if not waited_for:
                 break
-    found.ended = time.monotonic()
-    return found
+    received.ended = time.monotonic()
+    return received
 
 
 def _lost(changes: Changes) -> Iterable[str]:
     return (token for token, change in changes.tokens.items() if change.lost_seq)
 
 
-def _published(token: str) -> str:
+def _published(dialect: Dialect, token: str) -> str:
     """The key that a publisher's token is about; "" for any other token."""
-    endpoint = bridge_dialect.parsed(token)
+    endpoint = dialect.endpoint(token)
     return endpoint.key if endpoint is not None and endpoint.role == "MP" else ""
 
 

@@ -17,7 +17,7 @@ from app.scaffold.fields import shown_fields
 from app.survey.forwarding import lost_servers, lost_topics, topic_forwarding
 from app.survey.model import GraphSnapshot, RobotGraph, Server, Topic
 from app.survey.node_services import NodeParameter, NodeServices
-from app.transport.bridge_observer import BridgeObserver
+from app.transport.robot_observer import RobotObserver
 
 ARRIVALS: Final = 3  # of a topic, by which it is known how often it is published
 IRREGULAR: Final = 3.0  # the longest period of a regular topic, in its shortest one
@@ -43,8 +43,8 @@ def usable(graph: GraphSnapshot) -> GraphSnapshot:
     return replace(graph, robots=tuple(one for one in graph.robots if one in fullest))
 
 
-async def survey(
-    observer: BridgeObserver, robot: RobotGraph, below: str, interfaces: Interfaces, listen_s: float
+async def read_scaffold_input(
+    observer: RobotObserver, robot: RobotGraph, below: str, interfaces: Interfaces, listen_s: float
 ) -> Known:
     """What is on the robot, with names below the panel's namespace."""
     parameters, unreadable = await _parameters(NodeServices(robot, interfaces, observer), robot, below)
@@ -135,7 +135,7 @@ class Heard:
 
 
 async def _listen(
-    observer: BridgeObserver, topics: Sequence[Topic], interfaces: Interfaces, listen_s: float
+    observer: RobotObserver, topics: Sequence[Topic], interfaces: Interfaces, listen_s: float
 ) -> dict[str, Heard]:
     """What arrived on each topic that has a use, by the topic's name: until it is enough of all, or
     time is up."""

@@ -1,5 +1,4 @@
-"""A link that only reads: the ROS graph behind the bridges, service calls, topics. It publishes
-nothing.
+"""A link that only reads: what is on the robots, service calls, topics. It publishes nothing.
 
 For commands that run beside the panel server or without one.
 """
@@ -9,13 +8,12 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from typing import Final
 
-from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.robot.sample import Sample
 from app.survey.model import GraphSnapshot
-from app.transport.bridge_graph_reader import first_graph
 from app.transport.declarations import Declarations
+from app.transport.peer import RobotAccess
 from app.transport.zenoh_config import Config
 from app.transport.zenoh_session import ZenohSession
 
@@ -23,13 +21,14 @@ CONNECT_S: Final = 3.0
 CALL_S: Final = 2.0
 
 
-class BridgeObserver:
-    """One session of its own. Used on the event loop that it was opened on."""
+class RobotObserver:
+    """A session with robots of one kind. Used on the event loop that it was opened on."""
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, access: RobotAccess) -> None:
         self._loop = asyncio.get_running_loop()
         self._woken = asyncio.Event()
-        self._dialect = BridgeDialect()
+        self._access = access
+        self._dialect = access.dialect
         self._session = ZenohSession(config, self._wake, self._dialect)
 
     @property
@@ -48,13 +47,13 @@ class BridgeObserver:
             where = ", ".join(self.endpoints) or "any place that was found by scouting"
             raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
 
-    async def graph(self) -> GraphSnapshot:
-        """The graph now; LinkError without a link. Without a bridge it has no robots."""
-        return await first_graph(self._session, self.zid)
+    async def observe(self) -> GraphSnapshot:
+        """The graph now; LinkError without a link. It is empty if no robot is there."""
+        return await self._access.observe(self._session, self.zid)
 
     async def call(self, key: str, payload: bytes, timeout_s: float = CALL_S) -> bytes | None:
         """The response of a service that only reads; None for none in time. Only for a service that
-        the graph shows and that can be called: a query without an answer stays in the bridge."""
+        the graph shows and that can be called: a query without an answer may stay in the peer."""
         answer = self._session.query_at(self._dialect.service(key, ""), payload, timeout_s)
         await asyncio.wait({answer}, timeout=timeout_s + 1)
         return answer.result() if answer.done() else None
@@ -65,7 +64,7 @@ class BridgeObserver:
         """(key, sample) of each sample of these topics, beginning with those that latched publishers
         have kept. Call it once per observer. LinkError when the connection is lost.
 
-        `hold`: declares tokens, so that the bridge keeps its routes and each sample arrives once. Not
+        `hold`: declares tokens, so that a bridge keeps its routes and each sample arrives once. Not
         for a topic without a publisher: the token would fix the QoS of the route for a later publisher.
         """
         expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
