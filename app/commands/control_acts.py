@@ -18,7 +18,8 @@ from app.commands.press_context import PressGuard
 from app.commands.receipts import RECEIPTS_KEPT
 from app.errors import Cause, NotFound
 from app.i18n import TextLike, say
-from app.permission.control_authority import LIFE_S, ControlAuthority, HandOver
+from app.permission.control_authority import LIFE_S, ControlAuthority
+from app.permission.control_parties import HandOver
 from app.permission.press_permission import cause_of
 from app.permission.principal import Principal
 from app.robot.command_status import OutcomeCode

@@ -1,19 +1,20 @@
 """The single point of control (ISO 10218): one browser at a time may press for a robot.
 
-Pure, except for its clocks: acts and keepalives in, a verdict for each press out. A browser without a
-keepalive loses control, or its request for it; each call checks that first.
+Acts and keepalives in, a verdict for each press out. A browser without a keepalive loses control, or
+its request for it. Properties, `verdict` and `view` answer for the current time and write nothing.
+`advance` records what time has changed since the last call; acts and keepalives call it first.
 """
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
+from app.permission.control_parties import HandOver, Parties, Party, same_client
 from app.permission.principal import Principal
 from app.permission.verdict import PERMITTED, Verdict, locked
 
@@ -28,26 +29,6 @@ Refusal = Literal[
     "control_not_yours",
     "control_stranger",
 ]
-
-
-class HandOver(NamedTuple):
-    """A change of control that no act made: `who` had, took or requested control, `other` has it
-    now."""
-
-    how: Literal["lost", "idle", "first_page", "request_lost"]
-    who: Principal
-    other: Principal | None = None
-
-
-@dataclass(slots=True)
-class _Party:
-    """The holder or the requester. `since` is when the time to a takeover began, `scripted` whether its
-    page has sent a keepalive."""
-
-    who: Principal
-    since: float
-    alive_until: float
-    scripted: bool
 
 
 class ControlAuthority:
@@ -71,33 +52,29 @@ class ControlAuthority:
         self._wall = wall
         self._log_line = log_line
         self._on_hand_over = on_hand_over
-        self._holder: _Party | None = None
-        self._requester: _Party | None = None
-        self._since = ""
-        self._given_up = False
+        self._recorded = Parties()
+        self._wall_offset = wall() - monotonic()  # the same in the view as in the next record
         self._denied: dict[str, float] = {}
 
     @property
     def holder(self) -> Principal | None:
-        self.advance()
-        return self._holder.who if self._holder else None
+        holder = self._parties.holder
+        return holder.who if holder else None
 
     @property
     def requester(self) -> Principal | None:
-        self.advance()
-        return self._requester.who if self._requester else None
+        requester = self._parties.requester
+        return requester.who if requester else None
 
     @property
     def until(self) -> float:
         """When time alone would change who has control, where a panel asks for it."""
-        if not self.rules.required:
-            return float("inf")
-        times = [party.alive_until for party in (self._holder, self._requester) if party]
-        return min([*times, self._due()])
+        change = self._parties.next_change(self.rules.takeover_after_s)
+        return change.at if change and self.rules.required else math.inf
 
     def verdict(self, who: Principal) -> Verdict:
         """Whether this client may press."""
-        return PERMITTED if _is(who, self.holder) else self.lock
+        return PERMITTED if same_client(who, self.holder) else self.lock
 
     @property
     def lock(self) -> Verdict:
@@ -108,48 +85,75 @@ class ControlAuthority:
             return locked("control_held", name=holder.title, robot=self._robot)
         return locked("control_free", robot=self._robot)
 
+    def view(self) -> ControlView:
+        """The view of control, the same for all clients."""
+        if not self.rules.required:
+            return NO_CONTROL
+        holder, requester, wall, _ = self._parties
+        since = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds")
+        return control_view(
+            self.rules,
+            self._robot,
+            holder.who if holder else None,
+            requester.who if requester else None,
+            since if holder else "",
+        )
+
+    def advance(self) -> None:
+        """Records what time alone has changed, each change once: a lost holder or requester, a
+        takeover. It is called in each turn and at each press."""
+        for hand_over, parties in self._due():
+            self._recorded = parties
+            self._record(hand_over)
+        self._wall_offset = self._wall() - self._now()
+
     # Acts: each returns why it was refused, "" where it was done. They are idempotent.
 
     def take(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
         """Takes what is free; the panel at the cell takes over."""
+        self.advance()
         if not who.client.id:
             return "control_stranger"
-        if (holder := self.holder) and not self._may_override(who) and not _is(who, holder):
+        if (holder := self.holder) and not self._may_override(who) and not same_client(who, holder):
             return "control_taken"
-        if not _is(who, holder):
-            self._hold(who, life_s, "taken over" if holder else "taken")
+        if not same_client(who, holder):
+            self._recorded = self._recorded.taken(self._party(who, life_s), self._wall())
+            self._log_line(f"control {'taken over' if holder else 'taken'} by {who}")
         return ""
 
     def ask(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
         """Asks the holder; what is free or may be taken over is taken."""
+        self.advance()
         if not who.client.id:
             return "control_stranger"
-        if not self.holder or self._may_override(who) or _is(who, self.holder):
+        if not self.holder or self._may_override(who) or same_client(who, self.holder):
             return self.take(who, life_s)
-        if self._requester:
-            return "" if _is(who, self._requester.who) else "control_asked_by"
+        if self.requester:
+            return "" if same_client(who, self.requester) else "control_asked_by"
         self._denied = {client: until for client, until in self._denied.items() if until > self._now()}
         if who.client.id in self._denied:
             return "control_denied"
-        self._requester = self._party(who, life_s)
+        self._recorded = self._recorded._replace(requester=self._party(who, life_s))
         self._log_line(f"{who} asks for control")
         return ""
 
     def give(self, who: Principal, to: str) -> Refusal:
         """The holder grants the request of the browser with the id `to`."""
+        self.advance()
         requester = self.requester
-        if requester is None or requester.client.id != to or not _is(who, self.holder):
+        if requester is None or requester.client.id != to or not same_client(who, self.holder):
             return "control_not_yours"
         self._pass_on(f"given by {who}")
         return ""
 
     def keep(self, who: Principal, to: str) -> Refusal:
         """The holder denies the request of the browser with the id `to`."""
+        self.advance()
         requester = self.requester
-        if requester is None or requester.client.id != to or not _is(who, self.holder):
+        if requester is None or requester.client.id != to or not same_client(who, self.holder):
             return "control_not_yours"
         self._denied[to] = self._now() + ASK_AGAIN_S
-        self._requester = None
+        self._recorded = self._recorded._replace(requester=None)
         self.touch(who)
         self._log_line(f"{who} keeps control: {requester} was denied")
         return ""
@@ -157,11 +161,13 @@ class ControlAuthority:
     def release(self, who: Principal) -> Refusal:
         """The holder gives it up: to the client that requests it, else to no one. A requester withdraws
         its request."""
-        if _is(who, self.holder):
-            self._given_up = True
+        self.advance()
+        if same_client(who, self.holder):
             self._pass_on(f"given up by {who}")
-        elif _is(who, self.requester):
-            self._end_request()
+            self._recorded = self._recorded._replace(given_up=self._recorded.holder is None)
+        elif same_client(who, self.requester):
+            self._recorded = self._recorded._replace(requester=None)
+            self._log_line(f"{who} no longer asks for control")
         else:
             return "control_not_yours"
         return ""
@@ -170,96 +176,71 @@ class ControlAuthority:
 
     def keepalive(self, who: Principal, touched: bool) -> None:
         """A page with scripts is open; `touched`: by its operator since the last call."""
-        for party in self._parties(who):
-            party.scripted = True
-            party.alive_until = self._now() + LIFE_S
+        self.advance()
+        until = self._now() + LIFE_S
+        self._update(who, lambda party: party._replace(scripted=True, alive_until=until))
         if touched:
             self.touch(who)
 
     def touch(self, who: Principal) -> None:
         """The operator touched or pressed something: a request waits longer."""
         self.advance()
-        if self._holder and _is(who, self.holder):
-            self._holder.since = self._now()
-            self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)
+        now, holder = self._now(), self._recorded.holder
+        if holder and same_client(who, holder.who):
+            alive_until = max(holder.alive_until, now + LIFE_S)
+            touched = holder._replace(since=now, alive_until=alive_until)
+            self._recorded = self._recorded._replace(holder=touched)
 
     def loaded(self, who: Principal, life_s: float, opened_by_person: bool) -> None:
         """A page was loaded; without scripts it reloads within `life_s`. Control is taken only with
         `opened_by_person`, not for a program or a browser that prefetches."""
-        for party in self._parties(who):
-            party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
-        if opened_by_person and not self.holder and not self._given_up and self._may_override(who):
-            self._hold(who, life_s, "taken at its first page")
-            self._on_hand_over(HandOver("first_page", who))
-
-    def advance(self) -> None:
-        """Applies what time alone has changed: a lost holder or requester, a takeover."""
-        now = self._now()
-        if self._requester and now >= self._requester.alive_until:
-            requester = self._requester.who
-            self._end_request()
-            self._on_hand_over(HandOver("request_lost", requester))
-        if self._holder and now >= self._holder.alive_until:
-            self._pass_by_time("lost", f"lost by {self._holder.who}")
-        elif now >= self._due():
-            self._pass_by_time("idle", "taken over for want of a touch")
-
-    def view(self) -> ControlView:
-        """The view of control, the same for all clients."""
-        if not self.rules.required:
-            return NO_CONTROL
-        return control_view(self.rules, self._robot, self.holder, self.requester, self._since)
+        self.advance()
+        now, parties = self._now(), self._recorded
+        free = not parties.holder and not parties.given_up
+        self._update(
+            who,
+            lambda party: party._replace(alive_until=now + (LIFE_S if party.scripted else life_s)),
+        )
+        if opened_by_person and free and self._may_override(who):
+            self._recorded = parties.taken(self._party(who, life_s), self._wall())
+            self._record(HandOver("first_page", who))
 
     def _may_override(self, who: Principal) -> bool:
         return who.client.local and self.rules.local and bool(who.client.id)
 
-    def _due(self) -> float:
-        """When the request goes through by itself: the holder has the whole time from its begin."""
-        if not self._holder or not self._requester:
-            return math.inf
-        return max(self._holder.since, self._requester.since) + self.rules.takeover_after_s
+    @property
+    def _parties(self) -> Parties:
+        """The parties after every change that is due."""
+        parties = self._recorded
+        for _, later in self._due():
+            parties = later
+        return parties
 
-    def _parties(self, who: Principal) -> list[_Party]:
-        self.advance()
-        both = (party for party in (self._holder, self._requester) if party)
-        return [party for party in both if _is(who, party.who)]
+    def _due(self) -> Iterator[tuple[HandOver, Parties]]:
+        """The changes that are due and not yet recorded, in the order of their times, each with the
+        parties after it."""
+        now, parties = self._now(), self._recorded
+        while (change := parties.next_change(self.rules.takeover_after_s)) and change.at <= now:
+            parties = parties.after(change, change.at + self._wall_offset)
+            yield change.hand_over, parties
 
-    def _party(self, who: Principal, life_s: float) -> _Party:
-        return _Party(who, self._now(), self._now() + life_s, life_s == LIFE_S)
+    def _record(self, hand_over: HandOver) -> None:
+        self._log_line(str(hand_over))
+        self._on_hand_over(hand_over)
 
-    def _hold(self, who: Principal, life_s: float, how: str) -> None:
-        self._install(self._party(who, life_s))
-        self._log_line(f"control {how} by {who}")
+    def _update(self, who: Principal, updated: Callable[[Party], Party]) -> None:
+        """Updates the parties that are this client."""
+        holder, requester = self._recorded.holder, self._recorded.requester
+        if holder and same_client(who, holder.who):
+            self._recorded = self._recorded._replace(holder=updated(holder))
+        elif requester and same_client(who, requester.who):
+            self._recorded = self._recorded._replace(requester=updated(requester))
 
-    def _install(self, party: _Party | None) -> None:
-        self._holder = party
-        self._since = ""
-        if party:
-            self._given_up = False
-            now = datetime.fromtimestamp(self._wall(), UTC)
-            self._since = now.isoformat(timespec="milliseconds")
-            if self._requester and _is(party.who, self._requester.who):
-                self._requester = None
+    def _party(self, who: Principal, life_s: float) -> Party:
+        return Party(who, self._now(), self._now() + life_s, life_s == LIFE_S)
 
     def _pass_on(self, how: str) -> None:
         """To the client that requests it, else to no one."""
-        heir, self._requester = self._requester, None
-        if heir:
-            heir.since = self._now()
-        self._install(heir)
+        self._recorded = self._recorded.passed_on(self._now(), self._wall())
+        heir = self._recorded.holder
         self._log_line(f"control {how}, now of {heir.who if heir else 'no one'}")
-
-    def _pass_by_time(self, how: Literal["lost", "idle"], line: str) -> None:
-        before = self._holder
-        self._pass_on(line)
-        if before:
-            self._on_hand_over(HandOver(how, before.who, self._holder.who if self._holder else None))
-
-    def _end_request(self) -> None:
-        if self._requester:
-            self._log_line(f"{self._requester.who} no longer asks for control")
-        self._requester = None
-
-
-def _is(who: Principal, other: Principal | None) -> bool:
-    return other is not None and bool(who.client.id) and who.client.id == other.client.id

@@ -1,4 +1,4 @@
-"""One turn of a robot's session: inbox → robot's state → holds → confirmations → view.
+"""One turn of a robot's session: inbox → robot's state → control → holds → confirmations → view.
 
 Only this module defines the order. Holds and confirmations do not depend on the view: a slow or failing
 view never delays the end of a hold.
@@ -6,9 +6,11 @@ view never delays the end of a hold.
 
 import asyncio
 import logging
+import math
 from collections.abc import Iterable
 from contextlib import suppress
 
+from app.permission.control_authority import ControlAuthority
 from app.robot.state import Reading
 from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest, Updates
@@ -26,6 +28,7 @@ class Turn:
         self,
         context: RobotContext,
         peer: Peer,
+        control: ControlAuthority,
         ingest: Ingest,
         commands: RobotCommands,
         refresher: ViewRefresher,
@@ -34,12 +37,15 @@ class Turn:
         self._robot = context.robot
         self._link_lost = context.signals.link_lost
         self._peer = peer
+        self._control = control
         self._ingest = ingest
         self._commands = commands
         self._refresher = refresher
         self._log = RobotLog(log, self._robot.name)
         self._loop = asyncio.get_running_loop()
         self._frame: asyncio.TimerHandle | None = None  # the turn that is scheduled for the next frame
+        self._control_timer: asyncio.TimerHandle | None = None
+        self._control_due = math.inf  # when the turn of `_control_timer` runs, in monotonic seconds
         self._running = False
         self._again = False  # something changed that no step of a turn may have shown
         self._stopped = False
@@ -48,6 +54,8 @@ class Turn:
         """Runs no further turns."""
         self._stopped = True
         self._cancel_frame()
+        if self._control_timer is not None:
+            self._control_timer.cancel()
 
     def wake(self, immediate: bool) -> None:
         """Called on Zenoh's threads. Data that is not `immediate` waits for the next frame."""
@@ -106,6 +114,7 @@ class Turn:
         """Runs the steps of a turn. Changes during it are shown at its end, or in one more turn."""
         running, self._running = self._running, True
         try:
+            self._control.advance()
             for updates in steps:
                 self._apply(updates)
         finally:
@@ -113,6 +122,7 @@ class Turn:
             if self._again and not running:
                 self._again = False
                 self._loop.call_soon(self.changed)
+            self._schedule_control()
 
     def _apply(self, updates: Updates) -> None:
         """Updates holds, then confirmations, then the view, from the robot's current state."""
@@ -130,6 +140,21 @@ class Turn:
             self._refresher.refresh_next_frame()
         elif updates.values:
             self._refresher.refresh_values(updates.values)
+
+    def _schedule_control(self) -> None:
+        """Plans the turn that records the next change of control by time: no data may arrive until
+        then."""
+        due = self._control.until
+        if self._stopped or due == math.inf or (self._control_timer and self._control_due <= due):
+            return
+        if self._control_timer:
+            self._control_timer.cancel()
+        self._control_due = due
+        self._control_timer = self._loop.call_at(due, self._run_for_control)
+
+    def _run_for_control(self) -> None:
+        self._control_timer = None
+        self.run()
 
     def _confirm(self, key: str, reading: Reading) -> None:
         try:

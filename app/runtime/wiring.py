@@ -105,7 +105,7 @@ def wire_session(
         peer=peer,
         commands=commands,
         ingest=ingest,
-        turn=Turn(context, peer, ingest, commands, refresher),
+        turn=Turn(context, peer, control, ingest, commands, refresher),
         frames=Frames(context, partial(peer.on_graph_change, False)),
         renewal=Renewal(link, robot),
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Generic, ParamSpec
 
-from app.permission.control_authority import HandOver
+from app.permission.control_parties import HandOver
 from app.robot.topics import Reading
 
 Values = ParamSpec("Values")

@@ -15,6 +15,7 @@ from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, Refusal
 from app.permission.control_authority_view import Role, role
+from app.permission.control_parties import HandOver
 from app.permission.principal import Principal
 from tests.support.builders import faults_text
 from tests.support.form import several
@@ -36,8 +37,14 @@ class Room:
     def __init__(self, rules: ControlRules = RULES, robot: str = "Robot 1") -> None:
         self.now = 1000.0
         self.logged: list[str] = []
+        self.hand_overs: list[HandOver] = []
         self.control = ControlAuthority(
-            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, log_line=self.logged.append
+            rules,
+            robot,
+            monotonic=lambda: self.now,
+            wall=lambda: self.now,
+            log_line=self.logged.append,
+            on_hand_over=self.hand_overs.append,
         )
 
     def pass_s(self, seconds: float, *alive: Principal, touched: bool = False) -> None:
@@ -418,6 +425,57 @@ def test_the_log_says_every_change_with_who_it_was(requested: Room) -> None:
         "control taken over by the panel at the cell (127.0.0.1)",
         "control lost by the panel at the cell (127.0.0.1), now of no one",
     ]
+
+
+# Reading writes nothing; `advance` records.
+
+
+def read_all(room: Room) -> list[object]:
+    """What every getter answers."""
+    control = room.control
+    verdicts = [control.verdict(who) for who in (ANN, BOB, CELL, ANONYMOUS)]
+    return [control.holder, control.requester, control.lock, control.until, control.view(), *verdicts]
+
+
+@pytest.mark.parametrize(
+    ("alive", "hand_over"),
+    [
+        ((BOB,), HandOver("lost", ANN, BOB)),
+        ((ANN,), HandOver("request_lost", BOB)),
+        ((ANN, BOB), HandOver("idle", ANN, BOB)),
+    ],
+)
+def test_reading_after_an_expiry_writes_nothing_and_the_next_advance_records_it_once(
+    requested: Room, alive: tuple[Principal, ...], hand_over: HandOver
+) -> None:
+    due = requested.now + (TAKEOVER_S if len(alive) > 1 else LIFE_S)
+    requested.pass_s(due - requested.now - 1, *alive)
+    requested.now = due + 0.5
+    lines = len(requested.logged)
+    before = read_all(requested)
+    assert (len(requested.logged), requested.hand_overs) == (lines, [])
+
+    requested.control.advance()
+    assert read_all(requested) == before
+    requested.control.advance()
+    assert requested.hand_overs == [hand_over]
+    assert requested.logged[lines:] == [str(hand_over)]
+
+
+def test_control_that_passed_by_time_counts_from_when_it_was_due(requested: Room) -> None:
+    requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    requested.now += 3
+    since = requested.control.view()["since"]
+    assert since.startswith("1970-01-01T00:17:10.000")  # 1000 s and the time to a takeover
+    requested.now += 1
+    assert requested.control.view()["since"] == since
+
+
+def test_a_takeover_stands_if_its_client_is_lost_before_it_is_recorded(requested: Room) -> None:
+    requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    requested.now += 1 + LIFE_S
+    requested.control.advance()
+    assert requested.hand_overs == [HandOver("idle", ANN, BOB), HandOver("lost", BOB)]
 
 
 # What a panel file says of it.

@@ -7,12 +7,16 @@ from typing import Any
 
 import pytest
 
-from app.audit import NullLog
+from app.audit import Entry, NullLog
 from app.commands.confirmations import Confirmations
 from app.commands.holds.controller import HoldController
 from app.commands.holds.receipts import ActiveHold
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
+from app.panel.model import Panel
+from app.permission.clients import Clients
+from app.permission.control_authority import LIFE_S
+from app.permission.principal import Principal
 from app.runtime.wiring import ServerParts, wire_session
 from app.transport.bridge_peer import BRIDGE as BRIDGES
 from app.transport.inbox import Inbox
@@ -37,16 +41,20 @@ SAMPLES = 5_000
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.5}
 PANEL = panel_of(SPEED, JOG, ARM, MESSAGE, {**FREE, "confirm": CONFIRM}, HEARD)
 ACCESS = RobotAccess(BRIDGES.dialect, BRIDGES.traits, TinyPeer, BRIDGES.observe)
+CONTROLLED = panel_of(SPEED, JOG, ARM, control={"required": True})
+ANN = Principal(Clients().identify(f"{1:032x}", "192.0.2.1"))
 
 
 class Cell:
     """A session without Zenoh: what arrives is put into its inbox, what it sends is kept."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, panel: Panel = PANEL, log: NullLog | None = None
+    ) -> None:
         self.ended: list[Receipt] = []
         self.order: list[str] = []
         self._monkeypatch = monkeypatch
-        server = ServerParts(PANEL, "r1", NullLog())
+        server = ServerParts(panel, "r1", log or NullLog())
         self.session = wire_session(server, config_to("tcp/127.0.0.1:1"), ACCESS)
         self.inbox: Inbox = self.session.link._inbox
         ingest = self.session.ingest
@@ -58,7 +66,6 @@ class Cell:
         self.inbox.token(bridge_dialect.bridge_token(BRIDGE), True)
         self.permit(True)
         self.take()
-        assert self.session.publisher.view["widgets"]["jog"]["enabled"]
 
     def permit(self, permitted: bool) -> None:
         self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), None)
@@ -99,6 +106,7 @@ def test_a_view_that_can_not_be_built_keeps_no_hold_from_its_end(
 
     async def scene() -> None:
         cell = Cell(monkeypatch)
+        assert cell.session.publisher.view["widgets"]["jog"]["enabled"]
         cell.hold("jog")
         cell.hold("arm")
         with monkeypatch.context() as broken:
@@ -195,5 +203,51 @@ def test_what_changes_while_a_turn_runs_is_shown_by_it_once(monkeypatch: pytest.
         assert cell.session.publisher.version == version + 1
         assert not cell.session.publisher.view["widgets"]["jog"]["held"]
         await cell.session.stop()
+
+    run(scene())
+
+
+class Entries(NullLog):
+    def __init__(self) -> None:
+        super().__init__()
+        self.actions: list[str] = []
+
+    def add(self, entry: Entry) -> None:
+        self.actions.append(entry.action)
+
+
+def test_lost_control_is_recorded_by_a_turn_though_no_data_arrives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scene() -> None:
+        entries = Entries()
+        cell = Cell(monkeypatch, CONTROLLED, entries)
+        session, control = cell.session, cell.session.control
+        assert control.take(ANN, life_s=0.05) == ""
+        cell.take()
+        async with asyncio.timeout(20):  # no data arrives
+            while session.publisher.view["control"]["holder"] or not entries.actions:
+                await asyncio.sleep(0.01)
+        assert entries.actions == ["control_lost"]
+        await session.stop()
+
+    run(scene())
+
+
+def test_a_view_that_is_built_after_an_expiry_writes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene() -> None:
+        entries = Entries()
+        cell = Cell(monkeypatch, CONTROLLED, entries)
+        session, control = cell.session, cell.session.control
+        control.take(ANN)
+        now = time.monotonic() + LIFE_S
+        monkeypatch.setattr(control, "_now", lambda: now)
+        session.refresher.refresh_now()
+        assert session.publisher.view["control"]["holder"] == ""
+        assert entries.actions == []
+        cell.take()
+        cell.take()
+        assert entries.actions == ["control_lost"]
+        await session.stop()
 
     run(scene())
