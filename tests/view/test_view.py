@@ -320,7 +320,7 @@ def test_a_widget_that_cannot_be_shown_leaves_the_others(
             raise ValueError(widget.id)
         return attributes_of(widget, *parameters)
 
-    monkeypatch.setattr(view_module, "show", fail)
+    monkeypatch.setattr(view_module, "attributes_of", fail)
     built = build_view(PANEL, robot, NOW)
     frame = update_displays(fine, PANEL.displays, robot, NOW)
     command, display = (built.view["widgets"][name] for name in names)
