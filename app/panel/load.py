@@ -86,7 +86,8 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         ]
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
     interlocks = tuple(resolve_condition(one, interfaces) for one in panel.interlocks)
-    return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
+    state = panel.state and panel.state.with_constants(interfaces)
+    return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks, "state": state})
 
 
 def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:

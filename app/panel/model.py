@@ -27,6 +27,7 @@ from app.panel.demo import DemoEntry
 from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
+from app.panel.machine_state import StateRules
 from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.stories import StoryName
@@ -108,6 +109,7 @@ class Panel(Description):
     keyboard: Keyboard = "auto"
     screen: ScreenRules = ScreenRules()
     frame: Frame = Frame.model_validate({})
+    state: StateRules | None = None
     control: ControlRules = ControlRules(required=False)
     embed: EmbedRules = EmbedRules()
     record: RecordRules | None = None
@@ -150,10 +152,15 @@ class Panel(Description):
         """The templates of its pages, each once."""
         return tuple(dict.fromkeys(page.template for page in self.pages if page.template))
 
+    @property
+    def frame_widgets(self) -> tuple[BaseWidget, ...]:
+        """What every page shows: the keys of the frame and the machine's state."""
+        return (*self.frame.widgets, *([self.state.display] if self.state else []))
+
     def widgets(self) -> Iterator[BaseWidget]:
         for page in self.pages:
             yield from page.widgets
-        yield from self.frame.widgets
+        yield from self.frame_widgets
 
     def widget(self, widget_id: str, kind: type[Kind]) -> Kind:
         """The widget of a kind with this id; NotFound for every other id."""
@@ -165,7 +172,7 @@ class Panel(Description):
     @cached_property
     def widgets_by_page(self) -> dict[str, frozenset[str]]:
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
-        frame = {widget.id for widget in self.frame.widgets}
+        frame = {widget.id for widget in self.frame_widgets}
         return {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
 
     @cached_property

@@ -136,6 +136,7 @@ class RobotState:
                 on_unreadable=partial(self.count_unreadable, key),
                 on_late_reading=partial(self._on_late_reading, key),
                 keyed=[path for path in dict.fromkeys(paths) if has_key(path)],
+                timed=[panel.state.field] if panel.state and panel.state.topic == topic else (),
             )
             yield key, made
 

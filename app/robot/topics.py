@@ -5,7 +5,7 @@ continued in the next turns. Until the newest is decoded, the topic's value is u
 """
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
@@ -15,6 +15,7 @@ from app.interfaces import FieldReader, Fields, Walk
 from app.robot.keyed_values import NO_VALUES, KeyedValues, updated, without_source
 from app.robot.sample import Sample
 from app.robot.slices import SMALL_BYTES, Slices
+from app.robot.value_times import NO_TIMES, ValueTimes
 
 # Undecoded messages of a lossless topic; of other topics only the newest is kept.
 MAX_UNREAD: Final = 16
@@ -30,7 +31,7 @@ class Reading:
     `status`: no message yet ("waiting"); received before a cut ("cut"); not decodable ("unreadable");
     being decoded, with the fields of the one before ("reading"); a valid message ("message"). `at` is
     in monotonic seconds, `wall` in seconds since the epoch. `keyed` are the newest values of fields
-    with keys, over several messages.
+    with keys, over several messages. `since` has the wall time of the last change of timed fields.
     """
 
     status: Literal["waiting", "cut", "unreadable", "reading", "message"]
@@ -38,6 +39,7 @@ class Reading:
     at: float = -math.inf
     wall: float = 0.0
     keyed: KeyedValues = field(default_factory=lambda: NO_VALUES)
+    since: Mapping[str, float] = field(default_factory=lambda: NO_TIMES)
 
     def of_field(self, path: str, kept_s: float) -> "Reading":
         """The reading with the times of a field; one with a key has its own, see `keyed_values`.
@@ -77,10 +79,11 @@ class Topic:
         on_unreadable: Callable[[Sample, DecodeError], None],
         on_late_reading: Callable[[Reading], None],
         keyed: Collection[str] = (),
+        timed: Collection[str] = (),
     ) -> None:
         """Of a `lossless` topic each message counts, and of one with the paths `keyed` each message
-        that has arrived. `on_late_reading` takes a reading that needed more than one turn;
-        `on_unreadable` a sample that can't be decoded."""
+        that has arrived. The changes of the fields `timed` are timed. `on_late_reading` takes a reading
+        that needed more than one turn; `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
         self._on_unreadable = on_unreadable
@@ -88,6 +91,7 @@ class Topic:
         self._lossless = lossless
         self._keyed = keyed
         self._values = NO_VALUES
+        self._times = ValueTimes(timed)
         most = MAX_UNREAD_PARTS if keyed else MAX_UNREAD
         self._unread: BoundedQueue[Sample] = BoundedQueue(most, MAX_UNREAD_BYTES)
         self._walk: _PendingRead | None = None  # before the unread
@@ -127,6 +131,7 @@ class Topic:
             self._unread.clear()
             self._walk = None
             self._values = NO_VALUES
+            self._times.clear()
 
     def forget_source(self, source: str) -> None:
         """A peer was lost: values of fields with keys that came from it are no longer valid."""
@@ -141,6 +146,7 @@ class Topic:
             self.sample, self._walk, self._last_reading = None, None, WAITING
             self._unread.clear()
             self._values = NO_VALUES
+            self._times.clear()
 
     def _read(self) -> bool:
         """Decodes as much as this turn allows; returns whether that was all."""
@@ -199,7 +205,8 @@ class Topic:
                 return None
             if self._keyed:
                 self._values = updated(self._values, self._keyed, fields, sample)
-            self._last_reading = Reading("message", fields, sample.at, sample.wall, self._values)
+            since = self._times.update(fields, sample.wall)
+            self._last_reading = Reading("message", fields, sample.at, sample.wall, self._values, since)
         self._walk = None
         return self._last_reading
 

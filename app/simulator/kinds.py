@@ -12,6 +12,7 @@ from app.i18n import render
 from app.interfaces import Interfaces, Type
 from app.panel.base import TopicQos
 from app.panel.constants import parent_type, resolve_names
+from app.panel.machine_state import MachineState
 from app.panel.template import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
@@ -128,6 +129,14 @@ def _indicator(indicator: Indicator, _: Interfaces) -> Iterator[Need]:
     return _shown(indicator, tuple(state.value for state in indicator.states))
 
 
+def _machine_state(display: MachineState, _: Interfaces) -> Iterator[Need]:
+    yield from _shown(display, tuple(state.value for state in display.states))
+    for detail in display.details:
+        yield Shown(
+            topic=detail.topic, type=detail.type, field=detail.field, max_age_s=detail.max_age_s
+        )
+
+
 def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
     """In its normal range for the most part, and at times beyond the limit above."""
     low, high = gauge.normal or (gauge.min, gauge.max)
@@ -224,6 +233,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Display: lambda of, _: _shown(of),
     Readout: _readout,
     Indicator: _indicator,
+    MachineState: _machine_state,
     Gauge: _gauge,
     Joints: _joints,
     Table: lambda *_: iter(()),

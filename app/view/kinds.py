@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any, Final, TypedDict
 
 from app.i18n import TextLike, joined, say
+from app.panel.machine_state import MachineState
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
@@ -30,6 +31,7 @@ from app.view.display_values import indicator, readout, value
 from app.view.gauge_values import gauge
 from app.view.joint_values import joints
 from app.view.log_values import log
+from app.view.machine_values import machine_state
 from app.view.parameter_values import parameter
 from app.view.step_values import step
 from app.view.table_values import table
@@ -152,6 +154,7 @@ ATTRIBUTES: Final[
     Camera: lambda of, robot, verdict, now: camera(of, robot, now),
     LogView: lambda of, robot, verdict, now: log(of, robot),
     Indicator: lambda of, robot, verdict, now: indicator(of, robot, now),
+    MachineState: lambda of, robot, verdict, now: machine_state(of, robot, now),
     Gauge: lambda of, robot, verdict, now: gauge(of, robot, now),
     Joints: lambda of, robot, verdict, now: joints(of, robot, now),
     Table: lambda of, robot, verdict, now: table(of, robot, now),

@@ -1,36 +1,31 @@
-"""The state of the robot in one word, as the frame shows it: pure, from the verdicts."""
+"""Whether the robot is there, in one word, as the frame shows it: pure, from the link's verdict.
 
-from collections.abc import Collection
+What the machine does is the robot's to say, see `[state]` of a panel file; what is permitted is said
+at each button.
+"""
+
 from functools import cache
 from typing import Final, Literal, TypedDict
 
 from app.i18n import TextLike, say
 from app.permission.verdict import Verdict
 
-FORBIDDEN: Final = frozenset({"forbidden", "unmet"})
-
-
-State = Literal["ready", "online", "locked", "unknown", "lost"]
+State = Literal["online", "unknown", "lost"]
 
 
 class RobotWord(TypedDict):
-    """`state` is "ready" if all interlocks permit, "online" if the panel has none, "locked" if one
-    forbids, "unknown" if one is unknown, "lost" without a connection to the robot."""
+    """`state` is "online" with a connection to the robot, "lost" without one, "unknown" while it is
+    being set up."""
 
     state: State
     text: TextLike
 
 
-def robot_word(passable: Verdict, interlocks: Collection[Verdict]) -> RobotWord:
-    """The word for the verdicts of the link and of all interlocks. "locked" goes before "unknown"."""
-    refused = [one for one in interlocks if not one.permitted]
-    if not passable.permitted:
-        return _word("unknown" if passable.code in ("joining", "catching_up") else "lost")
-    if any(one.code in FORBIDDEN for one in refused):
-        return _word("locked")
-    if not interlocks:
+def robot_word(passable: Verdict) -> RobotWord:
+    """The word for the verdict of the link."""
+    if passable.permitted:
         return _word("online")
-    return _word("unknown" if refused else "ready")
+    return _word("unknown" if passable.code in ("joining", "catching_up") else "lost")
 
 
 @cache

@@ -34,7 +34,7 @@ def time_text(style: str, seconds: float, wall: float) -> tuple[TextLike, float]
     """The text, and the seconds after which it changes; `wall` is the server's clock, in seconds since
     the epoch, as is a time."""
     if style == "duration":
-        return _duration(seconds), math.inf
+        return duration_text(seconds), math.inf
     if seconds == 0:
         return say("time_unset"), math.inf
     if not EARLIEST <= seconds <= LATEST:  # NaN neither
@@ -57,9 +57,21 @@ def _age_changes_in(age: float) -> float:
     return (step - age % step) or step
 
 
-def _duration(seconds: float) -> TextLike:
+def span_text(seconds: float) -> TextLike:
+    """How long something has lasted, in whole seconds below a minute, else in minutes."""
+    minutes = int(seconds // 60)
+    if not minutes:
+        return format_age(seconds)
+    hours, minutes = divmod(minutes, 60)
+    if not hours:
+        return format_age(seconds)
+    return say("duration_hours", hours=hours, minutes=f"{minutes:02}")
+
+
+def duration_text(seconds: float) -> TextLike:
+    """A duration in seconds, with its two largest units."""
     if seconds < 0:
-        return say("duration_negative", duration=_duration(-seconds))
+        return say("duration_negative", duration=duration_text(-seconds))
     if not seconds < LONGEST_S:
         text = "NaN" if math.isnan(seconds) else f"{seconds:.6g}"
         return say("duration_seconds", number=number("Infinity" if text == "inf" else text))

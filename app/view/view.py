@@ -115,7 +115,7 @@ def build_view(
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
         widgets={name: attributes for name, (attributes, _) in widgets.items()},
         notice=Notice(banner=banner, fault=context.fault),
-        state=robot_word(passable, interlocks.values()),
+        state=robot_word(passable),
         robots=dict(context.robots),
         control=context.control,
     )

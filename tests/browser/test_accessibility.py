@@ -298,11 +298,17 @@ def shifts(pages: Sequence[Page], url: str, states: Sequence[str]) -> list[list[
         page.goto(url)
     for state in states:
         for page in pages:
-            expect(page.locator("#state")).to_have_attribute("data-state", state)
+            if state == "online":
+                expect(page.locator("#state")).to_have_attribute("data-state", state)
+            else:
+                button = page.locator("[data-widget=operation1] > button")
+                expect(button).to_be_enabled(enabled=state == "permitted")
     return [] if any(page.evaluate("lost") for page in pages) else [p.evaluate("shifts") for p in pages]
 
 
-@pytest.mark.parametrize(("path", "states"), [("/pages/setup", ["ready"]), ("/", ["locked", "ready"])])
+@pytest.mark.parametrize(
+    ("path", "states"), [("/pages/setup", ["online"]), ("/", ["locked", "permitted"])]
+)
 def test_nothing_moves_after_the_page_is_there(
     example: Server, chromium: Browser, path: str, states: list[str]
 ) -> None:
@@ -332,6 +338,6 @@ def test_of_a_page_that_comes_slowly_no_half_is_drawn(example: Server, page: Pag
         line.slow = True
         page.goto(f"{line.url}/pages/setup", wait_until="domcontentloaded")
         line.slow = False
-        expect(page.locator("#state")).to_have_attribute("data-state", "ready")
+        expect(page.locator("#state")).to_have_attribute("data-state", "online")
         page.wait_for_function("() => performance.getEntriesByName('first-paint').length")
         assert page.evaluate(DRAWN_WHOLE)

@@ -242,7 +242,7 @@ def test_a_hold_ends_when_it_opens(screen: Page) -> None:
 def test_a_lock_that_came_while_it_was_open_is_there_after_it(screen: Page, kiosk: Server) -> None:
     open_for(screen, "#input-speed")
     permit(kiosk, HALT)
-    expect(screen.locator("#state")).to_have_attribute("data-state", "locked")
+    expect(screen.locator('[data-widget="jog"] .hold')).to_be_disabled()
     screen.locator(".cancel-entry").tap()
     expect(screen.locator("#why-jog")).to_contain_text("order")
     expect(screen.get_by_role("button", name="Left")).to_be_disabled()

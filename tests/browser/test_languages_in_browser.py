@@ -16,7 +16,7 @@ from tests.support.parts import Server
 from tests.support.servers import demo_server
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
-STATES: Final = ("ready", "online", "locked", "unknown", "lost")
+STATES: Final = ("online", "unknown", "lost")
 # What reaches out of the header: a word that is broken into its characters does.
 BEYOND: Final = """() => {
   const end = document.querySelector("header").getBoundingClientRect().bottom;

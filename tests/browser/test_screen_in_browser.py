@@ -140,7 +140,7 @@ def test_each_state_of_the_robot_fits_a_phone(cell: Server, page: Page, language
     page.goto(f"{cell.url}/pages/cell")
     sized(page, 390, 844)
     shown = page.locator(".robot-state")
-    for state in ("ready", "online", "locked", "unknown", "lost"):
+    for state in ("online", "unknown", "lost"):
         shown.evaluate(SAYS, [state, sentences(language)[f"state_{state}"], language])
         page.evaluate(DRAWN)
         assert page.evaluate(OVERFLOWS) == [], state
@@ -354,9 +354,10 @@ def test_the_tabs_change_sides(cell: Server, page: Page) -> None:
 def test_the_state_of_the_robot_is_a_word_in_the_header(cell: Server, page: Page) -> None:
     page.goto(f"{cell.url}/pages/setup")
     state = page.locator("#state")
-    for word in ("READY", "LOCKED"):
-        expect(state).to_have_text(word, timeout=40_000)
-        expect(page.locator('[data-widget="load"] > button')).to_be_enabled(enabled=word == "READY")
+    for enabled in (True, False):
+        button = page.locator('[data-widget="load"] > button')
+        expect(button).to_be_enabled(enabled=enabled, timeout=40_000)
+        expect(state).to_have_text("ONLINE")  # what is permitted is no state of the robot
         expect(state.locator("svg:visible")).to_have_count(1)
     page.route("**/events*", lambda route: route.abort())
     page.reload()

@@ -429,7 +429,8 @@ LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "sh
         (
             {**LAMP, "states": [{"value": "a", "text": "A", "shape": "star"}]},
             "states[0].shape",
-            'must be "circle", "square", "triangle", "diamond", "cross" or "bar", not "star"',
+            'must be "circle", "square", "triangle", "diamond", "cross", "bar", "play" or "pause", not'
+            ' "star"',
         ),
         (
             {**LAMP, "states": [{"value": "a", "text": "A", "shape": "bar", "colour": "green"}]},

@@ -77,7 +77,6 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
         "operation-enabled-updated": {"enabled": True, "reason": None},
         "update": {"guarded": {"enabled": True, "reason": None}},
         "link": english(publisher.view["link"]),  # the node locks nothing any more
-        "state": {"state": "ready", "text": "READY"},
     }
 
 
@@ -119,7 +118,7 @@ def test_keys_change_before_the_frame_around_them_on_a_page_too(robot: RobotStat
     for page in ("one", ""):
         sent = list(events(publisher.events_since(1, old, publisher.reader(ENGLISH, page))))
         permission = [] if page else ["operation-enabled-updated"]
-        assert sent == [*permission, "update", "link", "state"], page
+        assert sent == [*permission, "update", "link"], page
 
 
 def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot: RobotState) -> None:
@@ -212,8 +211,8 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
     sent = [events(publisher.events_since(version, view)) for version, view in enumerate(views, 1)]
     assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
     assert all(one["link"] == english(publisher.view["link"]) for one in sent)
-    assert [one["update"] for one in sent] == encoded[1:2] + encoded[4:]
-    assert len(encoded) == 6  # the permission, the links and the state once, the widgets for each
+    assert [one["update"] for one in sent] == encoded[1:2] + encoded[3:]
+    assert len(encoded) == 5  # the permission and the links once, the widgets for each
 
 
 def test_each_language_has_events_of_its_own_encoded_once(

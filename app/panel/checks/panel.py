@@ -15,6 +15,7 @@ from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.faults.wording import list_names
 from app.panel.interlock import Interlock
+from app.panel.machine_state import STATE_ID
 from app.panel.model import Panel, RobotEntry
 from app.panel.template import NOW
 from app.panel.widgets.families import (
@@ -95,6 +96,8 @@ def _widgets_with_places(panel: Panel) -> Iterator[tuple[str, BaseWidget]]:
     for p, page in enumerate(panel.pages):
         yield from ((f"page[{p}].{place}", widget) for place, widget in page.placed())
     yield from ((f"frame.widget[{w}]", widget) for w, widget in enumerate(panel.frame.widgets))
+    if panel.state:
+        yield "state", panel.state.display
 
 
 def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
@@ -149,7 +152,10 @@ def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]
         for place, widget in page.placed():
             if not isinstance(widget, Input):
                 yield from widget.faults(f"page[{p}].{place}", checking)
-    yield from _frame_faults(panel, _check_context(panel, interfaces, (), faulty), faulty)
+    checking = _check_context(panel, interfaces, (), faulty)
+    yield from _frame_faults(panel, checking, faulty)
+    if panel.state:
+        yield from panel.state.display.faults("state", checking)
 
 
 def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str]) -> Iterator[Fault]:
@@ -220,7 +226,7 @@ def _duplicate_ids(table: str, ids: list[str]) -> Iterator[Fault]:
 
 
 def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
-    places: dict[str, str] = {}
+    places = {STATE_ID: "[state]"} if panel.state else {}
     ids = [page.id for page in panel.pages]
     for p, page in enumerate(panel.pages):
         for at, widget in page.placed():

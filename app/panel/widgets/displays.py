@@ -57,7 +57,7 @@ class LampState(Description):
 
     value: Annotated[bool | int | str, BeforeValidator(_check_state_value)]
     text: Label
-    shape: Literal["circle", "square", "triangle", "diamond", "cross", "bar"]
+    shape: Literal["circle", "square", "triangle", "diamond", "cross", "bar", "play", "pause"]
     colour: Literal["grey", "white", "black", "blue", "yellow", "red"] = "grey"
 
 

@@ -22,7 +22,7 @@ from app.web.rendering.page_words import TREND_WORDS, WORDS
 
 router = APIRouter(include_in_schema=False)
 
-STATES: Final = ("ready", "online", "locked", "unknown", "lost")
+STATES: Final = ("online", "unknown", "lost")
 LINKS: Final = (("server", "ok", "ok"), ("bridge", "wait", "pending"), ("robot", "bad", "lost"))
 
 

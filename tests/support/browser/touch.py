@@ -162,8 +162,8 @@ def touched_server(folder: Path, above: str = "", screen: str = "") -> Server:
 def permit(server: Server, order: str = "4711") -> None:
     """Presses so that the interlock permits, or with HALT forbids."""
     server.http.post("/widgets/send", json={"inputs": {"order": order}})
-    word = "locked" if order == HALT else "ready"
-    until(lambda: server.snapshot()["state"]["state"] == word, word)
+    permits = order != HALT
+    until(lambda: server.snapshot()["interlocks"]["order"]["enabled"] is permits, f"order {order}")
 
 
 @contextmanager
