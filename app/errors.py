@@ -39,11 +39,11 @@ OS_ERRORS: Final[Mapping[int, str]] = {
     errno.ENOSPC: "disk_full",
     errno.EROFS: "disk_read_only",
     errno.EIO: "disk_failed",
-    errno.EACCES: "file_not_permitted",
-    errno.EPERM: "file_not_permitted",
-    errno.ENOENT: "file_not_found",
-    errno.EEXIST: "not_a_folder",
-    errno.ENOTDIR: "not_a_folder",
+    errno.EACCES: "disk_file_not_permitted",
+    errno.EPERM: "disk_file_not_permitted",
+    errno.ENOENT: "disk_file_not_found",
+    errno.EEXIST: "disk_not_a_folder",
+    errno.ENOTDIR: "disk_not_a_folder",
 }
 
 

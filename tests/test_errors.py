@@ -67,7 +67,9 @@ def test_an_error_of_the_system_is_a_sentence_of_the_catalogue() -> None:
 def test_an_error_of_the_system_names_its_file() -> None:
     with pytest.raises(OSError, match="/gone/away") as raised:
         Path("/gone/away").read_bytes()
-    assert os_error_text(raised.value) == say("with_file", why=say("file_not_found"), file="/gone/away")
+    assert os_error_text(raised.value) == say(
+        "with_file", why=say("disk_file_not_found"), file="/gone/away"
+    )
 
 
 def test_a_rare_error_of_the_system_is_in_its_own_words() -> None:

@@ -93,7 +93,9 @@ def test_within_a_line_there_is_no_line_break_and_no_more_than_a_limit() -> None
 
 
 def test_sentences_and_errors_are_printable() -> None:
-    assert str(say("no_option", label="Speed", options="1, 2", given=BAD)).endswith(f"not {SHOWN}")
+    assert str(say("input_not_an_option", label="Speed", options="1, 2", given=BAD)).endswith(
+        f"not {SHOWN}"
+    )
     assert str(InputError(f'no input "{BAD}"')) == f'no input "{ESCAPED}"'
 
 

@@ -97,7 +97,7 @@ class OperatorLog:
     @property
     def _fault_reason(self) -> TextLike:
         if self._stuck and not self._writer.fault:
-            return say("log_slow", seconds=number(f"{PRESSED_WITHIN_S:g}"))
+            return say("log_write_too_slow", seconds=number(f"{PRESSED_WITHIN_S:g}"))
         return self._writer.fault
 
     @property
@@ -196,7 +196,7 @@ class OperatorLog:
         """Presses of these widgets since `since` (ms) without a known end, the newest first; LogError
         if the log can't be read or is not open yet."""
         if self.head is None:
-            raise LogError(say("log_unreadable", why=self._fault_reason or say("log_closed")))
+            raise LogError(say("log_unreadable", why=self._fault_reason or say("log_file_reopening")))
         return await self._readers.open_presses(robot, widgets, since)
 
     async def _write_press(self, entry: Entry) -> Entry:
@@ -219,7 +219,7 @@ class OperatorLog:
         if ticket.result is None:
             self._stuck.add(ticket)
             self._notify_listeners()
-            raise LogError(say("log_slow", seconds=number(f"{seconds:g}")))
+            raise LogError(say("log_write_too_slow", seconds=number(f"{seconds:g}")))
         if isinstance(ticket.result, Entry):
             return ticket.result
         raise ticket.result
@@ -227,14 +227,14 @@ class OperatorLog:
     def _close_abandoned(self, ticket: Ticket) -> None:
         """Closes a press that was written after its waiting had ended."""
         if isinstance(ticket.result, Entry):
-            self._add(ticket.result.follow_up("closed", "refused", say("log_abandoned")))
+            self._add(ticket.result.follow_up("closed", "refused", say("log_entry_too_late")))
 
     def _add(self, entry: Entry) -> Ticket:
         """Queues an entry for the writer thread. If the queue is full, only new presses are rejected:
         the number of their results is limited by the number of presses."""
         ticket = Ticket(entry, self._loop.create_future())
         if not self._writer.add(ticket, MOST_WAITING if entry.of is None else None):
-            raise LogError(say("log_full_queue"))
+            raise LogError(say("log_queue_full"))
         return ticket
 
     def _post_results(self, results: Results, changed: bool) -> None:

@@ -41,7 +41,9 @@ class DataDir:
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise FolderInUse(say("folder_in_use", path=str(self.path), by=_read_holder(fd))) from None
+            raise FolderInUse(
+                say("disk_folder_in_use", path=str(self.path), by=_read_holder(fd))
+            ) from None
         else:
             self.release()
             self._fd, fd = fd, -1
@@ -53,7 +55,7 @@ class DataDir:
     def check(self) -> None:
         """FolderInUse if the lock file was removed, renamed or replaced: another server may have it."""
         if self._fd is not None and not self._lock_is_in_place(self._fd):
-            raise FolderInUse(say("log_taken", name=LOCK))
+            raise FolderInUse(say("log_file_removed", name=LOCK))
 
     def _lock_is_in_place(self, fd: int) -> bool:
         try:
@@ -93,5 +95,5 @@ def _read_holder(fd: int) -> Text:
         about = json.loads(os.pread(fd, 4096, 0))
         pid, since, command = str(about["pid"]), str(about["since"]), str(about["command"])
     except (ValueError, KeyError, TypeError):
-        return say("other_process")
-    return say("named_process", pid=pid, since=since, command=command)
+        return say("disk_used_by_other_process")
+    return say("disk_used_by_process", pid=pid, since=since, command=command)

@@ -38,10 +38,10 @@ INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE pr
 # The code of the sentence for each error of SQLite that an operator may read.
 ERRORS: Final = {
     "SQLITE_FULL": "disk_full",
-    "SQLITE_READONLY": "file_read_only",
-    "SQLITE_CANTOPEN": "file_not_opened",
-    "SQLITE_BUSY": "file_locked",
-    "SQLITE_PERM": "file_not_permitted",
+    "SQLITE_READONLY": "disk_file_read_only",
+    "SQLITE_CANTOPEN": "disk_file_not_opened",
+    "SQLITE_BUSY": "disk_file_locked",
+    "SQLITE_PERM": "disk_file_not_permitted",
     "SQLITE_IOERR": "disk_failed",
 }
 
@@ -168,9 +168,9 @@ class Files:
                 found = None
             if found != known:
                 name = os.path.basename(path)
-                raise LogGone(say("log_taken", name=name), itself=name == self._main)
+                raise LogGone(say("log_file_removed", name=name), itself=name == self._main)
         if not os.stat(next(iter(self._known))).st_size:
-            raise LogCorrupt(say("log_emptied"))
+            raise LogCorrupt(say("log_file_emptied"))
 
 
 def _paths(folder: Path, name: str = NAME) -> list[Path]:

@@ -61,7 +61,7 @@ class NullLog:
             try:
                 self._folder.claim()
             except FolderInUse as error:
-                raise LogError(say("folder_taken", why=error.text)) from error
+                raise LogError(say("disk_data_in_use", why=error.text)) from error
             except OSError as error:
                 log.warning("a second server would not be noticed: %s", error)
         return None

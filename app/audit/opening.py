@@ -37,7 +37,7 @@ class Opening:
         except LogCorrupt as error:
             name = set_aside(self._folder)
             log.error("the operator's log is damaged (%s): it is kept as %s", error, name)
-            self._cause, self._new_file_reason = None, say("log_began_anew", name=name)
+            self._cause, self._new_file_reason = None, say("log_began_after_damage", name=name)
             return Store(self._folder, self._boot, head)
 
     def _store(self, head: Head | None) -> Store:
@@ -54,8 +54,8 @@ class Opening:
     def _clear_and_explain(self, head: Head | None) -> TextLike:
         with as_log_error():
             found = make_room(self._folder)
-        gone = say("log_began_for_gone", last=head.seq if head else 0)
-        why = joined([gone, say("log_found", name=found) if found else ""])
+        gone = say("log_began_after_removal", last=head.seq if head else 0)
+        why = joined([gone, say("log_found_file_kept", name=found) if found else ""])
         log.error("%s", why)
         return why
 
@@ -70,7 +70,7 @@ class Opening:
             return [new_entry("began", values={"first": found.seq + 1}, reason=why)]
         if head is None or head.seq <= found.seq:
             return []
-        gone = say("log_lost", first=found.seq + 1, last=head.seq)
+        gone = say("log_entries_lost", first=found.seq + 1, last=head.seq)
         log.error("%s", gone)
         return [new_entry("resumed", reason=gone)]
 
@@ -83,7 +83,9 @@ def unfinished_entries(store: Store) -> Sequence[Entry]:
     """Closing entries for presses of servers that ended before the result was known."""
     return [
         entry.follow_up(
-            "corrected" if store.has_outcome(entry.seq) else "closed", "unknown", say("log_ended")
+            "corrected" if store.has_outcome(entry.seq) else "closed",
+            "unknown",
+            say("press_unknown_server_ended"),
         )
         for entry in store.undone()
     ]

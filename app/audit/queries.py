@@ -13,7 +13,7 @@ from typing import Any, Final
 from app.audit.database import as_log_error, open_read_only
 from app.audit.entry import FIELDS, Entry
 from app.errors import LogError, SearchTooLong
-from app.i18n import say
+from app.i18n import present_code, say
 
 LONGEST_SEARCH_S: Final = 5.0
 STEPS_BETWEEN_CHECKS: Final = 10_000
@@ -73,7 +73,7 @@ class OpenPress:
     @property
     def code(self) -> str:
         """The code of the reason, "" without one."""
-        return str(json.loads(self.text)["code"]) if self.text else ""
+        return present_code(json.loads(self.text)["code"]) if self.text else ""
 
 
 def rows(
@@ -128,7 +128,7 @@ def _fetch(
             return db.execute(query, values).fetchall()
     except LogError as error:
         if time.monotonic() > end:
-            raise SearchTooLong(say("log_search_long")) from error
+            raise SearchTooLong(say("log_search_too_long")) from error
         raise
     finally:
         db.close()

@@ -51,8 +51,8 @@ class Readers:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._threads = ThreadPoolExecutor(THREADS, "operators-log-reader")
-        self._searching = ReaderSlots(MAX_SEARCHES, SEARCH_AGAIN_S, say("log_searched"))
-        self._exporting = ReaderSlots(1, EXPORT_AGAIN_S, say("log_exported"))
+        self._searching = ReaderSlots(MAX_SEARCHES, SEARCH_AGAIN_S, say("log_search_busy"))
+        self._exporting = ReaderSlots(1, EXPORT_AGAIN_S, say("log_export_running"))
         self._processes: set[ReaderProcess] = set()
         self._closed = False
 
@@ -104,7 +104,7 @@ class Readers:
     @asynccontextmanager
     async def _reader_process(self, request: ReadRequest) -> AsyncIterator[ReaderProcess]:
         if self._closed:
-            raise LogError(say("ending"))
+            raise LogError(say("server_shutting_down"))
         process = ReaderProcess(request)
         self._processes.add(process)
         try:

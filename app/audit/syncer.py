@@ -52,7 +52,7 @@ class Syncer:
             try:
                 with self._syncing:
                     if self._store is None:
-                        raise LogError(say("log_closed"))
+                        raise LogError(say("log_file_reopening"))
                     self._store.sync()
             except LogError as error:
                 self._failed([(ticket, error) for ticket, _ in batch])

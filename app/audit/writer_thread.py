@@ -147,7 +147,7 @@ class WriterThread:
     def _write(self, batch: list[Ticket]) -> None:
         wanted = [ticket for ticket in batch if not ticket.abandoned]
         if len(wanted) < len(batch):
-            abandoned = LogError(say("log_abandoned"))
+            abandoned = LogError(say("log_entry_too_late"))
             self._report([(ticket, abandoned) for ticket in batch if ticket.abandoned], False)
         if self._store is None:
             self._fail(wanted, LogError(self.fault))

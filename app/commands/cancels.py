@@ -56,7 +56,7 @@ class Cancels:
             # A slow or failing disk must not delay a cancel.
             answer, cause = await self._canceled(widget, press_id)
         except BaseException:
-            (await writing).close_unknown("log_broke_off")
+            (await writing).close_unknown("press_server_error")
             raise
         pending = await writing
         self._log.info(
@@ -70,8 +70,8 @@ class Cancels:
             async with self._waits.cancellable():
                 answer = await self._goals.cancel(widget, press_id)
         except TimeoutError:
-            return Outcome("unknown", say("server_ends")), ""
+            return Outcome("unknown", say("press_unknown_at_shutdown")), ""
         except LinkError as error:
-            text = say("not_encoded", why=error.text, time=format_time(time.time()))
+            text = say("press_not_encoded", why=error.text, time=format_time(time.time()))
             return Outcome("refused", text), "link"
         return answer, "interlock" if answer.outcome == "refused" else ""

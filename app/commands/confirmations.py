@@ -77,7 +77,7 @@ class Confirmations:
         self._waiting.setdefault(self._robot.key(confirm.topic), []).append(waiting)
         self._latest[widget.id] = press_id
         self._show(
-            widget, CommandStatus(busy=True, text=say("waiting_for_effect", topic=confirm.topic))
+            widget, CommandStatus(busy=True, text=say("confirmation_waiting", topic=confirm.topic))
         )
         try:
             await asyncio.wait({future}, timeout=confirm.within_s)
@@ -94,7 +94,7 @@ class Confirmations:
         waiting.confirmed.add_done_callback(lambda _: self._confirm_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = number(f"{confirm.within_s:g}")
-        missed = say("no_effect", topic=confirm.topic, seconds=limit)
+        missed = say("confirmation_missing", topic=confirm.topic, seconds=limit)
         return Outcome("unknown", joined([sent, missed]))
 
     def is_awaited(self, key: str) -> bool:

@@ -104,7 +104,7 @@ class ControlActs:
             earlier, task = known
             same_act = (earlier.act, earlier.to) == (request.act, request.to)
             if not (same_act and _same(earlier.who, request.who)):
-                return _receipt(request, act_id, "press_reused", say("press_reused", id=act_id))
+                return _receipt(request, act_id, "press_id_reused", say("press_id_reused", id=act_id))
         else:
             task = self._begin(request, act_id, at, life_s)
         return await asyncio.shield(task)
@@ -121,7 +121,7 @@ class ControlActs:
 
     def log_hand_over(self, hand_over: HandOver) -> None:
         """Logs a change of control without an act, such as a timeout. Does not wait for the disk."""
-        who, other = hand_over.who, hand_over.other.title if hand_over.other else say("no_client")
+        who, other = hand_over.who, hand_over.other.title if hand_over.other else say("control_no_one")
         reason = say(f"log_control_{hand_over.how}", name=who.title, other=other)
         self._press_log.note(f"control_{hand_over.how}", origin_of(who), reason)
 

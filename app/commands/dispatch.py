@@ -109,7 +109,7 @@ class Dispatcher:
                 if target is not None and equal(float(target), given):
                     return target
         known = "?" if base is None else number(f"{base:g}")
-        raise InputError(say("step_moved", label=widget.label, value=known))
+        raise InputError(say("step_value_changed", label=widget.label, value=known))
 
     def widget(self, widget_id: str) -> PressCommand:
         """The command widget with this id; NotFound for every other id."""
@@ -210,7 +210,7 @@ class Dispatcher:
         has_reader = self._transport.has_reader(key)
         final_check()
         self._transport.put(key, payload)
-        sentence = "published" if has_reader else "sent_to_nobody"
+        sentence = "published" if has_reader else "press_no_subscriber"
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Outcome("published" if has_reader else "unknown", text)
 

@@ -86,7 +86,7 @@ class PressGuard:
     def act_verdict(self, at: float | None) -> Verdict:
         """Whether the server permits an act on control authority; `at` as in `context_for`."""
         if self._ended:
-            return locked("ending")
+            return locked("server_shutting_down")
         if self._log.lock:
             return Verdict(False, "log", self._log.lock)
         why = "" if at is None else self.late(at)
@@ -96,8 +96,8 @@ class PressGuard:
         """Why a touch at this time (in the server's time) is too old or in the future, else ""."""
         age = clock.server_now() - at
         if age > self._expires_s:
-            return say("expired", seconds=number(f"{age:.1f}"))
-        return say("ahead") if age < -MAX_AHEAD_S else ""
+            return say("press_expired", seconds=number(f"{age:.1f}"))
+        return say("press_clock_ahead") if age < -MAX_AHEAD_S else ""
 
     def _check(self, seen: str) -> None:
         instance_id, _, version = seen.partition("-")
@@ -115,7 +115,7 @@ class PressGuard:
         instance_id, _, version = seen.partition("-")
         if instance_id and instance_id != self._publisher.instance_id:
             is_other = instance_id in self._instance_ids()
-            return say("seen_on_another" if is_other else "seen_before_restart")
+            return say("press_seen_on_another_robot" if is_other else "press_seen_before_restart")
         if instance_id and int(version) < self._publisher.lock_changed_at(widget):
-            return say("changed_meanwhile")
+            return say("press_state_changed")
         return "" if at is None else self.late(at)

@@ -58,7 +58,7 @@ class PressJudge:
         verdict = self.verdict(widget, context)
         if not verdict.permitted:
             return verdict, verdict.reason or "", cause_of(verdict.code)
-        stale = say("press_by_stopping") if self._closed else context.stale_reason()
+        stale = say("press_during_shutdown") if self._closed else context.stale_reason()
         return verdict, stale, "interlock"
 
     def final_check(self, widget: Command, pending: PendingEntry, context: PressContext) -> None:
@@ -71,4 +71,4 @@ class PressJudge:
             pending.set_verdict(verdict.code)
             if why:
                 raise PressRefused(why, cause)
-        raise PressRefused(say("catching_up"), "link")
+        raise PressRefused(say("link_catching_up"), "link")

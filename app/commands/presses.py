@@ -117,10 +117,10 @@ class Presses:
             work = self._press_logged(widget, inputs, press_id, context)
             return await self._run_once(widget, inputs, press_id, work)
         if known is None:
-            why = say("press_past", id=press_id)
+            why = say("press_already_made", id=press_id)
             return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
-            why = say("press_reused", id=press_id)
+            why = say("press_id_reused", id=press_id)
             return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if isinstance(known, _InFlightPress):
             return await asyncio.shield(known.receipt)
@@ -218,15 +218,15 @@ class Presses:
                     widget, inputs, press_id, correct, pending.hash, final_check
                 )
         except TimeoutError:
-            return receipt(Outcome("unknown", say("server_ends")))
+            return receipt(Outcome("unknown", say("press_unknown_at_shutdown")))
         except (FieldError, InputError) as error:
-            return refused("not_encoded", error.text, "input")
+            return refused("press_not_encoded", error.text, "input")
         except LinkError as error:
-            return refused("not_encoded", error.text, "link")
+            return refused("press_not_encoded", error.text, "link")
         except PressRefused as error:
             return refused("refused", error.reason, error.cause)
         if answer.outcome == "refused":
-            return refused("not_encoded", answer.text, "interlock")
+            return refused("press_not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
 
@@ -236,8 +236,8 @@ def _always_closed(pending: PendingEntry) -> Iterator[None]:
     try:
         yield
     except asyncio.CancelledError:
-        pending.close_unknown("log_ended")
+        pending.close_unknown("press_unknown_server_ended")
         raise
     except BaseException:
-        pending.close_unknown("log_broke_off")
+        pending.close_unknown("press_server_error")
         raise

@@ -9,7 +9,7 @@ from app.i18n import BETWEEN, Text, TextLike
 # Sentences that only frame another one → the parameter with that sentence.
 FRAMES: Final[Mapping[str, str]] = {
     "refused": "why",
-    "not_encoded": "why",
+    "press_not_encoded": "why",
     "hold_ended": "why",
     "with_stop": "said",
     "with_reply": "said",

@@ -140,7 +140,7 @@ def recalled_receipt(
 ) -> Receipt:
     """The receipt of a press from the operator's log; without a `last` entry the result is unknown."""
     if last is None:
-        answer, at = Outcome("unknown", say("log_ended")), press.at
+        answer, at = Outcome("unknown", say("press_unknown_server_ended")), press.at
     else:
         answer, at = Outcome(cast(OutcomeCode, last.outcome), last.reason_text), last.at
     receipt = receipt_of(widget, inputs, press.press, answer, cause)

@@ -53,7 +53,7 @@ class EarlyRefusals:
         why: TextLike = say("press_too_soon")
         if (last := self._receipts.get(before)) is not None:
             label = self._dispatcher.widget(last.widget).label
-            said = say("press_before", label=label, said=last.reason)
+            said = say("press_last_result", label=label, said=last.reason)
             why = last.reason if ends_with(last.reason, why) else joined([said, why])
         return await self.refuse(self._dispatcher.widget(widget_id), inputs, press_id, why, origin)
 
@@ -62,7 +62,7 @@ class EarlyRefusals:
         widget_id: str,
         inputs: Mapping[str, Any],
         press_id: str,
-        sentence: str = "too_often",
+        sentence: str = "press_too_often",
         *,
         shown: bool = False,
     ) -> Receipt:
@@ -93,7 +93,7 @@ class EarlyRefusals:
         if self._press_log.has_room(context.origin):
             return None
         _, why, cause = self._judge.judge(widget, context)
-        sentence = "refused" if why else "not_encoded"
+        sentence = "refused" if why else "press_not_encoded"
         if not why:
             try:
                 why, cause = self._dispatcher.refusal(widget, inputs), "interlock"

@@ -30,7 +30,7 @@ class RepeatedPresses:
         press, last = known.press, known.last_entry
         own = self._dispatcher.needed_inputs(widget, inputs)
         if press.widget != widget.id or not same_values(press.values, own):
-            why = say("press_reused", id=press.press)
+            why = say("press_id_reused", id=press.press)
             return await self._early_refusals.refuse(widget, inputs, press.press, why, origin)
         receipt = recalled_receipt(widget, inputs, press, last, self._cause(widget, inputs, last))
         self._log.info("press %s of %s by %s repeats entry %d: %s: %s", press.press, widget.id,

@@ -86,7 +86,7 @@ class ServiceCalls:
     def full(self, service: str) -> TextLike:
         """Why no further request of a service may be sent, "" if it may."""
         full = self.unanswered(self._robot.key(service)) >= self._robot.traits.max_unanswered
-        return say("too_many", service=service) if full else ""
+        return say("call_too_many_pending", service=service) if full else ""
 
     def on_graph_change(self) -> None:
         """Ends the waiting calls if no peer is left. Call it after every change of the graph."""
@@ -136,7 +136,7 @@ class ServiceCalls:
         self._open[number] = waiting
         query.add_done_callback(lambda _: self._open.pop(number, None))
         self._latest[request.widget] = press_id
-        self._show(request, CommandStatus(busy=True, text=say("waiting_for_answer")))
+        self._show(request, CommandStatus(busy=True, text=say("call_waiting")))
         answer = await self._response(waiting, corrected)
         self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
         return answer
@@ -154,7 +154,7 @@ class ServiceCalls:
                 lambda done: self._on_late_response(waiting, done, corrected)
             )
         if waiting.cut.done() or not self._robot.graph.peers:
-            return Outcome("unknown", say("call_cut"))
+            return Outcome("unknown", say("call_connection_lost"))
         if waiting.answered.done():
             return Outcome("unknown", say(sentences.no_reply, service=request.service))
         advice = "" if request.service in self._answering else hint(sentences.timeout_hint)
@@ -187,7 +187,7 @@ class ServiceCalls:
             fields = await self._robot.slices.read_all(reader, reply)
         except DecodeError as error:
             self._log.error("%s: %s", request.service, error)
-            return Outcome("unknown", say("answer_unreadable", wanted=request.type))
+            return Outcome("unknown", say("call_response_unreadable", wanted=request.type))
         return request.read(fields)
 
     def _show(self, request: Request, progress: CommandStatus) -> None:
@@ -214,8 +214,8 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     reply = together(several[1:])
     now = format_time(time.time())
     if success is None or fields.get(success):
-        return Outcome("succeeded", with_reply(say("answered", time=now), reply))
-    return Outcome("rejected", with_reply(say("said_no", time=now), reply))
+        return Outcome("succeeded", with_reply(say("call_succeeded", time=now), reply))
+    return Outcome("rejected", with_reply(say("call_rejected", time=now), reply))
 
 
 def with_reply(said: Text, reply: TextLike) -> Text:

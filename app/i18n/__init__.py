@@ -5,7 +5,19 @@ Codes are stable names for tests and logs; `catalogue` has the sentences of each
 """
 
 from app.i18n.catalogue import ENGLISH, sentences
-from app.i18n.text import BETWEEN, Param, Text, TextLike, hint, joined, localized, render, say, text_in
+from app.i18n.text import (
+    BETWEEN,
+    Param,
+    Text,
+    TextLike,
+    hint,
+    joined,
+    localized,
+    present_code,
+    render,
+    say,
+    text_in,
+)
 from app.i18n.values import PanelText, date_and_time, number, time_of_day
 
 __all__ = [
@@ -20,6 +32,7 @@ __all__ = [
     "joined",
     "localized",
     "number",
+    "present_code",
     "render",
     "say",
     "sentences",

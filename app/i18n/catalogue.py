@@ -4,6 +4,7 @@ A language is a BCP 47 tag, such as "en" or "pt-BR". `msgid` is the code, `msgst
 `{name}` for a parameter. A sentence that a catalogue lacks is rendered in English.
 """
 
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -45,6 +46,12 @@ def files() -> Mapping[str, Path]:
     """The catalogue of each language."""
     found = {path.stem: path for folder in _folders for path in folder.glob(f"*{SUFFIX}")}
     return dict(sorted(found.items()))
+
+
+@cache
+def renamed_codes() -> Mapping[str, str]:
+    """The present code of each sentence by its former one, which stored texts may have."""
+    return tomllib.loads((Path(__file__).parent / "renamed_codes.toml").read_text(encoding="utf-8"))
 
 
 @cache

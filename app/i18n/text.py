@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import Any, Final, NoReturn, Union
 
-from app.i18n.catalogue import ENGLISH, sentences, when_changed
+from app.i18n.catalogue import ENGLISH, renamed_codes, sentences, when_changed
 from app.i18n.locales import date_time_in, number_in, symbols, time_in
 from app.printable import readable
 
@@ -190,15 +190,21 @@ def _as_json(value: Param) -> Any:
     return [_as_json(one) for one in value] if isinstance(value, tuple) else value
 
 
+def present_code(stored: str) -> str:
+    """The present code of a sentence that was stored with a code that may have been renamed since."""
+    return renamed_codes().get(stored, stored)
+
+
 def text_in(given: str) -> Text:
-    """The text in JSON of `as_json`; ValueError if it is not one."""
+    """The text in JSON of `as_json`, with its present code; ValueError if it is not one."""
     return _text_in(json.loads(given))
 
 
 def _text_in(given: Any) -> Text:
     if not isinstance(given, dict) or given.keys() != {"code", "params"}:
         raise ValueError("it is no sentence with a code and params")
-    return say(given["code"], **{name: _param_in(one) for name, one in given["params"].items()})
+    code = present_code(given["code"])
+    return say(code, **{name: _param_in(one) for name, one in given["params"].items()})
 
 
 def _param_in(given: Any) -> Any:

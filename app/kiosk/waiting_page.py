@@ -38,7 +38,9 @@ def waiting_page(title: str, languages: Sequence[str]) -> str:
 
 
 def _sentences(language: str) -> str:
-    waits, late = (escape(render(say(code), language)) for code in ("kiosk_waits", "kiosk_waits_long"))
+    waits, late = (
+        escape(render(say(code), language)) for code in ("kiosk_starting", "kiosk_no_response")
+    )
     return f'<div lang="{language}"><p>{waits}</p><p class="late">{late}</p></div>'
 
 

@@ -24,6 +24,13 @@ from app.robot.state import Reading, RobotState
 HISTORY_S: Final = 1.0
 LONGEST_TEXT: Final = 40  # characters of a text that stands in a reason
 DIGITS: Final = (6, 9)  # a float32 has nine at most
+# The codes of locks by the status of a reading that has no message.
+READING_LOCKS: Final[Mapping[str, str]] = {
+    "waiting": "interlock_waiting",
+    "cut": "interlock_connection_lost",
+    "unreadable": "interlock_unreadable",
+    "reading": "interlock_reading",
+}
 
 HOLDS: Final[Mapping[str, Callable[[Any, Any], bool]]] = {
     "equals": same_value,
@@ -71,42 +78,47 @@ def value_verdict(
     topic, key = condition.topic, robot.key(condition.topic)
     reading = _reading(condition, robot, single_publisher=single_publisher)
     if reading.status != "message":
-        return locked(reading.status, topic=topic, wanted=condition.type)
+        return unread(reading, topic, condition.type)
     if robot.silent_publishers.has_silent(key, robot.peers_of(key)):
-        reason = say("new_publisher", topic=topic)
+        reason = say("interlock_new_publisher", topic=topic)
         which = robot.publishers(key).sentence(topic) if robot.graph.has_endpoint("MP", key) else ""
-        return Verdict(False, "new_publisher", joined([reason, which]))
+        return Verdict(False, "interlock_new_publisher", joined([reason, which]))
     value = reading.value(condition.field)
     if not permits(condition, value):
         return refusal(condition, value, is_ambiguous=reading.is_ambiguous(condition.field))
     if condition.max_age_s is None:
         return PERMITTED
     if reading.at < _fresh_since(robot, key):
-        return locked("waiting", topic=topic)
+        return locked("interlock_waiting", topic=topic)
     stale_at = reading.at + condition.max_age_s
     if now >= stale_at:
         return stale(topic, condition.field, condition.max_age_s)
     return Verdict(True, until=stale_at)
 
 
+def unread(reading: Reading, topic: str, type_name: str) -> Verdict:
+    """The lock for a topic of which no message can be used now."""
+    return locked(READING_LOCKS[reading.status], topic=topic, wanted=type_name)
+
+
 def refusal(condition: Condition, value: Any, *, is_ambiguous: bool = False) -> Verdict:
     """The verdict for a value that does not meet the condition, None for one that is missing.
     `is_ambiguous`: several elements have the key of its field."""
     if is_ambiguous:
-        return locked("several", field=condition.field, topic=condition.topic)
+        return locked("interlock_field_ambiguous", field=condition.field, topic=condition.topic)
     if value is None:
-        return locked("missing", field=condition.field, topic=condition.topic)
+        return locked("interlock_field_missing", field=condition.field, topic=condition.topic)
     if not condition.comparisons:
-        return locked("forbidden", name=condition.name)
-    return Verdict(False, "unmet", unmet(condition, value))
+        return locked("interlock_not_permitted", name=condition.name)
+    return Verdict(False, "interlock_condition_unmet", unmet(condition, value))
 
 
 def stale(topic: str, field: str, max_age_s: float) -> Verdict:
     """The lock for a value that is too old; one with a key may be older than the last message."""
     limit = number(f"{max_age_s:g}")
     if has_key(field):
-        return locked("stale_entry", topic=topic, field=field, limit=limit)
-    return locked("stale", topic=topic, limit=limit)
+        return locked("interlock_stale_field", topic=topic, field=field, limit=limit)
+    return locked("interlock_stale", topic=topic, limit=limit)
 
 
 def _reading(condition: Condition, robot: RobotState, *, single_publisher: bool = False) -> Reading:
@@ -135,7 +147,7 @@ def unmet(condition: Condition, value: Any) -> Text:
     """The sentence for a value that does not meet the comparisons."""
     wanted = need(condition)
     value_text = _received_text(condition, value, wanted)
-    return say("unmet", name=condition.name, value=value_text, wanted=wanted)
+    return say("interlock_condition_unmet", name=condition.name, value=value_text, wanted=wanted)
 
 
 def need(condition: Condition) -> TextLike:
@@ -143,12 +155,12 @@ def need(condition: Condition) -> TextLike:
     if not condition.comparisons:
         return _written(condition, True)
     first, *others = _needs(condition)
-    return say("both", one=first, other=others[0]) if others else first
+    return say("condition_both", one=first, other=others[0]) if others else first
 
 
 def not_finite(value: float) -> Text:
     """What stands for NaN and infinities in a sentence."""
-    return say("value_nan") if math.isnan(value) else say("value_infinite")
+    return say("condition_nan") if math.isnan(value) else say("condition_infinite")
 
 
 def _needs(condition: Condition) -> Iterator[TextLike]:
@@ -158,11 +170,11 @@ def _needs(condition: Condition) -> Iterator[TextLike]:
         *all_but_last, last = (
             _value_text(condition, value, condition.unit) for value in condition.one_of
         )
-        yield say("either", first=tuple(all_but_last), last=last) if all_but_last else last
+        yield say("condition_either", first=tuple(all_but_last), last=last) if all_but_last else last
     if condition.min is not None or condition.max is not None:
         yield _limits(condition)
     if condition.not_equals is not None:
-        yield say("not_value", value=_value_text(condition, condition.not_equals, condition.unit))
+        yield say("condition_not", value=_value_text(condition, condition.not_equals, condition.unit))
 
 
 def _limits(condition: Condition) -> Text:

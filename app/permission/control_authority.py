@@ -23,11 +23,11 @@ ASK_AGAIN_S: Final = 10.0  # after a request was denied
 
 Refusal = Literal[
     "",
-    "control_taken",
-    "control_asked_by",
+    "control_held_by_other",
+    "control_already_requested",
     "control_denied",
-    "control_not_yours",
-    "control_stranger",
+    "control_changed",
+    "control_no_cookie",
 ]
 
 
@@ -47,7 +47,7 @@ class ControlAuthority:
         """`robot` is its name, "" where there is only one; `log_line` is called with a line for each
         change, `on_hand_over` with each change that no act made."""
         self.rules = rules
-        self._robot: TextLike = robot or say("the_robot")
+        self._robot: TextLike = robot or say("control_the_robot")
         self._now = monotonic
         self._wall = wall
         self._log_line = log_line
@@ -113,9 +113,9 @@ class ControlAuthority:
         """Takes what is free; the panel at the cell takes over."""
         self.advance()
         if not who.client.id:
-            return "control_stranger"
+            return "control_no_cookie"
         if (holder := self.holder) and not self._may_override(who) and not same_client(who, holder):
-            return "control_taken"
+            return "control_held_by_other"
         if not same_client(who, holder):
             self._recorded = self._recorded.taken(self._party(who, life_s), self._wall())
             self._log_line(f"control {'taken over' if holder else 'taken'} by {who}")
@@ -125,11 +125,11 @@ class ControlAuthority:
         """Asks the holder; what is free or may be taken over is taken."""
         self.advance()
         if not who.client.id:
-            return "control_stranger"
+            return "control_no_cookie"
         if not self.holder or self._may_override(who) or same_client(who, self.holder):
             return self.take(who, life_s)
         if self.requester:
-            return "" if same_client(who, self.requester) else "control_asked_by"
+            return "" if same_client(who, self.requester) else "control_already_requested"
         self._denied = {client: until for client, until in self._denied.items() if until > self._now()}
         if who.client.id in self._denied:
             return "control_denied"
@@ -142,7 +142,7 @@ class ControlAuthority:
         self.advance()
         requester = self.requester
         if requester is None or requester.client.id != to or not same_client(who, self.holder):
-            return "control_not_yours"
+            return "control_changed"
         self._pass_on(f"given by {who}")
         return ""
 
@@ -151,7 +151,7 @@ class ControlAuthority:
         self.advance()
         requester = self.requester
         if requester is None or requester.client.id != to or not same_client(who, self.holder):
-            return "control_not_yours"
+            return "control_changed"
         self._denied[to] = self._now() + ASK_AGAIN_S
         self._recorded = self._recorded._replace(requester=None)
         self.touch(who)
@@ -169,7 +169,7 @@ class ControlAuthority:
             self._recorded = self._recorded._replace(requester=None)
             self._log_line(f"{who} no longer asks for control")
         else:
-            return "control_not_yours"
+            return "control_changed"
         return ""
 
     # Keepalives.

@@ -61,7 +61,7 @@ def control_view(
         asker=requester.client.id if requester else "",
         asker_name=requester.title if requester else "",
         since=since,
-        holder_text=say("control_mine", robot=robot),
+        holder_text=say("control_held_here", robot=robot),
         asker_text="",
         text=say("control_free", robot=robot),
         role="",
@@ -71,8 +71,10 @@ def control_view(
         view["text"] = say("control_held", name=holder.title, robot=robot)
     if holder and requester:
         seconds = number(f"{rules.takeover_after_s:g}")
-        view["holder_text"] = say("control_asks", name=requester.title, robot=robot, seconds=seconds)
-        view["asker_text"] = say("control_asked", name=holder.title, seconds=seconds)
+        view["holder_text"] = say(
+            "control_requested_by_other", name=requester.title, robot=robot, seconds=seconds
+        )
+        view["asker_text"] = say("control_request_waiting", name=holder.title, seconds=seconds)
     return view
 
 

@@ -22,7 +22,7 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
-from app.permission.conditions import not_finite, stale, value_verdict
+from app.permission.conditions import not_finite, stale, unread, value_verdict
 from app.permission.mismatches import topic_mismatch
 from app.permission.servers import call_blocked, set_blocked
 from app.permission.verdict import PERMITTED, Verdict, locked
@@ -31,14 +31,21 @@ from app.robot.keyed_values import kept_s
 from app.robot.state import RobotState
 
 # The codes of a `link_verdict` that locks.
-LINK_CODES: Final = frozenset({"joining", "catching_up"}).union(
+LINK_CODES: Final = frozenset({"link_connecting", "link_catching_up"}).union(
     *(sentences.link_codes for sentences in EVERY_SENTENCES)
 )
 
 MAX_ENDPOINTS: Final = 3
 SEVERAL: Final = 2  # publishers
 # The codes of locks that the robot's value decides.
-BY_VALUE: Final = frozenset({"forbidden", "unmet", "missing", "several"})
+BY_VALUE: Final = frozenset(
+    {
+        "interlock_not_permitted",
+        "interlock_condition_unmet",
+        "interlock_field_missing",
+        "interlock_field_ambiguous",
+    }
+)
 
 
 def link_verdict(robot: RobotState, now: float) -> Verdict:
@@ -51,11 +58,11 @@ def link_verdict(robot: RobotState, now: float) -> Verdict:
     if robot.graph.has_silent_peer:
         return locked(sentences.silent)
     if now < robot.settled_at:
-        return Verdict(False, "joining", say("joining"), robot.settled_at)
+        return Verdict(False, "link_connecting", say("link_connecting"), robot.settled_at)
     if not robot.is_responding:
         return locked(sentences.silent)
     if not robot.is_caught_up:
-        return locked("catching_up")
+        return locked("link_catching_up")
     return PERMITTED
 
 
@@ -93,7 +100,7 @@ def _publishers_lock(interlock: Interlock, robot: RobotState) -> Verdict | None:
     as many."""
     topic = interlock.topic
     if interlock.require_publisher and not robot.graph.has_endpoint("MP", robot.key(topic)):
-        return locked("no_publisher", topic=topic)
+        return locked("interlock_no_publisher", topic=topic)
     return several_publishers(interlock, robot) if interlock.publishers == "one" else None
 
 
@@ -104,9 +111,9 @@ def several_publishers(interlock: Interlock, robot: RobotState) -> Verdict | Non
     publishers = robot.topic_publishers.of_topic(robot.key(topic), robot.graph)
     if publishers.number < SEVERAL:
         return None
-    reason = say("several_publishers", topic=topic, number=publishers.number)
+    reason = say("interlock_several_publishers", topic=topic, number=publishers.number)
     text = joined([reason, publishers.sentence(topic)])
-    return Verdict(False, "several_publishers", text)
+    return Verdict(False, "interlock_several_publishers", text)
 
 
 def _with_publishers(verdict: Verdict, interlock: Interlock, robot: RobotState) -> Verdict:
@@ -128,7 +135,7 @@ def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
     if mismatch := topic_mismatch("MP", of, robot):
         return mismatch
     if of.one_at_a_time and robot.command_status.get(of.id, IDLE).busy:
-        return locked("busy")
+        return locked("press_in_progress")
     return None
 
 
@@ -151,12 +158,14 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
         return None, mismatch
     reading = robot.reading(of.topic).of_field(of.field, kept_s(of.max_age_s))
     if reading.status != "message":
-        return None, locked(reading.status, topic=of.topic, wanted=of.type)
+        return None, unread(reading, of.topic, of.type)
     value = reading.value(of.field)
     if value is None:
-        return None, locked("missing", field=of.field, topic=of.topic)
+        return None, locked("interlock_field_missing", field=of.field, topic=of.topic)
     if not math.isfinite(value):
-        return None, locked("not_a_number", field=of.field, topic=of.topic, value=not_finite(value))
+        return None, locked(
+            "interlock_not_a_number", field=of.field, topic=of.topic, value=not_finite(value)
+        )
     if of.max_age_s is None:
         return value, PERMITTED
     stale_at = reading.at + of.max_age_s
@@ -172,7 +181,7 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
     value, verdict = reported_value(step, robot, now)
     if value is not None and not step.min <= value <= step.max:
         low, high = number(number_text(step.min)), number(number_text(step.max))
-        return locked("step_outside", value=number(f"{value:g}"), low=low, high=high)
+        return locked("step_value_outside_limits", value=number(f"{value:g}"), low=low, high=high)
     return verdict
 
 

@@ -30,7 +30,7 @@ def definition_mismatch(role: Role, name: str, robot: RobotState) -> Verdict | N
     """Why what is sent and received would be misread: the robot's definition of its type is not the
     panel's. `role` is the robot's."""
     found = robot.difference(role, robot.key(name))
-    return locked("definition_differs", name=name, type=found.type) if found else None
+    return locked("topic_definition_differs", name=name, type=found.type) if found else None
 
 
 @cached_until_change
@@ -39,7 +39,7 @@ def _misfit(
 ) -> Verdict | None:
     """`unrouted` is the code of the lock for a topic that the peer does not forward."""
     if found := graph.mismatched_type(role, key, type_name):
-        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
+        return locked("topic_wrong_type", topic=topic, found=found, wanted=type_name)
     if code := graph.mismatched_qos(role, key, qos):
         return locked(code, topic=topic)
     return locked(unrouted, topic=topic) if role == "MS" and graph.is_unrouted(key) else None

@@ -68,7 +68,7 @@ class Check(NamedTuple):
 
 
 def _ending(of: PermissionRequest) -> Verdict | None:
-    return locked("ending") if of.grounds.ending else None
+    return locked("server_shutting_down") if of.grounds.ending else None
 
 
 def _log(of: PermissionRequest) -> Verdict | None:
@@ -87,7 +87,16 @@ CHECKS: Final = (
 
 # Why a receipt says that it was refused, by a verdict's code; "interlock" for all others.
 CAUSES: Final[Mapping[str, Cause]] = {
-    **dict.fromkeys((*LINK_CODES, "no_service", "no_parameters", "getting_ready", "ending"), "link"),
+    **dict.fromkeys(
+        (
+            *LINK_CODES,
+            "service_unavailable",
+            "parameter_node_unavailable",
+            "service_connecting",
+            "server_shutting_down",
+        ),
+        "link",
+    ),
     "log": "log",
 }
 

@@ -26,18 +26,18 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
     if found is None:
-        return locked("no_service", name=name)
+        return locked("service_unavailable", name=name)
     if found != call.type:
-        return locked("wrong_type", topic=name, found=found, wanted=call.type)
+        return locked("topic_wrong_type", topic=name, found=found, wanted=call.type)
     if mismatch := _unfit(role, name, robot):
         return mismatch
     ready_at = robot.graph.since(role, key) + robot.traits.server_settle_s
     if now < ready_at:
-        return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
+        return Verdict(False, "service_connecting", say("service_connecting", name=name), ready_at)
     known = robot.command_status.get(call.id, IDLE)
     if not known.busy:
         return None
-    return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
+    return locked("goal_may_be_running") if known.outcome == "unknown" else locked("press_in_progress")
 
 
 def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:
@@ -45,7 +45,7 @@ def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:
     definition is another one, or neither is known yet."""
     graph, key = robot.graph, robot.key(name)
     if robot.nodes_are_read and graph.since(role, key) > graph.nodes_read_at:
-        return locked("getting_ready", name=name)
+        return locked("service_connecting", name=name)
     if vendor := uncallable_dds(graph, role, key):
         return locked(robot.traits.sentences.uncallable, name=name, vendor=vendor)
     return definition_mismatch(role, name, robot)
@@ -59,7 +59,7 @@ def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
         parameter, known, robot.traits.sentences.timeout_hint
     ):
         return mismatch
-    return locked("busy") if robot.command_status.get(parameter.id, IDLE).busy else None
+    return locked("press_in_progress") if robot.command_status.get(parameter.id, IDLE).busy else None
 
 
 def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
@@ -67,9 +67,9 @@ def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
     for name, wanted in (GET, DESCRIBE, SET):
         found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
         if found is None:
-            return locked("no_parameters", node=node)
+            return locked("parameter_node_unavailable", node=node)
         if found != wanted:
-            return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
+            return locked("topic_wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
         if mismatch := _unfit("SS", f"{node}/{name}", robot):
             return mismatch
     return None
@@ -81,13 +81,13 @@ def unsettable(parameter: Parameter, known: ParameterState, timeout_hint: str) -
     code = {
         "waiting": "parameter_waiting",
         "cut": "parameter_waiting",
-        "silent": "parameter_silent",
+        "silent": "parameter_no_reply",
         "undeclared": "parameter_undeclared",
         "mistyped": "parameter_mistyped",
         "unreadable": "parameter_unreadable",
     }.get(known.state)
     node, name = parameter.node, parameter.parameter
-    if code == "parameter_silent" and known.wall == 0.0:
+    if code == "parameter_no_reply" and known.wall == 0.0:
         return Verdict(False, code, _silent_parameter(node, name, timeout_hint))
     if code is not None:
         return locked(code, node=node, name=name, found=known.robot_type, wanted=parameter.type)
@@ -96,10 +96,14 @@ def unsettable(parameter: Parameter, known: ParameterState, timeout_hint: str) -
     if not has_allowed_value(parameter, known):
         theirs = each_text(parameter, known.range)
         return locked(
-            "parameter_apart", node=node, name=name, theirs=theirs, ours=panel_limits_text(parameter)
+            "parameter_no_common_value",
+            node=node,
+            name=name,
+            theirs=theirs,
+            ours=panel_limits_text(parameter),
         )
     return None
 
 
 def _silent_parameter(node: str, name: str, timeout_hint: str) -> TextLike:
-    return joined([say("parameter_silent", node=node, name=name), hint(timeout_hint)])
+    return joined([say("parameter_no_reply", node=node, name=name), hint(timeout_hint)])

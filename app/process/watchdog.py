@@ -53,10 +53,10 @@ class Watchdog:
         while True:
             stuck = await self._unresponsive_links()
             if stuck != self._unresponsive and stuck:
-                log.critical("%s", say("link_stands_still", name=stuck))
+                log.critical("%s", say("link_session_stalled", name=stuck))
             self._unresponsive = stuck
             if not self._stopping:
-                text = say("link_stands_still", name=stuck) if stuck else self._status_text()
+                text = say("link_session_stalled", name=stuck) if stuck else self._status_text()
                 ping = ["WATCHDOG=1"] if self._manager.interval_s and not stuck else []
                 self._manager.notify(*ping, status_line(render(text)))
             await asyncio.sleep(self._every_s)

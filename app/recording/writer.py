@@ -101,7 +101,7 @@ class Recordings:
         """Sets the fault. The next press starts a new file."""
         why = os_error_text(error) if isinstance(error, OSError) else str(error)
         log.error("recording stopped, in %s: %s", self._folder.path, why)
-        self._set_fault(say("not_recorded", why=why))
+        self._set_fault(say("recording_failed", why=why))
 
     def _prepare(self) -> None:
         try:

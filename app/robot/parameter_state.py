@@ -166,8 +166,10 @@ def each_text(parameter: Parameter, limits: Range) -> TextLike:
     """The allowed values of one element, as text."""
     match parameter.element_type:
         case "bool":
-            return say("either", first=parameter.on, last=parameter.off)
+            return say("condition_either", first=parameter.on, last=parameter.off)
         case "string":
-            return say("any_text")
+            return say("limits_any_text")
     whole = parameter.element_type == "integer"
-    return range_text(limits, parameter.unit) or say("any_whole" if whole else "any_number")
+    return range_text(limits, parameter.unit) or say(
+        "limits_any_whole_number" if whole else "limits_any_number"
+    )

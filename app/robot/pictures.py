@@ -122,7 +122,7 @@ def _yuv(y: int, u: int, v: int, raw: Raw) -> "Image":
     from PIL import Image
 
     if raw.width % 2:
-        raise NoPicture(say("camera_broken", wanted=RAW))
+        raise NoPicture(say("camera_incomplete", wanted=RAW))
     rows = raw.rows(2)
     whole, half = (raw.width, raw.height), (raw.width // 2, raw.height)
     colours = [
@@ -163,7 +163,7 @@ def picture(interfaces: Interfaces, type_name: str, payload: bytes, most: int) -
     try:
         message = interfaces.decode(type_name, payload)
     except DecodeError:
-        raise NoPicture(say("camera_broken", wanted=type_name)) from None
+        raise NoPicture(say("camera_incomplete", wanted=type_name)) from None
     if type_name == RAW:
         return raw(message, most)
     return compressed(bytes(message.data), most)
@@ -189,14 +189,14 @@ def _opened(file: bytes) -> "Image":
     except UnidentifiedImageError:
         raise NoPicture(say("camera_format")) from None
     except Exception:  # a damaged head
-        raise NoPicture(say("camera_broken", wanted=COMPRESSED)) from None
+        raise NoPicture(say("camera_incomplete", wanted=COMPRESSED)) from None
 
 
 def _decoded(image: "Image") -> Picture:
     try:
         image.load()
     except Exception:  # a damaged file
-        raise NoPicture(say("camera_broken", wanted=COMPRESSED)) from None
+        raise NoPicture(say("camera_incomplete", wanted=COMPRESSED)) from None
     return _packed(_scaled(image))
 
 
@@ -210,7 +210,7 @@ def raw(message: Any, most: int) -> Picture:
     # Nothing is made by a size that the message only claims: `step` says little about a single row.
     step = row if height == 1 and step >= row else step
     if not (width > 0 and height > 0 and row <= step) or len(message.data) < step * (height - 1) + row:
-        raise NoPicture(say("camera_broken", wanted=RAW))
+        raise NoPicture(say("camera_incomplete", wanted=RAW))
     _check_size(width, height, most)
     data = bytes(message.data[: step * height])
     return _packed(encoding.draw(Raw(data, width, height, step, bool(message.is_bigendian))))

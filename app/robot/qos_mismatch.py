@@ -7,16 +7,16 @@ from app.interfaces.names import Qos
 def reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
     """Why a subscription with this QoS does not match a publisher."""
     if qos.reliable and publisher.reliable is False:
-        return "publishes_best_effort"
+        return "qos_robot_best_effort"
     if qos.transient_local and not publisher.transient_local:
-        return "publishes_volatile"
+        return "qos_robot_volatile"
     return None
 
 
 def writer_mismatch(subscriber: Endpoint, qos: Qos) -> str | None:
     """Why a subscriber does not match a publisher with this QoS."""
     if not qos.reliable and subscriber.reliable:
-        return "asks_for_reliable"
+        return "qos_robot_requires_reliable"
     if not qos.transient_local and subscriber.transient_local:
-        return "asks_for_transient_local"
+        return "qos_robot_requires_transient_local"
     return None

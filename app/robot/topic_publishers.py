@@ -34,7 +34,7 @@ class Publishers(NamedTuple):
         more = len(self.nodes) - MAX_NAMES
         names = self.nodes[:MAX_NAMES]
         shown = say("and_more", names=names, number=more) if more > 0 else names
-        return say("published_by", topic=topic, names=shown)
+        return say("interlock_published_by", topic=topic, names=shown)
 
 
 class TopicPublishers:

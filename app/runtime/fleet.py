@@ -82,7 +82,7 @@ class Fleet:
             (session.robot.name, session.link_verdict.reason or say("ready"))
             for session in self.sessions
         ]
-        return joined(say("ready_of", name=n, state=s) if n else s for n, s in states)
+        return joined(say("ready_robot", name=n, state=s) if n else s for n, s in states)
 
     @property
     def first(self) -> RobotSession:

@@ -93,7 +93,7 @@ class Feed:
         """Keeps the topic subscribed to during the block, and `LINGER_S` longer. `client` is that of
         `client_key`; TooMany if no more of its viewers may look."""
         if not self._viewers.has_place(client):
-            raise TooMany(say("camera_lookers", most=self._viewers.most(client)), 5)
+            raise TooMany(say("camera_too_many_viewers", most=self._viewers.most(client)), 5)
         self._viewers.take(client)
         self._subscribe()
         try:
@@ -117,7 +117,7 @@ class Feed:
         """The picture of a frame, encoded once for all viewers; NoPicture says why there is none."""
         try:
             if found := self._robot.difference("MP", self._key):
-                raise NoPicture(say("definition_differs", name=self.topic, type=found.type))
+                raise NoPicture(say("topic_definition_differs", name=self.topic, type=found.type))
             if len(frame.payload) > widget.max_bytes:
                 size, most = len(frame.payload), widget.max_bytes
                 raise NoPicture(say("camera_large", size=size, most=most))

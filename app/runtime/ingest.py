@@ -196,4 +196,4 @@ def _change(before: Verdict, verdict: Verdict) -> Change:
     as a readout, so it waits for a frame as a readout does."""
     if (before.permitted, before.reason) == (verdict.permitted, verdict.reason):
         return ""
-    return "soon" if verdict.code == "unmet" and not before.permitted else "now"
+    return "soon" if verdict.code == "interlock_condition_unmet" and not before.permitted else "now"

@@ -40,20 +40,20 @@ def _can_not_be_compared(graph: LiveGraph, role: Role, key: str) -> bool:
 def _differences(found: dict[str, Difference], robot: RobotState) -> Iterator[TextLike]:
     for name, of in [*found.items()][:NAMED_MOST]:
         yield say(
-            "definition_hashes",
+            "link_definition_hashes",
             name=name,
             type=of.type,
-            node=of.node or say("definition_of_robot"),
+            node=of.node or say("link_definition_node_unknown"),
             theirs=of.theirs,
             ours=of.ours,
             source=robot.definition_source(of.type),
         )
     if len(found) > NAMED_MOST:
-        yield say("definitions_more", number=len(found) - NAMED_MOST)
+        yield say("link_definitions_more", number=len(found) - NAMED_MOST)
 
 
 def _unhashed(names: list[str]) -> Iterator[TextLike]:
     if not names:
         return
     named, more = tuple(names[:NAMED_MOST]), len(names) - NAMED_MOST
-    yield say("no_hashes", names=say("and_more", names=named, number=more) if more > 0 else named)
+    yield say("link_no_hashes", names=say("and_more", names=named, number=more) if more > 0 else named)

@@ -104,7 +104,9 @@ def _reading(widget: ShownTopic, robot: RobotState) -> Reading | FieldState:
 def _dated(reading: Reading, value: Any, max_age_s: float | None, now: float) -> FieldState:
     """The state of a received message with this value, by its age."""
     if reading.status == "cut":
-        return FieldState("old", say("readout_cut", time=format_time(reading.wall)), value)
+        return FieldState(
+            "old", say("readout_before_disconnect", time=format_time(reading.wall)), value
+        )
     until = math.inf if max_age_s is None else reading.at + max_age_s
     if now < until:
         return FieldState("live", _received(format_time(reading.wall)), value, until)

@@ -25,28 +25,28 @@ from app.view.definition_notes import definition_notes
 State = Literal["ok", "wait", "bad"]
 
 PEER: Final = LINK_CODES | {sentences.unrouted for sentences in EVERY_SENTENCES}
-GONE: Final = frozenset({"no_publisher", "no_service", "no_parameters"})
+GONE: Final = frozenset({"interlock_no_publisher", "service_unavailable", "parameter_node_unavailable"})
 NODE: Final = GONE.union(sentences.uncallable for sentences in EVERY_SENTENCES) | {
-    "waiting",
-    "cut",
-    "stale",
-    "stale_entry",
-    "unreadable",
-    "new_publisher",
-    "several_publishers",
-    "reading",
-    "missing",
-    "not_a_number",
-    "several",
-    "wrong_type",
-    "definition_differs",
-    "publishes_best_effort",
-    "publishes_volatile",
-    "asks_for_reliable",
-    "asks_for_transient_local",
-    "getting_ready",
+    "interlock_waiting",
+    "interlock_connection_lost",
+    "interlock_stale",
+    "interlock_stale_field",
+    "interlock_unreadable",
+    "interlock_new_publisher",
+    "interlock_several_publishers",
+    "interlock_reading",
+    "interlock_field_missing",
+    "interlock_not_a_number",
+    "interlock_field_ambiguous",
+    "topic_wrong_type",
+    "topic_definition_differs",
+    "qos_robot_best_effort",
+    "qos_robot_volatile",
+    "qos_robot_requires_reliable",
+    "qos_robot_requires_transient_local",
+    "service_connecting",
     "parameter_waiting",
-    "parameter_silent",
+    "parameter_no_reply",
     "parameter_unreadable",
 }
 
@@ -78,8 +78,8 @@ def _peer_lamps(sentences: PeerSentences) -> Mapping[str, tuple[State, str]]:
         sentences.absent: ("bad", "absent"),
         sentences.absent_named: ("bad", "absent"),
         sentences.silent: ("bad", "silent"),
-        "joining": ("wait", "pending"),
-        "catching_up": ("wait", "pausing"),
+        "link_connecting": ("wait", "pending"),
+        "link_catching_up": ("wait", "pausing"),
         "permitted": ("ok", "ok"),
     }
 
@@ -127,11 +127,11 @@ def _node(
     if _peer_lamps(sentences)[passable.code][0] == "bad":
         return "bad", "lost", say(sentences.nodes_unknown)
     if silence:
-        return "bad", "node_silent", silence
+        return "bad", "link_node_silent", silence
     gone = robot.presence.missing(robot.graph)
     if not robot.presence.any_present(robot.graph):
         absent = say(sentences.nodes_absent) if passable.permitted else ""
-        return "wait", "no_node", _gone(sentences, gone) if gone else absent
+        return "wait", "link_no_node", _gone(sentences, gone) if gone else absent
     if gone and _first(verdicts, GONE).reason:
         return "ok", "ok", _gone(sentences, gone)
     return "ok", "ok", _first(verdicts, NODE).reason or ""
@@ -154,8 +154,10 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
         if now >= stale_at:
             limit = number(f"{of.max_age_s:g}")
             if has_key(of.field):
-                return say("node_stale_entry", field=of.field, topic=of.topic, limit=limit), math.inf
-            return say("node_stale", topic=of.topic, limit=limit), math.inf
+                return say(
+                    "link_node_stale_field", field=of.field, topic=of.topic, limit=limit
+                ), math.inf
+            return say("link_node_stale", topic=of.topic, limit=limit), math.inf
         until = min(until, stale_at)
     return "", until
 

@@ -16,7 +16,7 @@ def log(widget: LogView, robot: RobotState) -> tuple[dict[str, Any], float]:
     if mismatch := topic_mismatch("MS", widget, robot):
         shown |= {"state": "unreadable", "note": mismatch.reason or ""}
     elif not robot.link_up or not robot.graph.peers:
-        shown |= {"state": "old", "note": say("rosout_cut")}
+        shown |= {"state": "old", "note": say("rosout_no_connection")}
     elif not count:
         shown |= {"state": "waiting", "note": say("readout_waiting", topic=widget.topic)}
     return shown, math.inf

@@ -105,21 +105,23 @@ def never_received(known: ParameterState) -> bool:
 def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> TextLike:
     time = format_time(known.wall)
     mismatch = parameters_offered(parameter.node, robot)
-    never_queried = (robot.traits.sentences.uncallable, "definition_differs")
+    never_queried = (robot.traits.sentences.uncallable, "topic_definition_differs")
     if mismatch is not None and mismatch.code in never_queried:
         return mismatch.reason or ""
     if never_received(known):
         silent = known.state == "silent" and parameter.id not in robot.querying
-        return say("parameter_unanswered" if silent else "parameter_asking", node=parameter.node)
+        return say(
+            "parameter_no_response" if silent else "parameter_waiting_for_node", node=parameter.node
+        )
     match known.state:
         case "cut":
-            return say("parameter_cut", time=time)
+            return say("parameter_read_before_disconnect", time=time)
         case "silent":
-            return say("parameter_no_answer", time=time)
+            return say("parameter_no_response_since", time=time)
         case "missing":
-            return say("parameter_no_value")
+            return say("parameter_declared_without_value")
         case "undeclared":
-            return say("parameter_not_there", node=parameter.node)
+            return say("parameter_not_declared", node=parameter.node)
         case "mistyped":
             name, found = parameter.parameter, known.robot_type
             return say(
@@ -128,7 +130,9 @@ def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Tex
         case "unreadable":
             return say("parameter_unreadable", node=parameter.node, name=parameter.parameter)
     reports = reports_changes(robot)
-    return say("parameter_read" if reports else "parameter_told", time=time, node=parameter.node)
+    return say(
+        "parameter_read" if reports else "parameter_read_without_events", time=time, node=parameter.node
+    )
 
 
 def reports_changes(robot: RobotState) -> bool:

@@ -25,7 +25,7 @@ def robot_word(passable: Verdict) -> RobotWord:
     """The word for the verdict of the link."""
     if passable.permitted:
         return _word("online")
-    return _word("unknown" if passable.code in ("joining", "catching_up") else "lost")
+    return _word("unknown" if passable.code in ("link_connecting", "link_catching_up") else "lost")
 
 
 @cache

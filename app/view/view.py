@@ -209,7 +209,7 @@ def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) 
 
 def _embedded(attributes: Attributes) -> Attributes:
     """The attributes of a widget on a page that may only show."""
-    reason = say("embedded")
+    reason = say("page_embedded")
     overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
     overlay |= {"stoppable": False, "askable": False}
     return {name: overlay.get(name, value) for name, value in attributes.items()}

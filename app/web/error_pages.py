@@ -61,7 +61,7 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     """Starlette's own: no such path, wrong method, body too large."""
     if not isinstance(error, HTTPException):
         raise error
-    code = "path_missing" if error.status_code == 404 else "request_unfit"
+    code = "path_missing" if error.status_code == 404 else "path_method_not_allowed"
     message = say(code, path=printable(request.url.path)[:200])
     answer = error_answer(request, error.status_code, message)
     answer.headers.update(error.headers or {})

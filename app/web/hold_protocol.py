@@ -35,14 +35,14 @@ END_REASONS: Final[Mapping[str, str]] = {
     "released": RELEASED,
     "cancel": "hold_by_cancel",
     "sliding": "hold_by_sliding",
-    "second": "hold_by_second",
+    "second": "hold_by_second_finger",
     "menu": "hold_by_menu",
     "blur": "hold_by_blur",
     "hiding": "hold_by_hiding",
     "leaving": "hold_by_leaving",
     "lock": "hold_by_lock",
     "escape": "hold_by_escape",
-    "silence": "hold_by_silence",
+    "silence": "hold_by_no_response",
 }
 Deflected = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]

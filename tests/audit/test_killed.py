@@ -85,7 +85,7 @@ def test_nothing_is_lost_by_kills_under_presses(
     assert len(heard) >= KILLS
     assert [text for text in heard if text not in pressed] == [], seed
     assert pressed.keys() == closed.keys(), seed
-    cut = {p for p, entry in closed.items() if entry.reason == say("log_ended")}
+    cut = {p for p, entry in closed.items() if entry.reason == say("press_unknown_server_ended")}
     assert cut.isdisjoint(receipts), seed
     until(last.ready, "ready")
     assert last.press("operation", "after all").status_code == 200

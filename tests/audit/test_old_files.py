@@ -11,11 +11,13 @@ import pytest
 
 from app.audit import Entry, Filter, Limits, OperatorLog, Origin, new_entry
 from app.audit.database import NAME
+from app.audit.entry import reason_as_json
 from app.audit.export import csv_chunks
-from app.audit.queries import open_presses, rows
+from app.audit.queries import OpenPress, open_presses, rows
 from app.audit.verify import verify
-from app.i18n import PanelText, Text, number, say, time_of_day
-from app.i18n.catalogue import catalogues_in
+from app.i18n import ENGLISH, PanelText, Text, number, render, say, sentences, time_of_day
+from app.i18n.__main__ import placeholders
+from app.i18n.catalogue import catalogues_in, renamed_codes
 
 # As that version made its file.
 SCHEMA: Final = """
@@ -32,6 +34,7 @@ CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> '';
 PRAGMA application_id = 1330662471;
 PRAGMA user_version = 1;
 """
+SENTENCES: Final = sentences(ENGLISH)
 GENESIS: Final = "ab" * 32
 WHO: Final = ("10.0.0.7", "b1", "Panel 1", "")
 PRESS: Final = ("p1", "say", "press", '{"message": "hé"}', "77-1", "permitted", "77-2")
@@ -111,7 +114,7 @@ def test_an_old_file_is_opened_continued_and_verified(folder: Path) -> None:
     assert (verify(folder).count, verify(folder).fault) == (len(found), "")
     assert {one.text for one in found[:4]} == {""}
     assert [json.loads(one.text)["code"] for one in found[4:] if one.reason] == [
-        "log_ended",
+        "press_unknown_server_ended",
         "log_began",
         "published",
     ]
@@ -148,11 +151,11 @@ def test_texts_of_the_panel_numbers_and_times_are_in_the_language_of_who_reads_a
     folder: Path, tmp_path: Path
 ) -> None:
     label = PanelText({"en": "Limit", "de": "Grenze"}, "en")
-    why = say("off_limits", label=label, given=number("7.5", "m"), limits=number("1,234.5"))
+    why = say("input_outside_limits", label=label, given=number("7.5", "m"), limits=number("1,234.5"))
     continued(folder, reason=say("refused", why=why, time=time_of_day("11:00:00")))
     (tmp_path / "de.po").write_text(
         'msgid "refused"\nmsgstr "Nicht gesendet um {time}: {why}"\n'
-        'msgid "off_limits"\nmsgstr "{label} ist {given}: erlaubt ist {limits}"\n'
+        'msgid "input_outside_limits"\nmsgstr "{label} ist {given}: erlaubt ist {limits}"\n'
     )
     with catalogues_in(tmp_path):
         last = entries(folder)[-1]
@@ -187,3 +190,21 @@ def test_an_entry_whose_code_this_version_does_not_know_is_shown_as_it_was_writt
     strange = new_entry("refused", reason="As it was.")._replace(text='{"code": "gone", "params": {}}')
     broken = strange._replace(text='{"code": 1')
     assert [one.reason_in("xx") for one in (strange, broken)] == ["As it was."] * 2
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_entry_with_a_former_code_is_shown_with_its_sentence(language: str) -> None:
+    for former, present in renamed_codes().items():
+        about = {name: f"<{name}>" for name in placeholders(SENTENCES[present])}
+        sentence = say("refused", why=say(present, **about), time="10:00:00")
+        text = reason_as_json(sentence).replace(f'"code":"{present}"', f'"code":"{former}"')
+        entry = new_entry("refused", reason=sentence)._replace(text=text)
+        assert former in text
+        assert former not in SENTENCES
+        assert entry.reason_text == sentence
+        assert entry.reason_in(language) == render(sentence, language)
+
+
+def test_open_press_with_a_former_code_has_the_present_one() -> None:
+    press = OpenPress(new_entry("pressed"), "", "", '{"code":"goal_lost","params":{}}', False)
+    assert press.code == "goal_forgotten"

@@ -188,7 +188,7 @@ def test_a_lock_that_arrives_while_the_disk_is_busy_wins() -> None:
         assert "sent" not in bench.happened
         assert [(e.kind, e.outcome, e.verdict) for e in log.entries] == [
             ("pressed", "", ""),
-            ("closed", "refused", "forbidden"),
+            ("closed", "refused", "interlock_not_permitted"),
         ]
 
     slow(work)
@@ -242,7 +242,7 @@ def test_two_presses_of_one_service_wait_for_the_disk_and_one_is_sent() -> None:
         outcomes = [receipt.outcome for receipt in await asyncio.gather(*both)]
         assert outcomes == ["timed_out", "refused"]
         assert bench.happened.count("sent") == 1
-        assert {e.verdict for e in log.entries if e.outcome == "refused"} == {"busy"}
+        assert {e.verdict for e in log.entries if e.outcome == "refused"} == {"press_in_progress"}
         bench.queries[0].cancel()
 
     slow(work, panel_of(SET, *_message()))
@@ -367,7 +367,7 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
         permits(bench.robot, False)
         await bench.press("guarded", "p2")
         await bench.press("free", "p2")
-        by = PressContext(KIM, stale_reason=lambda: say("seen_before_restart"))
+        by = PressContext(KIM, stale_reason=lambda: say("press_seen_before_restart"))
         await bench.presses.press("free", {"message": "hi"}, "p3", by)
 
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]

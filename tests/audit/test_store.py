@@ -60,7 +60,7 @@ def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> Non
     assert found.hash == found.computed_hash()
 
 
-@pytest.mark.parametrize("reason", ['Nein: "ö"\\', say("waiting", topic="/ö")])
+@pytest.mark.parametrize("reason", ['Nein: "ö"\\', say("interlock_waiting", topic="/ö")])
 def test_a_hash_can_be_computed_by_any_reader_of_the_file(
     store: Store, tmp_path: Path, reason: TextLike
 ) -> None:

@@ -121,7 +121,7 @@ def test_a_service_or_an_action_of_another_definition_is_locked_and_never_called
         for widget, name in CALLS.items():
             said = until(partial(differs, kiosk, widget), f"{name} is locked")
             assert name in said
-            assert code_of(kiosk, widget) == "definition_differs"
+            assert code_of(kiosk, widget) == "topic_definition_differs"
         details = kiosk.snapshot()["link"]["node"]["reason"]
         assert served.calls() == []
         assert served.goals() == []
@@ -155,7 +155,7 @@ def test_a_topic_of_another_definition_is_not_read_and_not_written(
             said = until(partial(differs, kiosk, widget), f"{topic} is not used")
             assert topic in said
         assert kiosk.widget("words")["state"] == "unreadable"
-        assert (code_of(kiosk, "say"), code_of(kiosk, "go")) == ("definition_differs",) * 2
+        assert (code_of(kiosk, "say"), code_of(kiosk, "go")) == ("topic_definition_differs",) * 2
         assert fast_node.heard("/said") == []
 
 
@@ -202,5 +202,5 @@ def test_a_server_on_fast_dds_is_locked_by_its_vendor(
     with live_server(cyclone_bridge, tmp_path, panel) as kiosk:
         for widget in ("list", "simulated"):
             until(partial(is_on_fast_dds, kiosk, widget), "it is locked")
-        assert code_of(kiosk, "list") == "wrong_rmw"
+        assert code_of(kiosk, "list") == "service_wrong_rmw"
         assert "Fast DDS" in kiosk.snapshot()["link"]["node"]["reason"]

@@ -127,14 +127,14 @@ def test_a_value_is_set_and_shown_as_the_node_has_it(kiosk: Server, robot: Cyclo
 @pytest.mark.parametrize(
     ("widget", "value", "code", "limits"),
     [
-        ("speed", 1.6, "off_limits", "0 to 1.5 m/s, in steps of 0.1"),
-        ("speed", 0.55, "off_limits", "0 to 1.5 m/s, in steps of 0.1"),
-        ("speed", "fast", "no_number", "0 to 1.5 m/s, in steps of 0.1"),
-        ("speed", "", "number_empty", "0 to 1.5 m/s, in steps of 0.1"),
-        ("limit", 101, "off_limits", "0 to 100"),
-        ("limit", 1.5, "no_number", "0 to 100"),
-        ("enabled", 1, "no_toggle", ""),
-        ("name", 7, "no_text", "1000"),
+        ("speed", 1.6, "input_outside_limits", "0 to 1.5 m/s, in steps of 0.1"),
+        ("speed", 0.55, "input_outside_limits", "0 to 1.5 m/s, in steps of 0.1"),
+        ("speed", "fast", "input_not_a_number", "0 to 1.5 m/s, in steps of 0.1"),
+        ("speed", "", "input_number_empty", "0 to 1.5 m/s, in steps of 0.1"),
+        ("limit", 101, "input_outside_limits", "0 to 100"),
+        ("limit", 1.5, "input_not_a_number", "0 to 100"),
+        ("enabled", 1, "input_not_a_boolean", ""),
+        ("name", 7, "parameter_not_a_text", "1000"),
     ],
 )
 def test_what_the_node_would_not_take_is_not_sent(
@@ -253,7 +253,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
         own_cyclone_bridge.kill()
         receipt = waiting.result()
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
-    assert receipt.json()["code"] == "call_cut"
+    assert receipt.json()["code"] == "call_connection_lost"
     shown = kiosk.widget("name")
     assert (shown["state"], shown["text"], shown["enabled"]) == ("old", "cyclone", False)
     until(lambda: robot.parameters()["name"] == "later", "The robot may or may not have done it")

@@ -79,7 +79,7 @@ def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
             answers = list(pool.map(lambda _: kiosk.http.get("/readyz"), range(20)))
         assert time.monotonic() - began < 3
         for answer in answers:
-            assert (answer.status_code, answer.json()["code"]) == (503, "bridge_silent")
+            assert (answer.status_code, answer.json()["code"]) == (503, "link_bridge_silent")
         assert "does not respond" in answers[0].json()["reason"]
         assert kiosk.http.get("/healthz").status_code == 200
         until(lambda: not kiosk.widget("operation")["enabled"], "and soon all is locked", within_s=8)
@@ -99,7 +99,7 @@ def test_a_bridge_whose_main_loop_ended_is_seen_at_the_request(
         token.undeclare()
     assert own_bridge.process.running
     assert answer.status_code == 503
-    assert answer.json()["code"] in ("no_bridge", "bridge_silent")
+    assert answer.json()["code"] in ("link_no_bridge", "link_bridge_silent")
 
 
 def test_health_answers_while_every_thread_of_the_executors_is_busy() -> None:

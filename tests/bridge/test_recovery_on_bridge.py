@@ -197,7 +197,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
     shown = again.widget("count")
     assert "may still be running" in shown["result"]
     assert (shown["goal"], shown["busy"], shown["stoppable"]) == ("UNKNOWN", True, False)
-    assert cancel(again, press="goal-1").json()["code"] == "cancel_unheard"
+    assert cancel(again, press="goal-1").json()["code"] == "cancel_may_not_have_arrived"
     robots(own_cyclone_bridge.domain)
     until(lambda: again.widget("count")["enabled"], "offered, and the robot does not know it")
     assert "no longer knows this goal" in again.widget("count")["result"]
@@ -214,5 +214,5 @@ def test_without_a_log_nothing_is_known(
     until(lambda: again.widget("count")["enabled"], "open")
     assert again.widget("count")["result"] == ""
     late = cancel(again, press="goal-1")
-    assert late.json()["code"] == "goal_over"
+    assert late.json()["code"] == "cancel_goal_ended"
     robot.cancel()

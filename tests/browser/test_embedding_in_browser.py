@@ -55,7 +55,7 @@ OPEN: Final = """(path) => new Promise((done) => {
   socket.onopen = () => done("open");
   socket.onerror = () => done("refused");
 })"""
-LOCKED: Final = render(say("embedded"))
+LOCKED: Final = render(say("page_embedded"))
 
 
 @contextmanager

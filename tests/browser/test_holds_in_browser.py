@@ -83,7 +83,7 @@ TOUCHES: Final = {
     "released": ("up", "hold_released"),
     "pointer cancelled": ("cancel", "hold_by_cancel"),
     "slid off": ("slide_off", "hold_by_sliding"),
-    "second finger": ("second", "hold_by_second"),
+    "second finger": ("second", "hold_by_second_finger"),
 }
 
 
@@ -164,7 +164,7 @@ def test_the_servers_end_stops_the_robot_first(finger: Finger, jogger: RosNode) 
     finger.server.process.wait(10)
     time.sleep(QUIET_S)
     soon("server ended", times(jogger, before, began))
-    assert codes(finger.server, ends) == ["hold_by_stopping"]
+    assert codes(finger.server, ends) == ["hold_by_shutdown"]
     expect(finger.page.locator("#receipt-jog")).to_contain_text("the panel server is shutting down")
     expect(finger.button).to_be_disabled()
     assert finger.state is None

@@ -151,7 +151,7 @@ def drive_ended_by(
 
 TOUCHES: Final = {
     "released": ("up", "hold_released"),
-    "second finger": ("second", "hold_by_second"),
+    "second finger": ("second", "hold_by_second_finger"),
 }
 
 

@@ -124,7 +124,7 @@ def answer(page: Page, script: str, fault: str) -> None:
 def is_locked(page: Page) -> None:
     """The page says why, and nothing on it can be pressed."""
     expect(page.locator("body[data-locked]")).to_be_attached()
-    expect(page.locator("#fault")).to_have_text(sentence("page_faulty"))
+    expect(page.locator("#fault")).to_have_text(sentence("page_incomplete"))
     expect(page.locator("#fault")).to_be_visible()
     expect(page.locator("#state")).to_have_attribute("data-state", "unknown")
     assert page.locator("form.page [type=submit]:enabled, .hold:enabled").count() == 0
@@ -212,8 +212,8 @@ def test_a_page_is_locked_in_the_readers_language(demo: Server, tab: Page, langu
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
     answer(tab, "main", "500")
     go(tab, demo.url)
-    expect(tab.locator("#fault")).to_have_text(sentence("page_faulty", language))
-    expect(tab.locator("#why-operation")).to_contain_text(sentence("page_faulty", language))
+    expect(tab.locator("#fault")).to_have_text(sentence("page_incomplete", language))
+    expect(tab.locator("#why-operation")).to_contain_text(sentence("page_incomplete", language))
 
 
 def kept_timers(page: Page) -> list[int]:
@@ -296,7 +296,7 @@ def test_a_press_that_fails_before_it_is_sent_says_that_it_was_not(demo: Server,
     for broken in ("fetch = () => { throw new Error() }", "Date.prototype.toISOString = null"):
         tab.evaluate(f"() => {{ {broken} }}")
         button.click()
-        expect(tab.locator("#receipt-operation")).to_have_text(sentence("page_unsent"))
+        expect(tab.locator("#receipt-operation")).to_have_text(sentence("page_press_not_sent"))
         expect(tab.locator("#receipt-operation")).to_have_attribute("data-outcome", "refused")
         expect(button).not_to_have_attribute("aria-busy", "true")
 

@@ -181,7 +181,7 @@ def test_a_press_of_a_page_that_showed_the_lock_before_it_changed_is_stale() -> 
         permits(robot, permitted)
         publisher.post(build_view(panel, robot, NOW).view)
     assert publisher.view["widgets"]["guarded"]["enabled"]
-    assert reason("guarded", seen) == "changed_meanwhile"
+    assert reason("guarded", seen) == "press_state_changed"
     assert reason("free", seen) == ""
     assert reason("guarded", publisher.id) == ""
 

@@ -134,7 +134,7 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
         bench.line.queries[0][2].set_result(b"\0\1\0\0")
         answer = await call
         assert answer.outcome == "unknown"
-        assert coded(answer.text, "wanted") == ("answer_unreadable", TRIGGER)
+        assert coded(answer.text, "wanted") == ("call_response_unreadable", TRIGGER)
 
     run(test)
 
@@ -172,7 +172,7 @@ def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
         bench.line.queries[0][2].set_result(None)
         answer = await call
         assert answer.outcome == "unknown"
-        assert coded(answer.text, "service") == ("call_dropped", "/reset")
+        assert coded(answer.text, "service") == ("call_no_reply_from_bridge", "/reset")
 
     run(test)
 
@@ -218,7 +218,7 @@ def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
         bench.lose_the_bridge()
         answer = await waiting
         assert answer.outcome == "unknown"
-        assert coded(answer.text) == ("call_cut",)
+        assert coded(answer.text) == ("call_connection_lost",)
 
     run(test)
 
@@ -235,9 +235,9 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_says_its_result() -> None:
         await in_doubt(bench)
         outcomes = [bench.shown.outcome]
         bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
-        assert locked_by(bench) == "perhaps_busy"
+        assert locked_by(bench) == "goal_may_be_running"
         await queried(bench, 3)
-        assert (locked_by(bench), bench.shown.can_cancel) == ("perhaps_busy", True)
+        assert (locked_by(bench), bench.shown.can_cancel) == ("goal_may_be_running", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
         while bench.robot.command_status["count"].outcome != "succeeded":
             await asyncio.sleep(0)
@@ -322,7 +322,7 @@ def test_an_answer_to_a_cancel_that_can_not_be_read_is_no_refusal() -> None:
         bench.line.queries[-1][2].set_result(b"broken")
         answer = await cancel
         assert answer.outcome == "unknown"
-        assert answer.text == say("answer_unreadable", wanted="action_msgs/srv/CancelGoal")
+        assert answer.text == say("call_response_unreadable", wanted="action_msgs/srv/CancelGoal")
         assert bench.shown.goal == "ACCEPTED"
         await bench.actions.stop()
 
@@ -339,7 +339,7 @@ def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
         assert bench.shown.press == ""
         await accepted(bench, "g2")
         late = await bench.actions.cancel(bench.count, "g1")
-        assert (late.outcome, late.text) == ("refused", say("goal_over"))
+        assert (late.outcome, late.text) == ("refused", say("cancel_goal_ended"))
         assert bench.shown.goal == "ACCEPTED"
         assert await canceled(bench, "g2") == goal_id(bench, 2)
         assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")
@@ -499,7 +499,7 @@ def test_a_goal_without_an_answer_waits_for_the_news_of_the_cut() -> None:
         bench.line.queries[0][2].set_result(None)
         await asyncio.sleep(0.01)
         bench.lose_the_bridge()
-        assert coded((await start).text) == ("call_cut",)
+        assert coded((await start).text) == ("call_connection_lost",)
         await bench.actions.stop()
 
     run(test)
@@ -543,7 +543,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
         )
         await settled(bench)
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
-        assert bench.shown.text == say("goal_fault")
+        assert bench.shown.text == say("goal_server_error")
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown"]
 
     run(test)
@@ -577,15 +577,15 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         bench.actions.on_graph_change()
         await in_doubt(bench)
         assert (bench.shown.goal, bench.shown.can_cancel) == ("UNKNOWN", False)
-        assert bench.shown.text == say("goal_gone", name="/count")
+        assert bench.shown.text == say("goal_action_gone", name="/count")
         bench.robot.graph.apply_token(token, True)
         await queried(bench, 3)
-        assert locked_by(bench) == "perhaps_busy"
+        assert locked_by(bench) == "goal_may_be_running"
         bench.line.answer(
             INTERFACES.action_types(COUNT).get_result_response, status=0, result={"sequence": []}
         )
         await settled(bench)
-        assert bench.shown.text == say("goal_lost")
+        assert bench.shown.text == say("goal_forgotten")
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "unknown"]
 
     run(test)

@@ -146,7 +146,7 @@ def test_an_id_of_another_act_is_refused_and_does_nothing(bench: Bench, other: A
         receipt = await bench.acts.act(other, "a1")
         assert (receipt.outcome, receipt.code, receipt.cause) == (
             "refused",
-            "press_reused",
+            "press_id_reused",
             "interlock",
         )
         assert bench.control.holder == ANN
@@ -215,7 +215,7 @@ def test_who_keeps_no_cookie_is_refused_with_a_receipt(bench: Bench) -> None:
     async def work() -> None:
         program = Principal(anonymous("192.0.2.9"))
         receipt = await bench.do("take", program)
-        assert (receipt.outcome, receipt.code) == ("refused", "control_stranger")
+        assert (receipt.outcome, receipt.code) == ("refused", "control_no_cookie")
         again = bench.acts.limited(ActRequest("take", program), "a9")
         assert (again.cause, again.code) == ("limit", "control_too_often")
         assert bench.acts.receipt("a9") is None

@@ -64,7 +64,7 @@ MOVES: Final = (0.5, 0.0, 0.0)
 STOPS: Final = (0.0, 0.0, 0.0)
 A_POINT: Final = INTERFACES.encode(POINT, {"x": 0, "y": 0, "z": 0})
 WHO: Final = "127.0.0.1"
-FORBIDS: Final = say("forbidden", name="operation")
+FORBIDS: Final = say("interlock_not_permitted", name="operation")
 
 
 class Timer:
@@ -227,7 +227,7 @@ def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
     assert bench.points == [MOVES, STOPS]
     (receipt,) = bench.receipts
     assert receipt.outcome == "aborted"
-    assert coded(receipt.reason, "topic", "found") == ("wrong_type", "/jog", TEXT)
+    assert coded(receipt.reason, "topic", "found") == ("topic_wrong_type", "/jog", TEXT)
 
 
 @pytest.mark.parametrize("code", sorted(set(END_REASONS.values()) - {RELEASED} | {"hold_by_closing"}))
@@ -331,7 +331,7 @@ def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
     stopped_at, point = bench.way.sent[-1]
     assert point == STOPS
     assert stopped_at - NOW == pytest.approx(0.5)
-    assert coded(bench.receipts[0].reason, "topic", "limit") == ("stale", ENABLED, "0.5")
+    assert coded(bench.receipts[0].reason, "topic", "limit") == ("interlock_stale", ENABLED, "0.5")
 
 
 def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -> None:
@@ -340,7 +340,9 @@ def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -
     bench.holds.judge()
     (receipt,) = bench.receipts
     assert receipt.outcome == "unknown"
-    assert why(receipt.reason) == say("hold_unsaid", why=link_verdict(bench.robot, NOW).reason or "")
+    assert why(receipt.reason) == say(
+        "hold_stop_not_sent", why=link_verdict(bench.robot, NOW).reason or ""
+    )
     bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
     bench.holds.judge()
     bench.loop.pass_time(10)
@@ -392,7 +394,7 @@ def test_no_two_holds_send_on_one_topic(bench: Bench) -> None:
 
 def test_a_press_that_comes_late_is_refused(bench: Bench) -> None:
     for age_s in (LEASE_S, math.inf):
-        assert bench.refused(age_s=age_s) == ("interlock", say("hold_late"))
+        assert bench.refused(age_s=age_s) == ("interlock", say("hold_press_too_late"))
 
 
 def test_a_lock_bad_input_and_a_lost_way_refuse_as_with_a_press(bench: Bench) -> None:
@@ -412,7 +414,7 @@ def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:
     bench.begun("arm")
     bench.holds.close()
     assert sorted(bench.points) == sorted([MOVES, (-1, 0, 0), STOPS, STOPS])
-    assert bench.refused() == ("interlock", say("hold_by_stopping"))
+    assert bench.refused() == ("interlock", say("hold_by_shutdown"))
     bench.holds.close()
     assert all(timer.cancelled for timer in bench.loop.timers)
 
@@ -547,7 +549,7 @@ class Orders(RuleBasedStateMachine):
             self.beats[holding.lease.id] = max(self.beats[holding.lease.id], sent)
 
     @precondition(lambda self: self.all)
-    @rule(data=st.data(), code=st.sampled_from([RELEASED, "hold_by_closing", "hold_by_second"]))
+    @rule(data=st.data(), code=st.sampled_from([RELEASED, "hold_by_closing", "hold_by_second_finger"]))
     def end(self, data: st.DataObject, code: str) -> None:
         holding = data.draw(st.sampled_from(self.all))
         self.bench.holds.end(holding, code)

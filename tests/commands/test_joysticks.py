@@ -61,7 +61,9 @@ def test_it_begins_in_the_middle_and_sends_what_the_newest_beat_has() -> None:
     assert bench.points[-1] == (-2.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("code", sorted({*END_REASONS.values(), "hold_by_closing", "hold_by_renewal"}))
+@pytest.mark.parametrize(
+    "code", sorted({*END_REASONS.values(), "hold_by_closing", "hold_by_reconnect"})
+)
 def test_whatever_ends_a_hold_ends_it_with_zeros(code: str) -> None:
     bench = bench_of()
     holding = held(bench)

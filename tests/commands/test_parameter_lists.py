@@ -71,7 +71,7 @@ def test_what_is_no_list_is_refused(text: str) -> None:
         split_list(text)
     with pytest.raises(InputError) as refused:
         check_value(widget(type="string[]"), ParameterState("live"), text)
-    assert coded(refused.value.text, "label", "limits") == ("no_list", "Gains", TEXTS)
+    assert coded(refused.value.text, "label", "limits") == ("parameter_not_a_list", "Gains", TEXTS)
 
 
 @pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
@@ -79,7 +79,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
     began = time.process_time()
     with pytest.raises(InputError) as refused:
         check_value(widget(type="string[]"), ParameterState("live"), text.format(" " * 995))
-    assert coded(refused.value.text) == ("no_list",)
+    assert coded(refused.value.text) == ("parameter_not_a_list",)
     assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
 
@@ -110,27 +110,33 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
 @pytest.mark.parametrize(
     ("more", "given", "label", "code", "about"),
     [
-        ({}, "1, x", f"{VALUE} 2", "no_number", {"limits": "0 to 5", "given": '"x"'}),
-        ({}, "1, 7", f"{VALUE} 2", "off_limits", {"given": "7", "limits": "0 to 5"}),
+        ({}, "1, x", f"{VALUE} 2", "input_not_a_number", {"limits": "0 to 5", "given": '"x"'}),
+        ({}, "1, 7", f"{VALUE} 2", "input_outside_limits", {"given": "7", "limits": "0 to 5"}),
         (
             {"min": 1, "unit": "N"},
             [0.5],
             f"{VALUE} 1",
-            "off_limits",
+            "input_outside_limits",
             {"given": "0.5 N", "limits": "1 to 5 N"},
         ),
-        ({}, [1, None], f"{VALUE} 2", "number_empty", {"limits": "0 to 5"}),
-        ({}, 5, "Gains", "no_list", {"limits": f"0 to 5; {NUMBERS}", "given": "5"}),
-        ({}, [1.0] * 1001, "Gains", "list_long", {"count": 1001, "most": 1000}),
+        ({}, [1, None], f"{VALUE} 2", "input_number_empty", {"limits": "0 to 5"}),
+        ({}, 5, "Gains", "parameter_not_a_list", {"limits": f"0 to 5; {NUMBERS}", "given": "5"}),
+        ({}, [1.0] * 1001, "Gains", "parameter_list_too_long", {"count": 1001, "most": 1000}),
         (
             {"type": "bool[]"},
             "On, maybe",
             f"{VALUE} 2",
-            "no_toggle",
+            "input_not_a_boolean",
             {"on": "On", "off": "Off", "given": '"maybe"'},
         ),
-        ({"type": "integer[]"}, "1, 1.5", f"{VALUE} 2", "no_number", {"limits": "a whole number"}),
-        ({"type": "string[]"}, [5], f"{VALUE} 1", "no_text", {"most": 1000, "given": "5"}),
+        (
+            {"type": "integer[]"},
+            "1, 1.5",
+            f"{VALUE} 2",
+            "input_not_a_number",
+            {"limits": "a whole number"},
+        ),
+        ({"type": "string[]"}, [5], f"{VALUE} 1", "parameter_not_a_text", {"most": 1000, "given": "5"}),
     ],
 )
 def test_each_value_of_a_list_is_checked(
@@ -161,14 +167,18 @@ def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, valu
 def test_what_is_no_option_is_refused(given: Any) -> None:
     with pytest.raises(InputError) as refused:
         check_value(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
-    assert coded(refused.value.text, "label", "options") == ("no_option", "Gains", ("Slow", "Fast"))
+    assert coded(refused.value.text, "label", "options") == (
+        "input_not_an_option",
+        "Gains",
+        ("Slow", "Fast"),
+    )
 
 
 def test_an_option_that_the_node_does_not_take_is_refused() -> None:
     of = widget(type="integer", options=OPTIONS)
     with pytest.raises(InputError) as refused:
         check_value(of, ParameterState("live", range=Range(0, 1)), "2")
-    assert coded(refused.value.text, "given", "limits") == ("off_limits", "Fast", "0 to 1")
+    assert coded(refused.value.text, "given", "limits") == ("input_outside_limits", "Fast", "0 to 1")
 
 
 @pytest.mark.parametrize(
@@ -316,7 +326,7 @@ def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) 
     assert press(kiosk, "gains", [1, 2]).json()["outcome"] == "succeeded"
     assert robot.parameters()["gains"] == [1.0, 2.0]
     refused = press(kiosk, "gains", "1, 6")
-    assert (refused.status_code, refused.json()["code"]) == (422, "off_limits")
+    assert (refused.status_code, refused.json()["code"]) == (422, "input_outside_limits")
     robot.set_parameter(name="frames", value=["x"])
     until(lambda: kiosk.widget("frames")["text"] == "x", "what the robot sets shows")
 

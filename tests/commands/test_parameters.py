@@ -174,7 +174,7 @@ def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
     async def test(bench: Bench) -> None:
         bench.parameters.on_graph_change()
         assert bench.line.keys == []
-        assert bench.reason() == say("no_parameters", node="/arm")
+        assert bench.reason() == say("parameter_node_unavailable", node="/arm")
         bench.offer()
         bench.parameters.on_graph_change()
         await bench.queried(1)
@@ -299,19 +299,19 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
 
     async def test(bench: Bench) -> None:
         (one,) = bench.panel.parameters()
-        assert bench.parameters.read_again(one) == say("no_parameters", node="/arm")
+        assert bench.parameters.read_again(one) == say("parameter_node_unavailable", node="/arm")
         bench.offer()
         await bench.queried(1)
         assert bench.parameters.read_again(one) == ""  # it is being asked
         await bench.until(lambda: bench.known().state == "silent")
         assert bench.shown["askable"] is False
-        assert coded(bench.shown["note"], "node") == ("parameter_asking", "/arm")
+        assert coded(bench.shown["note"], "node") == ("parameter_waiting_for_node", "/arm")
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
         await bench.until(lambda: bench.shown["askable"])
         assert bench.known().state == "silent"
-        assert coded(bench.shown["note"], "node") == ("parameter_unanswered", "/arm")
-        silent = say("parameter_silent", node="/arm", name="speed")
-        assert bench.reason() == joined([silent, say("cyclone_hint")])
+        assert coded(bench.shown["note"], "node") == ("parameter_no_response", "/arm")
+        silent = say("parameter_no_reply", node="/arm", name="speed")
+        assert bench.reason() == joined([silent, say("service_cyclone_hint")])
         for _ in range(3):  # whatever it says by itself
             bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
             bench.parameters.on_graph_change()
@@ -470,7 +470,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
             )
         )
         await bench.queried(3)
-        assert bench.reason() == say("busy")
+        assert bench.reason() == say("press_in_progress")
         request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.queries[2][1])
         (sent,) = request.parameters
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
@@ -558,7 +558,7 @@ def test_a_panel_narrows_what_the_node_describes(
     for one in bad:
         with pytest.raises(InputError) as refused:
             check_value(of, known, one)
-        assert coded(refused.value.text, "label") == ("off_limits", "Speed")
+        assert coded(refused.value.text, "label") == ("input_outside_limits", "Speed")
 
 
 def test_no_value_that_both_allow_locks() -> None:
@@ -567,7 +567,7 @@ def test_no_value_that_both_allow_locks() -> None:
         limits = [{"from_value": 0.0, "to_value": 2.0, "step": 0.0}]
         await bench.tell(1, 0.5, floating_point_range=limits)
         about = coded(bench.reason(), "node", "name", "theirs", "ours")
-        assert about == ("parameter_apart", "/arm", "speed", "0 to 2", "3 or more")
+        assert about == ("parameter_no_common_value", "/arm", "speed", "0 to 2", "3 or more")
 
     run(test, {**SPEED, "min": 3.0})
 
@@ -624,4 +624,6 @@ def test_a_value_shows_and_its_input_starts_from_it(
     (of,) = panel.parameters()
     shown = parameter(of, robot)
     assert english((shown["text"], shown["entry"])) == (text, entry)
-    assert coded(shown["note"]) == ("parameter_told",)  # no one publishes /parameter_events
+    assert coded(shown["note"]) == (
+        "parameter_read_without_events",
+    )  # no one publishes /parameter_events

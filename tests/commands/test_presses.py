@@ -158,7 +158,7 @@ def test_a_press_without_a_subscriber_is_sent_but_unknown(bench: Bench) -> None:
     bench.way.listened_to = False
     receipt = bench.press()
     assert (receipt.outcome, receipt.cause) == ("unknown", "")
-    assert coded(receipt.reason, "topic") == ("sent_to_nobody", "/free")
+    assert coded(receipt.reason, "topic") == ("press_no_subscriber", "/free")
     assert bench.way.texts == ["hello"]
 
 
@@ -190,11 +190,11 @@ def listens_with_another_type(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("happens", "code", "about"),
     [
-        (forbids, "forbidden", {"name": "operation"}),
-        (cuts, "cut", {"topic": ENABLED}),
-        (garbles, "unreadable", {"topic": ENABLED}),
-        (takes_another_type, "wrong_type", {"topic": ENABLED, "found": TEXT}),
-        (listens_with_another_type, "wrong_type", {"topic": "/guarded", "found": BOOL}),
+        (forbids, "interlock_not_permitted", {"name": "operation"}),
+        (cuts, "interlock_connection_lost", {"topic": ENABLED}),
+        (garbles, "interlock_unreadable", {"topic": ENABLED}),
+        (takes_another_type, "topic_wrong_type", {"topic": ENABLED, "found": TEXT}),
+        (listens_with_another_type, "topic_wrong_type", {"topic": "/guarded", "found": BOOL}),
     ],
 )
 def test_a_forged_press_is_refused_with_its_reason(
@@ -209,7 +209,7 @@ def test_a_forged_press_is_refused_with_its_reason(
 def test_a_press_before_the_robot_permitted_is_refused() -> None:
     bench = Bench(panel_of(MESSAGE, GUARDED, interlock={"topic": "/estop_ok"}))
     cause, reason = refused(bench, bench.press("guarded"))
-    assert (cause, reason) == ("interlock", say("waiting", topic="/estop_ok", wanted=BOOL))
+    assert (cause, reason) == ("interlock", say("interlock_waiting", topic="/estop_ok", wanted=BOOL))
 
 
 def test_a_permission_is_judged_at_the_time_of_the_press() -> None:
@@ -242,10 +242,10 @@ def joins(robot: RobotState) -> None:
 @pytest.mark.parametrize(
     ("happens", "code"),
     [
-        (loses_link, "no_link"),
-        (loses_bridge, "no_bridge"),
-        (goes_silent, "bridge_silent"),
-        (joins, "joining"),
+        (loses_link, "link_unreachable"),
+        (loses_bridge, "link_no_bridge"),
+        (goes_silent, "link_bridge_silent"),
+        (joins, "link_connecting"),
     ],
 )
 @pytest.mark.parametrize("widget", ["free", "guarded"])
@@ -386,7 +386,7 @@ def test_an_id_that_was_used_for_another_press_is_refused(
     first = bench.press()
     again = bench.press(widget, inputs)
     assert (again.outcome, again.cause) == ("refused", "input")
-    assert coded(again.reason, "id") == ("press_reused", "p1")
+    assert coded(again.reason, "id") == ("press_id_reused", "p1")
     assert (again.widget, len(bench.way.sent)) == (widget, 1)
     assert bench.receipt("p1") is first
 
@@ -411,7 +411,7 @@ def test_the_oldest_receipts_are_forgotten() -> None:
     assert bench.receipt(f"p{RECEIPTS_KEPT}") is not None
     sent = len(bench.way.sent)
     again = bench.press(press_id="p0")
-    assert coded(again.reason, "id") == ("press_past", "p0")
+    assert coded(again.reason, "id") == ("press_already_made", "p0")
     assert (again.outcome, len(bench.way.sent)) == ("refused", sent)
 
 
@@ -458,7 +458,7 @@ def test_the_reason_is_the_link_before_control_and_control_before_an_interlock()
     assert coded(reason) == ("control_held",)
     bench.robot.link_up = False
     cause, reason = refused(bench, bench.press("guarded", press_id="p2"))
-    assert (cause, coded(reason)) == ("link", ("no_link",))
+    assert (cause, coded(reason)) == ("link", ("link_unreachable",))
 
 
 HOME = {
@@ -486,7 +486,7 @@ def test_cancelling_needs_no_control() -> None:
     bench = Bench(panel_of(MESSAGE, HOME))
     bench.may_press = lambda _: locked("control_free", robot="the robot")
     assert bench.press("home").code == "control_free"
-    assert bench.cancel("home").code == "nothing_to_cancel"
+    assert bench.cancel("home").code == "cancel_nothing_in_progress"
 
 
 SPEED = {
@@ -509,7 +509,7 @@ def test_a_number_out_of_its_limits_is_refused_with_them(given: Any) -> None:
     cause, reason = refused(bench, bench.press(inputs={"speed": given}))
     assert cause == "input"
     code, *about = coded(reason, "label", "limits")
-    assert code in ("off_limits", "no_number")
+    assert code in ("input_outside_limits", "input_not_a_number")
     assert about == ["Speed", "−1 to 1 m/s, in steps of 0.5"]
 
 

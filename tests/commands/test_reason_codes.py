@@ -5,7 +5,7 @@ import pytest
 from app.commands.reason_codes import ADVICE, FRAMES, reason_code
 from app.i18n import ENGLISH, TextLike, joined, say, sentences
 
-LOCKED = say("waiting", topic="/operation_enabled")
+LOCKED = say("interlock_waiting", topic="/operation_enabled")
 
 
 @pytest.mark.parametrize(
@@ -14,18 +14,29 @@ LOCKED = say("waiting", topic="/operation_enabled")
         ("", None),
         ("the robot's own words", None),
         (say("published", topic="/go", time="10:00:00"), "published"),
-        (say("refused", why=LOCKED, time="10:00:00"), "waiting"),
-        (say("not_encoded", why='the input "speed" is missing', time="10:00:00"), "not_encoded"),
-        (say("with_reply", said=say("said_no", time="10:00:00"), reply="the arm moves"), "said_no"),
-        (say("hold_ended", time="10:00:00", seconds="1.2", why=LOCKED), "waiting"),
-        (joined([say("timed_out", seconds="2"), say("cyclone_hint")]), "timed_out"),
+        (say("refused", why=LOCKED, time="10:00:00"), "interlock_waiting"),
         (
-            joined([say("published", topic="/go", time="10:00:00"), say("no_effect", topic="/on")]),
-            "no_effect",
+            say("press_not_encoded", why='the input "speed" is missing', time="10:00:00"),
+            "press_not_encoded",
+        ),
+        (
+            say("with_reply", said=say("call_rejected", time="10:00:00"), reply="the arm moves"),
+            "call_rejected",
+        ),
+        (say("hold_ended", time="10:00:00", seconds="1.2", why=LOCKED), "interlock_waiting"),
+        (joined([say("timed_out", seconds="2"), say("service_cyclone_hint")]), "timed_out"),
+        (
+            joined(
+                [
+                    say("published", topic="/go", time="10:00:00"),
+                    say("confirmation_missing", topic="/on"),
+                ]
+            ),
+            "confirmation_missing",
         ),
         (
             say("log_not_on_disk", said=say("refused", why=LOCKED, time="10:00:00"), why="full"),
-            "waiting",
+            "interlock_waiting",
         ),
     ],
 )

@@ -149,13 +149,13 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         shown = rig.bench.shown
         assert "may still be running" in str(shown.text)
         assert (shown.busy, shown.can_cancel, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
-        assert rig.lock == "perhaps_busy"
+        assert rig.lock == "goal_may_be_running"
         assert queried_goal(rig) == goal_id(entry.hash).bytes
         assert rig.bench.line.timeouts == [LATE_S]
         tell_states(rig.bench, (bytes(16), 2))
         assert rig.bench.shown == shown
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
-        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
+        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "press_in_progress")
         await rig.answer(status=4)
         assert str(rig.bench.shown.text).startswith("Succeeded at ")
         assert len(rig.bench.line.queries) == 1
@@ -172,12 +172,12 @@ def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.M
         await rig.started()
         rig.bench.line.queries[0][2].set_result(None)
         await queried(rig.bench, 2)
-        assert rig.lock == "perhaps_busy"
+        assert rig.lock == "goal_may_be_running"
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
         rig.bench.line.queries[1][2].set_result(None)
         await queried(rig.bench, 3)
         assert rig.bench.line.timeouts == [LATE_S, LATE_S, RESULT_S]
-        assert rig.lock == "busy"
+        assert rig.lock == "press_in_progress"
 
     run(tmp_path, test, "accepted")
 
@@ -384,7 +384,7 @@ def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
             tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
         await queried(rig.bench, 1)
         assert rig.bench.line.timeouts == [RESULT_S]
-        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
+        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "press_in_progress")
 
     run(tmp_path, test)
 

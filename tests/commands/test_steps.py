@@ -103,20 +103,25 @@ def test_steps_end_at_the_limits(speed: float, down: str, up: str) -> None:
 def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
     desk = Desk()
     assert desk.shown()["enabled"] is False
-    assert desk.reason() == say("waiting", topic="/speed", wanted=FLOAT)
+    assert desk.reason() == say("interlock_waiting", topic="/speed", wanted=FLOAT)
     assert desk.shown()["reason"] == str(desk.reason())
     assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("", "")
     desk.reports(float("nan"))
-    nan = say("value_nan")
-    assert desk.reason() == say("not_a_number", topic="/speed", field="data", value=nan)
+    nan = say("condition_nan")
+    assert desk.reason() == say("interlock_not_a_number", topic="/speed", field="data", value=nan)
     assert desk.shown()["note"] == "the value is not a number (NaN)"
     desk.reports(120.0)
-    assert coded(desk.reason(), "value", "low", "high") == ("step_outside", "120", "0", "100")
+    assert coded(desk.reason(), "value", "low", "high") == (
+        "step_value_outside_limits",
+        "120",
+        "0",
+        "100",
+    )
     desk.reports(40.0)
     step = next(w for w in desk.panel.commands if isinstance(w, Step))
     assert judged(step, (), desk.robot, desk.now).until == desk.now + 5
     desk.now += 6
-    assert desk.reason() == say("stale", topic="/speed", limit=number("5"))
+    assert desk.reason() == say("interlock_stale", topic="/speed", limit=number("5"))
     assert desk.press(50).outcome == "refused"
     assert desk.sent() == []
 
@@ -126,7 +131,7 @@ def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_report
         first = asyncio.create_task(desk.presses.press("speed", {"speed": 50}, "p1", FROM))
         while not desk.sent():
             await asyncio.sleep(0)
-        assert (desk.shown()["enabled"], desk.reason()) == (False, say("busy"))
+        assert (desk.shown()["enabled"], desk.reason()) == (False, say("press_in_progress"))
         second = await desk.presses.press("speed", {"speed": 50}, "p2", FROM)
         desk.reports(50.0)
         return await first, second
@@ -145,7 +150,7 @@ def test_a_press_that_is_no_step_from_the_reported_value_sends_nothing(given: An
     desk.reports(40.0)
     receipt = desk.press(given)
     assert receipt.outcome == "refused"
-    assert coded(receipt.reason, "label", "value") == ("step_moved", "Speed", "40")
+    assert coded(receipt.reason, "label", "value") == ("step_value_changed", "Speed", "40")
     assert desk.sent() == []
 
 

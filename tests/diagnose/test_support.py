@@ -140,7 +140,7 @@ def test_no_secret_is_in_it_in_any_form_from_anywhere(
     sent = next(one for one in entries if one.get("outcome") == "published")
     assert (sent["codes"], sent["parameters"]["topic"]) == (["published"], "/say")
     refused = next(one for one in entries if one.get("outcome") == "refused")
-    assert "no_number" in refused["codes"]
+    assert "input_not_a_number" in refused["codes"]
     assert json.loads(files["state/snapshot.json"])["widgets"]["say"]["enabled"] is True
     assert json.loads(files["state/readyz.json"]) == {"ready": True, "robots": {}}
     assert 'kiosk_presses_total{outcome="published"}' in files["state/metrics.txt"]

@@ -144,7 +144,7 @@ def test_advice_is_for_sentences_that_are_there() -> None:
 def test_what_the_code_locks_by_has_advice() -> None:
     source = "".join(path.read_text() for path in places.modules())
     codes = set(re.findall(r'\b(?:locked\(|Verdict\(False, )"(\w+)"', source)) & set(SENTENCES)
-    assert {"joining", "forbidden", "busy"} <= codes
+    assert {"link_connecting", "interlock_not_permitted", "press_in_progress"} <= codes
     advised = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
     assert codes <= advised
 
@@ -218,16 +218,16 @@ def test_the_page_of_locks_in_another_language_is_whole(tmp_path: Path) -> None:
         path.write_text("\n".join(lines), encoding="utf-8")
         return path
 
-    (tmp_path / "ja.po").write_text('msgid "waiting"\nmsgstr "{topic} を待っています。"\n')
+    (tmp_path / "ja.po").write_text('msgid "interlock_waiting"\nmsgstr "{topic} を待っています。"\n')
     advice = locks.groups(locks.ADVICE)
     with catalogues_in(tmp_path):
         page = locks.translated_page("ja", toml(advice))
         assert page.startswith("---\norphan: true\n---\n# 操作不可と拒否の理由\n")
-        assert "| *{topic}* を待っています。 | `waiting` | 対処 |" in page
+        assert "| *{topic}* を待っています。 | `interlock_waiting` | 対処 |" in page
         assert page.count("\n## ") == len(advice)
-        links = {code: one for code, one in advice["link"].items() if code != "no_link"}
+        links = {code: one for code, one in advice["link"].items() if code != "link_unreachable"}
         fewer = {**advice, "link": {**links, "on_fire": ""}}
-        with pytest.raises(ValueError, match=r"locks.ja.toml: \[link\] .*: no_link, on_fire"):
+        with pytest.raises(ValueError, match=r"locks.ja.toml: \[link\] .*: link_unreachable, on_fire"):
             locks.translated_page("ja", toml(fewer))
     assert locks.translations(tmp_path) == {"ja": tmp_path / "locks.ja.toml"}
     with pytest.raises(ValueError, match=r"no \[fr\]"):

@@ -73,7 +73,7 @@ def test_every_sentence_is_said_somewhere() -> None:
 
 
 def test_a_sentence_is_filled_in() -> None:
-    assert render(say("waiting", topic="/estop")) == "Locked: waiting for /estop."
+    assert render(say("interlock_waiting", topic="/estop")) == "Locked: waiting for /estop."
 
 
 def test_braces_in_what_is_filled_in_are_only_text() -> None:
@@ -86,17 +86,17 @@ def test_an_unknown_code_is_a_mistake_of_the_programmers() -> None:
 
 
 def test_a_text_is_its_code_and_its_parameters() -> None:
-    text = say("stale", topic="/estop", limit="2")
-    assert text == say("stale", limit="2", topic="/estop")
-    assert {text: 1}[say("stale", topic="/estop", limit="2")] == 1
-    assert text != say("stale", topic="/estop", limit="3")
+    text = say("interlock_stale", topic="/estop", limit="2")
+    assert text == say("interlock_stale", limit="2", topic="/estop")
+    assert {text: 1}[say("interlock_stale", topic="/estop", limit="2")] == 1
+    assert text != say("interlock_stale", topic="/estop", limit="3")
     assert text != render(text)
     with pytest.raises(AttributeError, match="code: a Text does not change"):
-        text.code = "waiting"
+        text.code = "interlock_waiting"
 
 
 def test_a_text_in_a_text_is_rendered_with_it() -> None:
-    why = say("waiting", topic="/estop")
+    why = say("interlock_waiting", topic="/estop")
     assert render(say("with_stop", said=say("and_more", names=("/a", why), number=2))) == (
         f"/a, {render(why)} and 2 more."
     )
@@ -112,11 +112,11 @@ def test_texts_that_follow_one_another_are_one() -> None:
 
 
 def test_what_hides_in_a_parameter_is_shown() -> None:
-    assert "\\u202e" in render(say("waiting", topic="/\u202estop"))
+    assert "\\u202e" in render(say("interlock_waiting", topic="/\u202estop"))
 
 
 def test_a_text_comes_back_from_json() -> None:
-    text = say("refused", why=joined([say("waiting", topic="/a"), "as is"]), time="10:00:00")
+    text = say("refused", why=joined([say("interlock_waiting", topic="/a"), "as is"]), time="10:00:00")
     assert text_in(json.dumps(text.as_json())) == text
     with pytest.raises(ValueError, match="no sentence"):
         text_in('{"code": "ready"}')
@@ -153,12 +153,24 @@ def test_every_catalogue_is_whole() -> None:
 @pytest.mark.parametrize(
     ("changed", "fault"),
     [
-        ({"waiting": ""}, "waiting is not translated"),
-        ({"waiting": "Gesperrt."}, "waiting has nothing, and English has {topic}"),
-        ({"waiting": "{topic} {node}"}, "waiting has {node}, {topic}, and English has {topic}"),
-        ({"waiting": "{topic.__class__}"}, "waiting has {topic.__class__}, and English has {topic}"),
-        ({"waiting": "{topic!r}"}, "waiting has {topic!r}, and English has {topic}"),
-        ({"waiting": "{topic"}, "waiting can't be filled in: expected '}' before end of string"),
+        ({"interlock_waiting": ""}, "interlock_waiting is not translated"),
+        ({"interlock_waiting": "Gesperrt."}, "interlock_waiting has nothing, and English has {topic}"),
+        (
+            {"interlock_waiting": "{topic} {node}"},
+            "interlock_waiting has {node}, {topic}, and English has {topic}",
+        ),
+        (
+            {"interlock_waiting": "{topic.__class__}"},
+            "interlock_waiting has {topic.__class__}, and English has {topic}",
+        ),
+        (
+            {"interlock_waiting": "{topic!r}"},
+            "interlock_waiting has {topic!r}, and English has {topic}",
+        ),
+        (
+            {"interlock_waiting": "{topic"},
+            "interlock_waiting can't be filled in: expected '}' before end of string",
+        ),
         ({"vaiting": "{topic}"}, "vaiting is no code of the English catalogue"),
     ],
 )
@@ -176,13 +188,16 @@ def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 
 def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: Path) -> None:
     shipped = list(files())
-    own = {"waiting": "Gesperrt: warte auf {topic}.", "between_names": "{first} / {last}"}
+    own = {"interlock_waiting": "Gesperrt: warte auf {topic}.", "between_names": "{first} / {last}"}
     catalogue(tmp_path, "qps", own)
     with catalogues_in(tmp_path):
-        assert render(say("waiting", topic="/a"), "qps") == "Gesperrt: warte auf /a."
-        assert render(say("waiting", topic=("/a", "/b")), "qps") == "Gesperrt: warte auf /a / /b."
+        assert render(say("interlock_waiting", topic="/a"), "qps") == "Gesperrt: warte auf /a."
+        assert (
+            render(say("interlock_waiting", topic=("/a", "/b")), "qps")
+            == "Gesperrt: warte auf /a / /b."
+        )
         assert render(say("stopping"), "qps") == SENTENCES["stopping"]
-        assert render(say("waiting", topic="/a")) == "Locked: waiting for /a."
+        assert render(say("interlock_waiting", topic="/a")) == "Locked: waiting for /a."
     assert list(files()) == shipped
 
 
@@ -200,7 +215,7 @@ def test_english_japanese_and_german_are_shipped() -> None:
 
 
 def test_sentences_and_names_follow_one_another_as_the_language_has_it() -> None:
-    stopped = joined([say("log_began"), say("log_lost", first=1, last=2)])
+    stopped = joined([say("log_began"), say("log_entries_lost", first=1, last=2)])
     assert [render(stopped, one) for one in ("ja", "de")] == [
         "パネルサーバーが起動しました。No. 1～2 の記録がディスクから失われました。",
         "Der Panel-Server wurde gestartet. "
@@ -212,9 +227,12 @@ def test_sentences_and_names_follow_one_another_as_the_language_has_it() -> None
 
 def test_a_sentence_in_another_one_ends_as_the_language_has_it() -> None:
     why = say(
-        "off_limits", label="速度", given="400 mm/s", limits=say("limits_low", low=0, unit=" mm/s")
+        "input_outside_limits",
+        label="速度",
+        given="400 mm/s",
+        limits=say("limits_low", low=0, unit=" mm/s"),
     )
-    assert render(say("not_encoded", why=why, time="10:04:32"), "ja") == (
+    assert render(say("press_not_encoded", why=why, time="10:04:32"), "ja") == (
         "未送信（10:04:32）：「速度」に 400 mm/s は入力できません（入力できる値：0 mm/s 以上）。"
     )
     ended = say("hold_ended", time="10:04:32", seconds="3.2", why=say("hold_by_sliding"))

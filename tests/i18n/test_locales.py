@@ -44,7 +44,7 @@ def test_a_number_that_all_write_alike_is_a_text() -> None:
 
 
 def test_a_number_in_a_sentence_comes_back_from_json() -> None:
-    text = say("stale", topic="/a", limit=number("0.5"))
+    text = say("interlock_stale", topic="/a", limit=number("0.5"))
     assert text_in(json.dumps(text.as_json())) == text
     assert "0,5 s" in render(text, "de")
     assert "0.5 s" in render(text)

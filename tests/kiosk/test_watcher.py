@@ -144,7 +144,7 @@ def test_it_waits_for_the_server_in_the_panels_languages(
     shown = "document.body?.dataset.waiting !== undefined && document.body.innerText"
     text = until(lambda: screen.evaluate(shown), "the waiting page is shown")
     assert [
-        language for language in LANGUAGES if render(say("kiosk_waits"), language) not in text
+        language for language in LANGUAGES if render(say("kiosk_starting"), language) not in text
     ] == []
     assert "Robot cell 1" in text
 

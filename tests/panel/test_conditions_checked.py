@@ -67,7 +67,7 @@ def said(robot: RobotState, interlock: Interlock, fields: Table) -> tuple[Any, .
 
 def unmet(value: str, wanted: str) -> tuple[str, ...]:
     """The reason with which this value does not permit."""
-    return "unmet", "Air pressure", value, wanted
+    return "interlock_condition_unmet", "Air pressure", value, wanted
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ def test_readers_choose_among_the_languages_of_the_panel(tmp_path: Path) -> None
 
 def test_a_text_in_a_sentence_survives_json() -> None:
     label = PanelText({"en": "Start", "ja": "始動"}, "en")
-    text = say("off_limits", label=label, given="1", limits=say("ready"))
+    text = say("input_outside_limits", label=label, given="1", limits=say("ready"))
     assert text_in(json.dumps(text.as_json())) == text
     assert hash(label) == hash(PanelText({"ja": "始動", "en": "Start"}, "en"))
     assert render(text_in(json.dumps(text.as_json())), "ja").startswith("始動")

@@ -91,7 +91,7 @@ def test_without_a_label_a_condition_is_named_by_its_topic(label: str | None, na
     robot = robot_there(small_panel())
     permits(robot, False)
     verdict = state_of(Condition(topic=ENABLED, label=label), robot).verdict
-    assert verdict == locked("forbidden", name=name)
+    assert verdict == locked("interlock_not_permitted", name=name)
 
 
 @pytest.mark.parametrize(("value", "shown"), [(True, "true"), (False, "false")])
@@ -131,7 +131,7 @@ def test_constants_are_shown_by_their_names() -> None:
 def test_a_value_that_never_arrived_is_unknown() -> None:
     state = state_of(air(), robot_there(panel_on(FLOAT, {"min": 5.0})))
     assert texts(state) == ("", "5 bar or more", False)
-    assert state.verdict == locked("waiting", topic=ENABLED, wanted=FLOAT)
+    assert state.verdict == locked("interlock_waiting", topic=ENABLED, wanted=FLOAT)
 
 
 def test_a_stale_value_is_shown_but_does_not_count(robot: RobotState) -> None:
@@ -140,24 +140,27 @@ def test_a_stale_value_is_shown_but_does_not_count(robot: RobotState) -> None:
     assert fresh.verdict == Verdict(True, until=NOW + 2)
     state = state_of(air(max_age_s=2), robot, NOW + 2)
     assert texts(state) == ("6 bar", "5 bar or more", False)
-    assert state.verdict == locked("stale", topic=ENABLED, limit="2")
+    assert state.verdict == locked("interlock_stale", topic=ENABLED, limit="2")
 
 
 def test_a_value_before_a_cut_is_unknown(robot: RobotState) -> None:
     robot.mark_peer_lost(BRIDGE, 2)
     state = state_of(air(), robot)
-    assert (state.value, state.verdict) == ("", locked("cut", topic=ENABLED, wanted=FLOAT))
+    assert (state.value, state.verdict) == (
+        "",
+        locked("interlock_connection_lost", topic=ENABLED, wanted=FLOAT),
+    )
 
 
 def test_without_a_link_no_condition_is_met(robot: RobotState) -> None:
     robot.link_up = False
-    assert state_of(air(), robot).verdict == locked("no_link")
+    assert state_of(air(), robot).verdict == locked("link_unreachable")
 
 
 def test_a_topic_of_another_type_does_not_meet_a_condition(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, TEXT)
     verdict = state_of(air(), robot).verdict
-    assert verdict == locked("wrong_type", topic=ENABLED, found=TEXT, wanted=FLOAT)
+    assert verdict == locked("topic_wrong_type", topic=ENABLED, found=TEXT, wanted=FLOAT)
 
 
 @pytest.mark.parametrize("value", [True, False])

@@ -124,17 +124,17 @@ def test_taking_twice_is_taking_once(held: Room) -> None:
 
 
 def test_what_another_has_is_not_taken(held: Room) -> None:
-    assert held.control.take(BOB) == "control_taken"
+    assert held.control.take(BOB) == "control_held_by_other"
     assert held.control.holder == ANN
 
 
 def test_who_has_no_token_gets_nothing(room: Room) -> None:
-    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_stranger"
+    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_no_cookie"
     assert room.control.until == math.inf
     room.control.take(ANN)
-    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_stranger"
+    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_no_cookie"
     assert (room.control.holder, room.control.requester) == (ANN, None)
-    assert room.control.give(ANONYMOUS, "") == room.control.release(ANONYMOUS) == "control_not_yours"
+    assert room.control.give(ANONYMOUS, "") == room.control.release(ANONYMOUS) == "control_changed"
 
 
 def test_the_panel_at_the_cell_takes_over(requested: Room) -> None:
@@ -152,7 +152,7 @@ def test_the_panel_at_the_cell_needs_no_consent(held: Room) -> None:
 def test_without_local_the_panel_at_the_cell_asks_like_others() -> None:
     room = Room(ControlRules(required=True, local=False))
     room.control.take(ANN)
-    assert room.control.take(CELL) == "control_taken"
+    assert room.control.take(CELL) == "control_held_by_other"
     assert room.control.ask(CELL) == ""
     assert (room.control.holder, room.control.requester) == (ANN, CELL)
 
@@ -190,7 +190,7 @@ def test_who_asks_may_not_press(requested: Room) -> None:
 
 def test_one_asks_at_a_time(requested: Room) -> None:
     assert requested.control.ask(BOB) == ""
-    assert requested.control.ask(CY) == "control_asked_by"
+    assert requested.control.ask(CY) == "control_already_requested"
     assert requested.control.requester == BOB
 
 
@@ -215,7 +215,7 @@ def test_the_holder_keeps_and_the_request_can_be_repeated_later(requested: Room)
 def test_only_the_holder_answers_a_request(
     requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], who: Principal
 ) -> None:
-    assert act(requested.control, who, BOB.client.id) == "control_not_yours"
+    assert act(requested.control, who, BOB.client.id) == "control_changed"
     assert (requested.control.holder, requested.control.requester) == (ANN, BOB)
 
 
@@ -224,13 +224,13 @@ def test_only_the_holder_answers_a_request(
 def test_an_answer_is_for_the_request_that_was_on_the_screen(
     requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], to: str
 ) -> None:
-    assert act(requested.control, ANN, to) == "control_not_yours"
+    assert act(requested.control, ANN, to) == "control_changed"
     assert (requested.control.holder, requested.control.requester) == (ANN, BOB)
 
 
 def test_a_request_that_was_withdrawn_can_not_be_granted(requested: Room) -> None:
     assert requested.control.release(BOB) == ""
-    assert requested.control.give(ANN, BOB.client.id) == "control_not_yours"
+    assert requested.control.give(ANN, BOB.client.id) == "control_changed"
     assert requested.control.holder == ANN
 
 
@@ -293,7 +293,7 @@ def test_a_shorter_time_may_be_set() -> None:
 def test_who_gives_it_up_frees_it(held: Room) -> None:
     assert held.control.release(ANN) == ""
     assert held.control.holder is None
-    assert held.control.release(ANN) == "control_not_yours"
+    assert held.control.release(ANN) == "control_changed"
     assert held.control.view()["since"] == ""
 
 
@@ -304,7 +304,7 @@ def test_who_gives_it_up_while_asked_gives_it(requested: Room) -> None:
 
 @pytest.mark.parametrize("who", [BOB, CELL, ANONYMOUS])
 def test_no_client_gives_up_what_another_has(held: Room, who: Principal) -> None:
-    assert held.control.release(who) == "control_not_yours"
+    assert held.control.release(who) == "control_changed"
     assert held.control.holder == ANN
 
 
@@ -344,7 +344,7 @@ def test_who_was_lost_takes_it_like_anybody(held: Room) -> None:
     held.control.keepalive(ANN, True)
     assert not held.may(ANN)
     held.control.take(BOB)
-    assert held.control.take(ANN) == "control_taken"
+    assert held.control.take(ANN) == "control_held_by_other"
 
 
 def test_without_scripts_each_page_lasts_until_the_next(room: Room) -> None:
@@ -554,7 +554,7 @@ class Everybody(RuleBasedStateMachine):
         self.heard(who, life_s)
         self.wanted.add(who.client.id)
         if before not in (None, who) and not who.client.local and who.client.id:
-            assert refusal == "control_taken"
+            assert refusal == "control_held_by_other"
             assert self.room.control.holder == before
 
     @rule(who=WHO, scripted=SCRIPTED)

@@ -78,13 +78,16 @@ def joining(robot: RobotState) -> None:
 
 MANY = say("and_more", names=("tcp/r0:1", "tcp/r1:1", "tcp/r2:1"), number=2)
 WAYS: list[tuple[Callable[[RobotState], None], Verdict]] = [
-    (no_link, locked("no_link")),
-    (no_link_at, Verdict(False, "no_link", say("no_link_at", where=("tcp/robot1:7447",)))),
-    (no_link_at_many, Verdict(False, "no_link", say("no_link_at", where=MANY))),
-    (no_bridge, locked("no_bridge", name="")),
-    (bridge_silent, locked("bridge_silent")),
-    (bridge_unheard, locked("bridge_silent")),
-    (joining, Verdict(False, "joining", say("joining"), NOW + 1)),
+    (no_link, locked("link_unreachable")),
+    (
+        no_link_at,
+        Verdict(False, "link_unreachable", say("link_unreachable_at", where=("tcp/robot1:7447",))),
+    ),
+    (no_link_at_many, Verdict(False, "link_unreachable", say("link_unreachable_at", where=MANY))),
+    (no_bridge, locked("link_no_bridge", name="")),
+    (bridge_silent, locked("link_bridge_silent")),
+    (bridge_unheard, locked("link_bridge_silent")),
+    (joining, Verdict(False, "link_connecting", say("link_connecting"), NOW + 1)),
 ]
 
 
@@ -119,40 +122,40 @@ def test_a_robot_that_says_true_permits(robot: RobotState) -> None:
 
 def test_nothing_is_permitted_before_the_robot_said_so() -> None:
     verdict = verdict_of(robot_there(small_panel()))
-    assert verdict == locked("waiting", topic=ENABLED, wanted=BOOL)
+    assert verdict == locked("interlock_waiting", topic=ENABLED, wanted=BOOL)
 
 
 @pytest.mark.parametrize(("label", "name"), [(None, "operation"), ("Operation of the cell",) * 2])
 def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, name: str) -> None:
     permits(robot, False)
     verdict = verdict_of(robot, {"label": label})
-    assert verdict == locked("forbidden", name=name)
+    assert verdict == locked("interlock_not_permitted", name=name)
 
 
 def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
     robot.mark_peer_lost(BRIDGE, 2)
     verdict = verdict_of(robot)
-    assert verdict == locked("cut", topic=ENABLED, wanted=BOOL)
+    assert verdict == locked("interlock_connection_lost", topic=ENABLED, wanted=BOOL)
 
 
 @pytest.mark.parametrize("payload", [b"", b"true!", b"\0\1\0\0", b"\0\1\0\0\1\0\0\0\0\0\0\0"])
 def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
     robot.update(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
-    assert verdict == locked("unreadable", topic=ENABLED, wanted=BOOL)
+    assert verdict == locked("interlock_unreadable", topic=ENABLED, wanted=BOOL)
 
 
 def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, TEXT)
     verdict = verdict_of(robot)
-    assert verdict == locked("wrong_type", topic=ENABLED, found=TEXT, wanted=BOOL)
+    assert verdict == locked("topic_wrong_type", topic=ENABLED, found=TEXT, wanted=BOOL)
 
 
 @pytest.mark.parametrize("age", [2.0, 2.001, 1e6])
 def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     verdict = verdict_of(robot, {"max_age_s": 2}, NOW + age)
-    assert verdict == locked("stale", topic=ENABLED, limit="2")
+    assert verdict == locked("interlock_stale", topic=ENABLED, limit="2")
 
 
 def test_a_fresh_permission_says_when_it_ends(robot: RobotState) -> None:
@@ -172,7 +175,7 @@ def test_a_new_sample_ends_staleness(robot: RobotState) -> None:
 
 def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
     verdict = verdict_of(robot, {"require_publisher": True})
-    assert verdict == locked("no_publisher", topic=ENABLED)
+    assert verdict == locked("interlock_no_publisher", topic=ENABLED)
     endpoint(robot, "MP", ENABLED, BOOL)
     assert verdict_of(robot, {"require_publisher": True}).permitted
 
@@ -180,7 +183,7 @@ def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
 def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     endpoint(robot, "MP", ENABLED, BOOL, alive=False)
-    assert verdict_of(robot, {"require_publisher": True}).code == "no_publisher"
+    assert verdict_of(robot, {"require_publisher": True}).code == "interlock_no_publisher"
     assert verdict_of(robot).permitted
 
 
@@ -191,14 +194,14 @@ def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", BOOL)
     verdict = judged(free(), (), robot, NOW)
-    assert verdict == locked("wrong_type", topic="/free", found=BOOL, wanted=TEXT)
+    assert verdict == locked("topic_wrong_type", topic="/free", found=BOOL, wanted=TEXT)
 
 
 def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
     interlock = Interlock(id="operation", topic=ENABLED)
     assert judged(free(), [interlock], robot, NOW).permitted
     permits(robot, False)
-    assert judged(free(), [interlock], robot, NOW).code == "forbidden"
+    assert judged(free(), [interlock], robot, NOW).code == "interlock_not_permitted"
 
 
 @pytest.mark.parametrize(
@@ -229,7 +232,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
     permits(robot)
     endpoint(robot, "MP", ENABLED, BOOL, qos=best_effort)
     verdict = interlock_verdict(small_panel().interlocks[0], robot, NOW)
-    assert verdict == locked("publishes_best_effort", topic=ENABLED)
+    assert verdict == locked("qos_robot_best_effort", topic=ENABLED)
     asks_less = small_panel({"qos": {"reliability": "best_effort"}}).interlocks[0]
     assert interlock_verdict(asks_less, robot, NOW).permitted
 
@@ -238,19 +241,21 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
     verdict = judged(free(), (), robot, NOW)
-    assert verdict == locked("asks_for_transient_local", topic="/free")
+    assert verdict == locked("qos_robot_requires_transient_local", topic="/free")
 
 
 def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
     robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
-    assert judged(call, (), robot, NOW).code == "no_service"
+    assert judged(call, (), robot, NOW).code == "service_unavailable"
     robot.graph.apply_token(token, True, NOW)
     verdict = judged(call, (), robot, NOW)
     ready_at = NOW + robot.traits.server_settle_s
-    assert verdict == Verdict(False, "getting_ready", say("getting_ready", name="/reset"), ready_at)
+    assert verdict == Verdict(
+        False, "service_connecting", say("service_connecting", name="/reset"), ready_at
+    )
     assert judged(call, (), robot, NOW + robot.traits.server_settle_s).permitted
     robot.graph.apply_token(token, False)
     robot.graph.apply_token(token, True, NOW + 9)  # another node of this name
-    assert judged(call, (), robot, NOW + 9).code == "getting_ready"
+    assert judged(call, (), robot, NOW + 9).code == "service_connecting"

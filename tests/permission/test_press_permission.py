@@ -51,7 +51,10 @@ def test_the_first_that_locks_is_reported() -> None:
     everything = ServerConditions(locked("control"), "The disk is full.", ending=True)
     one_press = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
     assert permission(one_press).code == "link"
-    assert permission(question(interlocks=[locked("one")], grounds=everything)).code == "ending"
+    assert (
+        permission(question(interlocks=[locked("one")], grounds=everything)).code
+        == "server_shutting_down"
+    )
     without = ServerConditions(locked("control"), "The disk is full.")
     log = permission(question(interlocks=[locked("one")], grounds=without))
     assert (log.code, log.reason, log.others) == ("log", "The disk is full.", ())
@@ -82,12 +85,12 @@ def test_verdicts_of_several_are_reported_in_their_order() -> None:
 @pytest.mark.parametrize(
     ("code", "cause"),
     [
-        ("no_bridge", "link"),
-        ("no_service", "link"),
-        ("ending", "link"),
+        ("link_no_bridge", "link"),
+        ("service_unavailable", "link"),
+        ("server_shutting_down", "link"),
         ("log", "log"),
         ("control_held", "interlock"),
-        ("forbidden", "interlock"),
+        ("interlock_not_permitted", "interlock"),
         ("alarm", "interlock"),
     ],
 )

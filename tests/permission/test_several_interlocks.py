@@ -39,9 +39,9 @@ FURTHER: Final[list[Table]] = [
     {"id": "air", "label": "Air", "topic": AIR, "type": "std_msgs/msg/Float64", "min": 5.0,
      "unit": "bar"},
 ]  # fmt: skip
-WAITS: Final = say("waiting", topic=ENABLED, wanted=BOOL)
-FORBIDS: Final = say("forbidden", name="operation")
-NO_DOORS: Final = say("forbidden", name="open doors")
+WAITS: Final = say("interlock_waiting", topic=ENABLED, wanted=BOOL)
+FORBIDS: Final = say("interlock_not_permitted", name="operation")
+NO_DOORS: Final = say("interlock_not_permitted", name="open doors")
 
 
 def cell(*widgets: Table, **more: Any) -> Panel:
@@ -87,11 +87,11 @@ def test_the_first_that_grows_old_ends_it() -> None:
     permits(robot)
     closes(robot)
     assert verdict_of(robot, panel) == Verdict(True, until=NOW + 5)
-    assert verdict_of(robot, panel, NOW + 5).reasons == [say("stale", topic=DOORS, limit="5")]
+    assert verdict_of(robot, panel, NOW + 5).reasons == [say("interlock_stale", topic=DOORS, limit="5")]
 
 
 def test_one_reason_is_reported_once() -> None:
-    locked = Verdict(False, "waiting", WAITS)
+    locked = Verdict(False, "interlock_waiting", WAITS)
     assert combined([locked, locked]).reasons == [WAITS]
     assert combined([]) is combined([PERMITTED, PERMITTED]) is PERMITTED
 
@@ -100,7 +100,7 @@ def test_without_a_way_that_is_the_only_reason() -> None:
     panel = cell()
     robot = robot_there(panel)
     robot.link_up = False
-    assert verdict_of(robot, panel).reasons == [say("no_link")]
+    assert verdict_of(robot, panel).reasons == [say("link_unreachable")]
 
 
 def test_what_is_against_the_command_itself_is_reported_first() -> None:
@@ -110,7 +110,7 @@ def test_what_is_against_the_command_itself_is_reported_first() -> None:
     permits(robot, False)
     closes(robot)
     wrong, then = verdict_of(robot, panel).reasons
-    assert coded(wrong, "topic", "found") == ("wrong_type", "/guarded", BOOL)
+    assert coded(wrong, "topic", "found") == ("topic_wrong_type", "/guarded", BOOL)
     assert then == FORBIDS
 
 
@@ -160,7 +160,7 @@ def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
     link = build_view(panel, robot, NOW).view["link"]["node"]
     assert (link["locks"], link["reason"]) == (
         say("locks", names=("Free",)),
-        say("waiting", topic=DOORS, wanted=BOOL),
+        say("interlock_waiting", topic=DOORS, wanted=BOOL),
     )
 
 

@@ -83,7 +83,7 @@ def test_the_hash_of_a_token_is_compared(robot: RobotState) -> None:
     assert interlock_verdict(PANEL.interlocks[0], robot, NOW).permitted
     announce(robot, ENABLED, BOOL, OTHER)
     verdict = interlock_verdict(PANEL.interlocks[0], robot, NOW)
-    assert verdict == locked("definition_differs", name=ENABLED, type=BOOL)
+    assert verdict == locked("topic_definition_differs", name=ENABLED, type=BOOL)
 
 
 def test_values_of_another_definition_are_never_decoded(robot: RobotState) -> None:
@@ -131,15 +131,15 @@ def test_the_details_name_hashes_and_what_can_not_be_compared(robot: RobotState)
     announce(robot, "/heard", TEXT, OTHER)
     assert is_unhashed(robot.graph, "MP", robot.key(ENABLED))
     hashes = say(
-        "definition_hashes",
+        "link_definition_hashes",
         name="/heard",
         type=TEXT,
-        node=say("definition_of_robot"),
+        node=say("link_definition_node_unknown"),
         theirs=OTHER,
         ours=SAME[TEXT],
         source="ROS 2 jazzy",
     )
-    unhashed = say("no_hashes", names=(ENABLED,))
+    unhashed = say("link_no_hashes", names=(ENABLED,))
     assert definition_notes(robot) == joined([hashes, unhashed], "between_lines")
 
 
@@ -149,20 +149,20 @@ def test_a_server_of_another_definition_is_not_called(robot: RobotState, part: s
     read(robot, server())
     assert blocked(robot) is None
     read(robot, server(**{part: OTHER}))
-    assert blocked(robot) == locked("definition_differs", name="/set", type=part)
+    assert blocked(robot) == locked("topic_definition_differs", name="/set", type=part)
 
 
 def test_a_server_on_fast_dds_is_not_called(robot: RobotState) -> None:
     serve(robot)
     read(robot, server(), dataclasses.replace(server(), dds="Fast DDS"))
-    assert blocked(robot) == locked("wrong_rmw", name="/set", vendor="Fast DDS")
+    assert blocked(robot) == locked("service_wrong_rmw", name="/set", vendor="Fast DDS")
 
 
 def test_a_new_server_is_not_called_before_its_node_is_known(robot: RobotState) -> None:
     robot.nodes_are_read = True
     serve(robot)
     read(robot, server(), at=NOW - 1)
-    assert blocked(robot) == locked("getting_ready", name="/set")
+    assert blocked(robot) == locked("service_connecting", name="/set")
     read(robot, server())
     assert blocked(robot) is None
 

@@ -225,16 +225,16 @@ LATCHED = Qos(transient_local=True)
     ("role", "robots", "panels", "code"),
     [
         ("MS", Qos(), Qos(), None),
-        ("MS", BEST_EFFORT, Qos(), "publishes_best_effort"),
+        ("MS", BEST_EFFORT, Qos(), "qos_robot_best_effort"),
         ("MS", Qos(), BEST_EFFORT, None),
         ("MS", BEST_EFFORT, BEST_EFFORT, None),
-        ("MS", Qos(), LATCHED, "publishes_volatile"),
+        ("MS", Qos(), LATCHED, "qos_robot_volatile"),
         ("MS", LATCHED, Qos(), None),
         ("MS", LATCHED, LATCHED, None),
         ("MP", Qos(), Qos(), None),
-        ("MP", Qos(), BEST_EFFORT, "asks_for_reliable"),
+        ("MP", Qos(), BEST_EFFORT, "qos_robot_requires_reliable"),
         ("MP", BEST_EFFORT, Qos(), None),
-        ("MP", LATCHED, Qos(), "asks_for_transient_local"),
+        ("MP", LATCHED, Qos(), "qos_robot_requires_transient_local"),
         ("MP", LATCHED, LATCHED, None),
         ("MP", Qos(), LATCHED, None),
         ("MP", Qos(depth=1), Qos(depth=5), None),
@@ -256,7 +256,7 @@ def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph
         graph.apply_token(topic_token(BRIDGE, role, "a", BOOL), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL, BEST_EFFORT), True)
     graph.apply_token(topic_token(BRIDGE, "MS", "a", BOOL, LATCHED), True)
-    assert graph.mismatched_qos("MS", "a", Qos()) == "publishes_best_effort"
+    assert graph.mismatched_qos("MS", "a", Qos()) == "qos_robot_best_effort"
     assert graph.mismatched_qos("MP", "a", Qos()) is None
 
 

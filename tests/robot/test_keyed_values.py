@@ -69,7 +69,7 @@ def test_each_entry_has_an_age_of_its_own() -> None:
         cell.says(NOW + number / 10, finger=0.1)
     verdict = interlock_verdict(cell.panel.interlocks[0], cell.robot, NOW + 0.9)
     assert (verdict.permitted, verdict.until) == (True, NOW + 1.0)
-    assert cell.code(NOW + 1.0) == "stale_entry"
+    assert cell.code(NOW + 1.0) == "interlock_stale_field"
 
 
 def test_without_an_age_an_entry_that_newer_messages_lack_is_missing() -> None:
@@ -78,13 +78,16 @@ def test_without_an_age_an_entry_that_newer_messages_lack_is_missing() -> None:
     cell.says(NOW + KEPT_S, finger=0.1)
     assert (cell.code(NOW), cell.shown(NOW)["state"]) == ("permitted", "live")
     cell.says(NOW + KEPT_S + 0.1, finger=0.1)
-    assert (cell.code(NOW), cell.shown(NOW)["state"]) == ("missing", "missing")
+    assert (cell.code(NOW), cell.shown(NOW)["state"]) == (
+        "interlock_field_missing",
+        "interlock_field_missing",
+    )
 
 
 def test_what_was_never_received_is_missing_though_other_parts_are() -> None:
     cell = Cell()
     cell.says(NOW, finger=0.1)
-    assert cell.code(NOW) == "missing"
+    assert cell.code(NOW) == "interlock_field_missing"
 
 
 def test_a_newer_value_counts_at_once_and_an_ambiguous_one_locks() -> None:
@@ -92,10 +95,10 @@ def test_a_newer_value_counts_at_once_and_an_ambiguous_one_locks() -> None:
     cell.says(NOW, lift=0.25)
     cell.says(NOW, finger=0.1)
     cell.says(NOW, lift=0.75)
-    assert cell.code(NOW) == "unmet"
+    assert cell.code(NOW) == "interlock_condition_unmet"
     payload = INTERFACES.encode(STATE, {"name": ["lift", "lift"], "position": [0.1, 0.2]})
     cell.robot.update(cell.robot.key(ENABLED), Sample(payload, 99, NOW, NOW, BRIDGE))
-    assert cell.code(NOW) == "several"
+    assert cell.code(NOW) == "interlock_field_ambiguous"
 
 
 @pytest.mark.parametrize("how", ["cut", "doubt", "lose"])
@@ -111,7 +114,7 @@ def test_no_entry_from_before_a_cut_counts(how: str) -> None:
         cell.robot.link_up, cell.robot.settled_at = True, 0.0
         cell.robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", True)
     cell.says(NOW, finger=0.1)
-    assert cell.code(NOW) == "missing"
+    assert cell.code(NOW) == "interlock_field_missing"
 
 
 def test_the_entries_of_a_lost_bridge_end_with_it() -> None:
@@ -122,7 +125,7 @@ def test_the_entries_of_a_lost_bridge_end_with_it() -> None:
     assert cell.code(NOW) == "permitted"
     cell.robot.graph.apply_token("@/b2/@ros2_lv", False)
     cell.robot.mark_peer_lost("b2", 99)
-    assert cell.code(NOW) == "missing"
+    assert cell.code(NOW) == "interlock_field_missing"
 
 
 def test_a_part_of_the_joints_that_is_old_is_named() -> None:
@@ -154,7 +157,7 @@ def test_with_one_publisher_each_message_is_the_whole_list() -> None:
     cell.says(NOW, lift=0.25)
     assert cell.code(NOW) == "permitted"
     cell.says(NOW + 0.1, finger=0.1)
-    assert cell.code(NOW + 0.1) == "missing"
+    assert cell.code(NOW + 0.1) == "interlock_field_missing"
 
 
 def test_where_the_newest_message_has_all_the_others_are_not_decoded(

@@ -99,11 +99,11 @@ def test_a_raw_picture_has_its_colours(encoding: str, pixel: bytes, colour: tupl
 @pytest.mark.parametrize(
     ("encoding", "width", "height", "data", "code"),
     [
-        ("yuv422_yuy2", 1, 1, bytes(2), "camera_broken"),
+        ("yuv422_yuy2", 1, 1, bytes(2), "camera_incomplete"),
         ("mono8", MOST + 1, 1, bytes(MOST + 1), "camera_pixels"),
         ("32FC1", 1, 1, bytes(4), "camera_encoding"),
-        ("rgb8", 0, 1, b"", "camera_broken"),
-        ("rgb8", 2, 2, bytes(11), "camera_broken"),
+        ("rgb8", 0, 1, b"", "camera_incomplete"),
+        ("rgb8", 2, 2, bytes(11), "camera_incomplete"),
         ("mono8", 1, 100_000, bytes(100_000), "camera_pixels"),
     ],
 )
@@ -118,7 +118,7 @@ def test_what_is_wrong_with_a_raw_picture_is_said(
 def test_bytes_that_are_no_message_are_no_picture() -> None:
     with pytest.raises(NoPicture) as error:
         picture(INTERFACES, COMPRESSED, b"\x00\x01\x00\x00nonsense", MOST)
-    assert code_of(error.value) == "camera_broken"
+    assert code_of(error.value) == "camera_incomplete"
 
 
 @pytest.mark.parametrize("step", [2, 2**31, 2**32 - 1])
@@ -195,7 +195,7 @@ def test_a_compressed_depth_is_scaled_for_the_eye() -> None:
         assert_scaled(shown(found))
     with pytest.raises(NoPicture) as error:
         of(COMPRESSED, format="16UC1; compressedDepth png", data=bytes(12) + packed.getvalue()[:-30])
-    assert code_of(error.value) == "camera_broken"
+    assert code_of(error.value) == "camera_incomplete"
 
 
 def assert_scaled(found: Image.Image) -> None:

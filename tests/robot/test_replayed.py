@@ -46,7 +46,7 @@ def test_the_first_value_of_a_latched_publisher_is_never_fresh(
 ) -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
     assert not says(robot, JOINED + late_s)
-    assert interlock_verdict(PANEL.interlocks[0], robot, JOINED + late_s).code == "waiting"
+    assert interlock_verdict(PANEL.interlocks[0], robot, JOINED + late_s).code == "interlock_waiting"
 
 
 def test_a_latched_publisher_that_is_periodic_opens_with_what_it_says_next(robot: RobotState) -> None:

@@ -210,14 +210,14 @@ ORDERS: list[tuple[tuple[Event, ...], str]] = [
     ((true, appears), "permitted"),
     ((appears, true), "permitted"),
     ((true, appears, goes), "permitted"),
-    ((true, appears, goes, appears), "new_publisher"),
-    ((true, appears, goes, appears, goes), "new_publisher"),
+    ((true, appears, goes, appears), "interlock_new_publisher"),
+    ((true, appears, goes, appears, goes), "interlock_new_publisher"),
     ((true, appears, goes, true, appears), "permitted"),
-    ((true, appears, goes, false, appears), "forbidden"),
-    ((true, appears, goes, appears, false), "forbidden"),
+    ((true, appears, goes, false, appears), "interlock_not_permitted"),
+    ((true, appears, goes, appears, false), "interlock_not_permitted"),
     ((true, appears, goes, appears, true), "permitted"),
-    ((appears, true, goes, appears), "new_publisher"),
-    ((appears, goes), "waiting"),
+    ((appears, true, goes, appears), "interlock_new_publisher"),
+    ((appears, goes), "interlock_waiting"),
     ((true, appears, appears), "permitted"),  # announced twice
 ]
 
@@ -292,7 +292,7 @@ def test_a_second_appearance_has_no_message_of_its_own(known: SilentPublishers) 
     assert silent(known)
 
 
-@pytest.mark.parametrize(("nodes", "code"), [(1, "permitted"), (2, "new_publisher")])
+@pytest.mark.parametrize(("nodes", "code"), [(1, "permitted"), (2, "interlock_new_publisher")])
 def test_a_late_token_locks_until_the_only_publisher_is_known(nodes: int, code: str) -> None:
     robot = robot_there(small_panel())
     robot.update(KEY, Sample(TRUE, 1, 10.0, 10.0, BRIDGE))
@@ -300,7 +300,7 @@ def test_a_late_token_locks_until_the_only_publisher_is_known(nodes: int, code: 
     robot.silent_publishers.add_publisher(PUBLISHER, 2, 12.0)
     (interlock,) = small_panel().interlocks
     robot.update_nodes()
-    assert interlock_verdict(interlock, robot, 12.0).code == "new_publisher"
+    assert interlock_verdict(interlock, robot, 12.0).code == "interlock_new_publisher"
     names = ["/cell_io", "/teach_box"][:nodes]
     robot.graph.update_routes((), [replace(PUBLISHER, node=name) for name in names], 12.1)
     robot.update_nodes()

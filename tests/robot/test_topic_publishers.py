@@ -45,7 +45,10 @@ def test_of_many_nodes_some_are_named() -> None:
 
 
 def test_a_second_publisher_locks_where_one_is_allowed_and_else_is_named_in_the_lock() -> None:
-    for publishers, codes in (("one", ["permitted", "several_publishers"]), ("any", ["permitted"] * 2)):
+    for publishers, codes in (
+        ("one", ["permitted", "interlock_several_publishers"]),
+        ("any", ["permitted"] * 2),
+    ):
         panel = small_panel({"publishers": publishers})
         robot, (interlock,) = robot_there(panel), panel.interlocks
         endpoint(robot, "MP", ENABLED, BOOL)

@@ -112,15 +112,15 @@ def test_until_it_is_read_it_permits_nothing_and_then_as_it_says() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(0)
-        assert cell.locked_by == "reading"
+        assert cell.locked_by == "interlock_reading"
         await asyncio.sleep(0)
-        assert cell.locked_by == "reading"  # a part of it was read
+        assert cell.locked_by == "interlock_reading"  # a part of it was read
         await cell.all_read()
         assert cell.locked_by == "permitted"
         cell.says(2)
-        assert cell.locked_by == "reading"  # what was said before is not so any more
+        assert cell.locked_by == "interlock_reading"  # what was said before is not so any more
         await cell.all_read()
-        assert cell.locked_by == "unmet"
+        assert cell.locked_by == "interlock_condition_unmet"
         assert cell.read == [("operation_enabled", 0), ("operation_enabled", 2)]
 
     run(test)
@@ -134,7 +134,7 @@ def test_what_is_small_is_read_at_once_though_something_large_is_read() -> None:
         cell.says(0, size=1000)
         assert cell.locked_by == "permitted"
         cell.says(2, size=1000)
-        assert cell.locked_by == "unmet"
+        assert cell.locked_by == "interlock_condition_unmet"
 
     run(test)
 
@@ -143,9 +143,9 @@ def test_what_can_not_be_read_to_its_end_locks() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(None)
-        assert cell.locked_by == "reading"
+        assert cell.locked_by == "interlock_reading"
         await cell.all_read()
-        assert cell.locked_by == "unreadable"
+        assert cell.locked_by == "interlock_unreadable"
         assert cell.robot.undecodable == {"operation_enabled": 1}
 
     run(test)
@@ -156,11 +156,11 @@ def test_a_small_message_behind_a_large_one_is_the_newest() -> None:
         for levels in ((0, 2), (2, 0)):
             cell = Cell()
             cell.says(levels[0])
-            assert cell.locked_by == "reading"
+            assert cell.locked_by == "interlock_reading"
             cell.says(levels[1], size=1000)
-            assert cell.locked_by == "reading"
+            assert cell.locked_by == "interlock_reading"
             await cell.all_read()
-            assert cell.locked_by == ("unmet" if levels[1] else "permitted")
+            assert cell.locked_by == ("interlock_condition_unmet" if levels[1] else "permitted")
 
     run(test)
 
@@ -233,7 +233,7 @@ def test_what_was_being_read_when_it_stopped_to_count_never_counts(how: str) -> 
     async def test() -> None:
         cell = Cell()
         cell.says(0)
-        assert cell.locked_by == "reading"
+        assert cell.locked_by == "interlock_reading"
         if how == "cut":
             cell.robot.mark_peer_lost(BRIDGE, 99)
         elif how == "doubt":

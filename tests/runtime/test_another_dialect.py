@@ -45,7 +45,7 @@ CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "t
 PANEL = panel_of(MESSAGE, {**GUARDED, "id": "go", "topic": "/go"}, HEARD, CALL)
 TINY_TRAITS = replace(
     BRIDGE_TRAITS,
-    sentences=replace(BRIDGE_TRAITS.sentences, lamp="robot", absent="no_service"),
+    sentences=replace(BRIDGE_TRAITS.sentences, lamp="robot", absent="service_unavailable"),
 )
 ROLES: dict[str, Role] = {"MP": "MP", "MS": "MS", "SS": "SS"}
 
@@ -222,7 +222,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
         one = fleet.first
         await one.start()
         await when(lambda: one.robot.link_up)
-        assert one.link_verdict.code == "no_service"  # by the sentences of this kind of peer
+        assert one.link_verdict.code == "service_unavailable"  # by the sentences of this kind of peer
         assert one.publisher.view["link"]["bridge"]["name"] == say("robot")
         assert one.publisher.view["link"]["bridge"]["text"] == say("absent")
         robot.appear()
@@ -256,7 +256,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
         assert one.peer.said == [f"found {robot.zid}"]
         assert shown.view["widgets"]["reset"]["enabled"]
         robot.nodes_alive.pop().undeclare()
-        await when(lambda: one.link_verdict.code == "no_service")
+        await when(lambda: one.link_verdict.code == "service_unavailable")
         assert one.peer.said == [f"found {robot.zid}", f"lost {robot.zid}"]
         await one.stop()
 

@@ -185,7 +185,7 @@ def test_each_of_two_robots_has_its_own_bridge_permission_and_presses(
     expect(there).to_have_attribute("data-state", "ok")
     expect(page.get_by_role("button", name="Publish1")).to_be_enabled()
     assert first.press("operation1", "late").status_code == 503
-    assert kiosk.http.get("/readyz").json()["robots"] == {"r1": "no_link", "r2": "permitted"}
+    assert kiosk.http.get("/readyz").json()["robots"] == {"r1": "link_unreachable", "r2": "permitted"}
     bridges[0].start()
     until(kiosk.ready, "joined again")
     assert second.widget("operation1")["enabled"]

@@ -46,7 +46,7 @@ def test_a_lost_link_locks_everything_and_is_renewed() -> None:
         vars(session.link)["renew"] = lambda: renewed.append(True)
         session.robot.link_up, session.robot.settled_at = True, 0.0
         session.context.signals.link_lost.emit()
-        assert session.link_verdict.code == "no_link"
+        assert session.link_verdict.code == "link_unreachable"
         while not renewed:
             await asyncio.sleep(0.01)
         await session.renewal.stop()

@@ -281,7 +281,7 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
         clock += 3.0
         mine.check_stall()  # as it is before each press is judged
         before = len(line.queries)
-        assert changes == ["catching_up"]
+        assert changes == ["link_catching_up"]
         answer(1)
         await queried(before + 1)
         answer(before + 1)

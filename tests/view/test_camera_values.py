@@ -47,7 +47,7 @@ def test_a_picture_that_can_not_be_shown_says_why() -> None:
 def test_a_topic_of_another_type_says_so() -> None:
     robot, widget, _ = subscribed()
     endpoint(robot, "MP", "/cam", "sensor_msgs/msg/Image")
-    assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "wrong_type")
+    assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "topic_wrong_type")
 
 
 def test_a_cameras_topic_is_subscribed_to_on_demand_only() -> None:

@@ -74,7 +74,7 @@ def links_of(
 
 
 LOCKS_NOTHING = say("locks_nothing")
-WAITS = say("waiting", topic=ENABLED, wanted=BOOL)
+WAITS = say("interlock_waiting", topic=ENABLED, wanted=BOOL)
 
 
 def locking(*names: str) -> Text:
@@ -94,17 +94,17 @@ def codes_of(module: str) -> set[str]:
 NO_LINK = frozenset(
     {
         "permitted",
-        "forbidden",
-        "step_outside",
-        "unmet",
-        "busy",
-        "perhaps_busy",
+        "interlock_not_permitted",
+        "step_value_outside_limits",
+        "interlock_condition_unmet",
+        "press_in_progress",
+        "goal_may_be_running",
         "log",
         "control",
         "parameter_undeclared",
         "parameter_mistyped",
         "parameter_read_only",
-        "parameter_apart",
+        "parameter_no_common_value",
     }
 )
 
@@ -112,7 +112,7 @@ NO_LINK = frozenset(
 def test_every_verdict_has_its_link_or_none() -> None:
     assert len(PEER | NODE | NO_LINK) == len(PEER) + len(NODE) + len(NO_LINK)
     made = codes_of("permission/interlocks") | codes_of("permission/conditions")
-    assert {"stale", "forbidden", "joining"} <= made
+    assert {"interlock_stale", "interlock_not_permitted", "link_connecting"} <= made
     assert made - {""} <= PEER | NODE | NO_LINK
 
 
@@ -130,9 +130,9 @@ def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:
     robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)
     link = links_of(panel, robot)
     assert link["bridge"]["locks"] == locking("Free", "Guarded")
-    assert coded(link["bridge"]["reason"]) == ("no_bridge",)
+    assert coded(link["bridge"]["reason"]) == ("link_no_bridge",)
     assert (link["node"]["locks"], link["server"]["locks"]) == (LOCKS_NOTHING, LOCKS_NOTHING)
-    assert link["node"]["reason"] == say("node_unknown")
+    assert link["node"]["reason"] == say("link_node_unknown")
 
 
 def test_a_value_that_is_waited_for_locks_by_the_node() -> None:
@@ -162,7 +162,11 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
         (ParameterState("live", 1.0, read_only=True), "parameter_read_only", {"name": "speed"}),
         (ParameterState("undeclared"), "parameter_undeclared", {"name": "speed"}),
         (ParameterState("mistyped", robot_type="string"), "parameter_mistyped", {"found": "string"}),
-        (ParameterState("live", 1.0, range=Range(5.0, 6.0)), "parameter_apart", {"theirs": "5 to 6"}),
+        (
+            ParameterState("live", 1.0, range=Range(5.0, 6.0)),
+            "parameter_no_common_value",
+            {"theirs": "5 to 6"},
+        ),
     ],
 )
 def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
@@ -193,8 +197,8 @@ def test_a_node_that_stops_talking_is_silent_though_its_token_is_there(silent_fo
     permits(robot)
     node = links_of(panel, robot, NOW + silent_for)["node"]
     if silent_for >= 5:
-        assert (node["state"], node["text"]) == ("bad", say("node_silent"))
-        assert node["reason"] == say("node_stale", topic=ENABLED, limit="5")
+        assert (node["state"], node["text"]) == ("bad", say("link_node_silent"))
+        assert node["reason"] == say("link_node_stale", topic=ENABLED, limit="5")
     else:
         assert (node["state"], node["text"], node["reason"]) == ("ok", say("ok"), "")
 
@@ -217,7 +221,7 @@ def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     permits(robot, False)
     assert build_view(panel, robot, NOW + 1).until == NOW + 2
-    assert links_of(panel, robot, NOW + 2)["node"]["text"] == say("node_silent")
+    assert links_of(panel, robot, NOW + 2)["node"]["text"] == say("link_node_silent")
 
 
 def test_the_node_is_not_blamed_for_what_its_bridge_or_a_type_keeps_back() -> None:
@@ -232,14 +236,14 @@ def test_an_old_value_without_a_publisher_is_no_silence() -> None:
     panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
     permits(robot)
-    assert links_of(panel, robot, NOW + 60)["node"]["text"] == say("no_node")
+    assert links_of(panel, robot, NOW + 60)["node"]["text"] == say("link_no_node")
 
 
 def test_a_node_that_was_never_seen_is_to_be_started() -> None:
     panel = cell()
     node = links_of(panel, robot_there(panel))["node"]
-    assert (node["state"], node["text"]) == ("wait", say("no_node"))
-    assert node["reason"] == say("node_absent")
+    assert (node["state"], node["text"]) == ("wait", say("link_no_node"))
+    assert node["reason"] == say("link_node_absent")
 
 
 def test_a_node_that_was_there_and_went_without_its_bridge_has_its_remedy() -> None:
@@ -249,8 +253,8 @@ def test_a_node_that_was_there_and_went_without_its_bridge_has_its_remedy() -> N
     links_of(panel, robot)
     endpoint(robot, "MP", "/heard", TEXT, alive=False)
     node = links_of(panel, robot)["node"]
-    assert (node["state"], node["text"]) == ("wait", say("no_node"))
-    assert node["reason"] == say("node_gone", name="/heard")
+    assert (node["state"], node["text"]) == ("wait", say("link_no_node"))
+    assert node["reason"] == say("link_node_gone", name="/heard")
     endpoint(robot, "MP", "/heard", TEXT)
     assert links_of(panel, robot)["node"]["reason"] == WAITS
 
@@ -264,7 +268,7 @@ def test_a_publisher_that_went_has_its_remedy_while_others_are_there() -> None:
     endpoint(robot, "MP", ENABLED, BOOL, alive=False)
     node = links_of(panel, robot)["node"]
     assert (node["text"], node["locks"]) == (say("ok"), locking("Guarded"))
-    assert node["reason"] == say("node_gone", name=ENABLED)
+    assert node["reason"] == say("link_node_gone", name=ENABLED)
 
 
 def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
@@ -275,7 +279,7 @@ def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
     endpoint(robot, "MP", "/heard", TEXT, alive=False)
     robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)
     robot.graph.apply_token(bridge_token("b2"), True)
-    assert links_of(panel, robot)["node"]["reason"] == say("node_absent")
+    assert links_of(panel, robot)["node"]["reason"] == say("link_node_absent")
 
 
 def test_a_lost_link_forgets_which_nodes_were_there() -> None:
@@ -286,7 +290,7 @@ def test_a_lost_link_forgets_which_nodes_were_there() -> None:
     robot.mark_link_lost()
     robot.link_up, robot.settled_at = True, 0.0
     robot.graph.apply_token(bridge_token(BRIDGE_ZID), True)
-    assert links_of(panel, robot)["node"]["reason"] == say("node_absent")
+    assert links_of(panel, robot)["node"]["reason"] == say("link_node_absent")
 
 
 def test_a_qos_that_does_not_match_is_the_nodes() -> None:
@@ -295,12 +299,12 @@ def test_a_qos_that_does_not_match_is_the_nodes() -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=Qos(reliable=False))
     link = links_of(panel, robot)
     assert link["node"]["locks"] == locking("Guarded")
-    assert link["node"]["reason"] == say("publishes_best_effort", topic=ENABLED)
+    assert link["node"]["reason"] == say("qos_robot_best_effort", topic=ENABLED)
 
 
 def test_what_the_bridge_does_not_pass_on_is_the_bridges() -> None:
     panel = cell()
-    verdicts = {"free": PERMITTED, "guarded": Verdict(False, "unheard", "Not passed on.")}
+    verdicts = {"free": PERMITTED, "guarded": Verdict(False, "topic_not_forwarded", "Not passed on.")}
     link, until = link_statuses(panel, robot_there(panel), PERMITTED, verdicts, NOW)
     assert link["bridge"]["locks"] == locking("Guarded")
     assert link["bridge"]["reason"] == "Not passed on."

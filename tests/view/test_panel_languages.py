@@ -26,7 +26,7 @@ from tests.support.catalogues import write_catalogue
 def _catalogues(tmp_path: Path) -> Any:
     german = {"limits_both": "{low} bis {high}{unit}", "with_reply": "{said}: {reply}"}
     write_catalogue(tmp_path, "de", german)
-    write_catalogue(tmp_path, "ja", {"no_link": "接続なし。"})
+    write_catalogue(tmp_path, "ja", {"link_unreachable": "接続なし。"})
     with catalogues_in(tmp_path):
         yield
 
@@ -51,9 +51,9 @@ def test_a_response_is_filled_into_each_language_with_its_own_signs() -> None:
     assert render(filled, "de") == "3 Kartons, 12,5 kg"
     assert render(with_fields("{mass} kg", fields), "de") == "12,5 kg"
     assert with_fields("{count} boxes", fields) == "3 boxes"
-    said = with_reply(say("answered", time="11:00"), filled)
+    said = with_reply(say("call_succeeded", time="11:00"), filled)
     assert render(said, "de").endswith(": 3 Kartons, 12,5 kg")
-    assert reason_code(said) == "answered"
+    assert reason_code(said) == "call_succeeded"
     assert reason_code(filled) is None
 
 

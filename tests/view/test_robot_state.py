@@ -11,11 +11,11 @@ from tests.support.words import english
     ("link", "state", "word"),
     [
         (PERMITTED, "online", "ONLINE"),
-        (Verdict(False, "joining"), "unknown", "UNKNOWN"),
-        (Verdict(False, "catching_up"), "unknown", "UNKNOWN"),
-        (Verdict(False, "no_link"), "lost", "NO LINK"),
-        (Verdict(False, "no_bridge"), "lost", "NO LINK"),
-        (Verdict(False, "bridge_silent"), "lost", "NO LINK"),
+        (Verdict(False, "link_connecting"), "unknown", "UNKNOWN"),
+        (Verdict(False, "link_catching_up"), "unknown", "UNKNOWN"),
+        (Verdict(False, "link_unreachable"), "lost", "NO LINK"),
+        (Verdict(False, "link_no_bridge"), "lost", "NO LINK"),
+        (Verdict(False, "link_bridge_silent"), "lost", "NO LINK"),
     ],
 )
 def test_the_robot_is_online_only_with_a_link_that_can_be_used(

@@ -384,7 +384,7 @@ def test_an_act_is_answered_with_a_receipt_and_the_same_id_is_the_same_act(
     assert (again.status_code, again.json()["at"]) == (200, receipt["at"])
     assert again.json()["control"]["holder"] == ""  # it was not done again
     stolen = bob.control("take", id="act-1")
-    assert (stolen.status_code, stolen.json()["code"]) == (409, "press_reused")
+    assert (stolen.status_code, stolen.json()["code"]) == (409, "press_id_reused")
     assert ann.control("take", id="<script>").status_code == 422
 
 

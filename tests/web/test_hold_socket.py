@@ -127,7 +127,7 @@ def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
 def test_a_deflection_out_of_its_limits_is_nonsense(demo: Server, deflection: dict[str, Any]) -> None:
     with held(demo) as socket:
         said = socket.beat(**deflection)
-        assert (said["state"], said["code"]) == ("ended", "hold_by_nonsense")
+        assert (said["state"], said["code"]) == ("ended", "hold_by_invalid_message")
 
 
 STICK: Final = """
@@ -184,7 +184,7 @@ def test_who_lets_go_before_a_hold_begins_gets_the_answer_that_it_did_not(demo: 
         socket.say(do="end", why="released")
         said = socket.hear()
         assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
-        assert said["code"] == "hold_let_go"
+        assert said["code"] == "hold_released_early"
         assert socket.closed() == 4409
 
 
@@ -218,12 +218,12 @@ def test_a_second_holder_is_refused(demo: Server) -> None:
         (
             {"stamp": 0, "after": 0, "do": "beat", "lease": "x", "number": 1},
             409,
-            "hold_by_nonsense",
+            "hold_by_invalid_message",
         ),
-        ({"seen": "abc-1"}, 409, "seen_before_restart"),
-        ({"inputs": {"speed": 7}}, 422, "off_limits"),
-        ({"inputs": []}, 409, "hold_by_nonsense"),
-        ({"stamp": 1e9}, 409, "hold_late"),
+        ({"seen": "abc-1"}, 409, "press_seen_before_restart"),
+        ({"inputs": {"speed": 7}}, 422, "input_outside_limits"),
+        ({"inputs": []}, 409, "hold_by_invalid_message"),
+        ({"stamp": 1e9}, 409, "hold_press_too_late"),
     ],
 )
 def test_what_can_not_be_begun_is_refused(
@@ -280,7 +280,7 @@ def test_who_lets_go_while_the_entry_is_written_holds_nothing(prompt: Server) ->
             db.close()
             said = socket.hear()
             assert (said["state"], said["status"]) == ("refused", 409)
-            assert said["code"] == "hold_let_go"
+            assert said["code"] == "hold_released_early"
             assert socket.closed() == 4409
         assert prompt.widget("jog")["held"] is False
 
@@ -290,7 +290,7 @@ def test_a_begin_that_was_long_on_its_way_is_refused(prompt: Server) -> None:
     with opened(prompt) as socket:
         time.sleep(0.3)
         said = socket.begin(after=0.0)
-        assert (said["state"], said["code"]) == ("refused", "hold_late")
+        assert (said["state"], said["code"]) == ("refused", "hold_press_too_late")
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"do":"dance"}', '"\ud800"'])
@@ -362,7 +362,7 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
             own_bridge.kill()
             said = socket.beat_until_it_ends()
             assert said["outcome"] == "unknown"
-            assert said["code"] == "hold_unsaid"
+            assert said["code"] == "hold_stop_not_sent"
         own_bridge.start()
         until(server.ready, "ready again")
         permit(server, own_node, True)
@@ -384,7 +384,7 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
         said = socket.hear()
         own_bridge.thaw()
     assert (said["state"], said["outcome"]) == ("ended", "unknown")
-    assert said["code"] == "hold_unanswered"
+    assert said["code"] == "hold_stop_unconfirmed"
     assert said["reason"].startswith("Released at")
     assert said["reason"] in kiosk.http.get("/log.csv").text
 
@@ -416,7 +416,7 @@ def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
     with demo_server(tmp_path, PANEL, app=PATIENT) as mine, held(mine) as socket:
         mine.process.send(signal.SIGHUP)
         said = socket.beat_until_it_ends()
-    assert (said["outcome"], said["code"]) == ("aborted", "hold_by_stopping")
+    assert (said["outcome"], said["code"]) == ("aborted", "hold_by_shutdown")
 
 
 def test_a_server_that_ends_reports_it_though_the_robot_has_to_be_queried_first(
@@ -431,7 +431,7 @@ def test_a_server_that_ends_reports_it_though_the_robot_has_to_be_queried_first(
         said = socket.beat_until_it_ends()
         own_bridge.thaw()
     assert said["outcome"] == "unknown"
-    assert said["code"] == "hold_unanswered"
+    assert said["code"] == "hold_stop_unconfirmed"
     kiosk.process.wait(ENOUGH_S)
 
 

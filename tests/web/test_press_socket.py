@@ -78,7 +78,7 @@ def test_a_slow_answer_holds_up_no_other_press(kiosk: Server) -> None:
         first, second = socket.hear(), socket.hear()
     assert (first["press"], first["outcome"], first["status"]) == ("quick", "unknown", 200)
     assert (second["press"], second["outcome"], second["status"]) == ("slow", "timed_out", 504)
-    assert (first["code"], second["code"]) == ("sent_to_nobody", "timed_out")
+    assert (first["code"], second["code"]) == ("press_no_subscriber", "timed_out")
 
 
 def test_too_many_presses_at_once_are_refused_and_none_is_lost(kiosk: Server) -> None:

@@ -121,7 +121,7 @@ def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -
     assert again.json() == refused.json()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "panel server restarted" in refused.json()["reason"]
-    assert refused.json()["code"] == "seen_before_restart"
+    assert refused.json()["code"] == "press_seen_before_restart"
     assert demo.press("operation", "x", seen=demo.snapshot()["id"]).status_code == 200
 
 

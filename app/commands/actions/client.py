@@ -89,12 +89,12 @@ class ActionClient:
             response = self._interfaces.action_types(widget.type).send_goal_response
             message = self._decoded(widget, response, reply)
             if message is None:
-                return Outcome("unknown", say("answer_unreadable", wanted=widget.type))
+                return Outcome("unknown", say("call_response_unreadable", wanted=widget.type))
             if message.accepted:
                 return Outcome("accepted", say("goal_accepted", time=now))
             return Outcome("rejected", say("goal_rejected", time=now))
         if goal.cut.done():
-            return Outcome("unknown", goal.cut.result() or say("call_cut"))
+            return Outcome("unknown", goal.cut.result() or say("call_connection_lost"))
         sentence = say("timed_out", seconds=number(f"{widget.timeout_s:g}"))
         return Outcome("timed_out", joined([sentence, hint(self._robot.traits.sentences.timeout_hint)]))
 
@@ -106,7 +106,7 @@ class ActionClient:
         """Why `cancel_goal` did not respond."""
         if self.is_offered(widget):
             return say("timed_out", seconds=number(f"{widget.timeout_s:g}"))
-        return say("cancel_unheard", name=widget.action)
+        return say("cancel_may_not_have_arrived", name=widget.action)
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
         """The response of `get_result`: the status, and the result fields that the widget shows."""

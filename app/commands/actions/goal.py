@@ -24,9 +24,9 @@ CANCELING: Final = 3
 NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
 # The outcome, the sentence for an end during the connection, and the one for an end before it.
 ENDS: Final[Mapping[int, tuple[OutcomeCode, str, str]]] = {
-    4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
-    5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
-    6: ("aborted", "goal_aborted", "goal_had_been_aborted"),
+    4: ("succeeded", "goal_succeeded", "goal_succeeded_before"),
+    5: ("canceled", "goal_canceled", "goal_canceled_before"),
+    6: ("aborted", "goal_aborted", "goal_aborted_before"),
 }
 
 

@@ -68,7 +68,7 @@ class GoalTracker:
             self._states.clear()
         for goal in (*self._latest.values(), *self._results.goals):
             if not goal.cut.done() and not (is_reached and self._services.is_offered(goal.widget)):
-                gone = say("goal_gone", name=goal.widget.action)
+                gone = say("goal_action_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if is_reached else "")
                 if goal.doubt:
                     self._set_status(goal, goal.doubt_status)
@@ -98,7 +98,7 @@ class GoalTracker:
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, own_id, cut, corrected)
         self._latest[widget.id] = goal
-        self._show(goal, CommandStatus(busy=True, text=say("waiting_for_answer")))
+        self._show(goal, CommandStatus(busy=True, text=say("call_waiting")))
         answer = self._services.goal_response(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
@@ -124,7 +124,11 @@ class GoalTracker:
     def full(self, action: str) -> TextLike:
         """Why no further goal of an action may be sent, "" if it may."""
         count = sum(goal.widget.action == action for goal in self._results.goals)
-        return say("too_many", service=action) if count >= self._robot.traits.max_unanswered else ""
+        return (
+            say("call_too_many_pending", service=action)
+            if count >= self._robot.traits.max_unanswered
+            else ""
+        )
 
     def _cancelable(self, widget: Action, press_id: str) -> Goal | None:
         latest, shown = self._latest.get(widget.id), self._robot.command_status.get(widget.id, IDLE)
@@ -139,7 +143,7 @@ class GoalTracker:
         """Why there is no goal to cancel, "" if there is one."""
         if self._cancelable(widget, press_id) is not None:
             return ""
-        return say("goal_over" if press_id else "nothing_to_cancel")
+        return say("cancel_goal_ended" if press_id else "cancel_nothing_in_progress")
 
     async def cancel(self, widget: Action, press_id: str = "") -> Outcome:
         """Asks the robot to cancel the goal of a press; without a press id, the goal shown as running.
@@ -151,7 +155,7 @@ class GoalTracker:
             return Outcome("unknown", self._services.no_response_reason(widget))
         response = self._services.cancel_response(widget, reply)
         if response is None:
-            return Outcome("unknown", say("answer_unreadable", wanted=CANCEL))
+            return Outcome("unknown", say("call_response_unreadable", wanted=CANCEL))
         return self._cancel_outcome(goal, response)
 
     def _cancel_outcome(self, goal: Goal, response: Any) -> Outcome:
@@ -247,7 +251,7 @@ class GoalTracker:
         """The goal is running. Corrects the receipt if that was unknown."""
         if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
-            answer = Outcome("accepted", say("goal_found", time=format_time(time.time())))
+            answer = Outcome("accepted", say("goal_still_in_progress", time=format_time(time.time())))
             goal.corrected(goal.press_id, answer)
 
     def _apply_feedback(self, goal: Goal, message: Fields) -> None:

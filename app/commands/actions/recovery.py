@@ -29,7 +29,7 @@ log = logging.getLogger("kiosk.actions")
 LOOK_BACK_S: Final = 86_400.0
 # Reasons for goals that the robot does not know: these are not tracked again. Logs of older versions
 # have no codes, only these sentences.
-FINAL: Final = frozenset({"goal_lost", "goal_not_there"})
+FINAL: Final = frozenset({"goal_forgotten", "goal_not_known"})
 FINAL_SENTENCES: Final = frozenset(
     {
         "The robot no longer knows this goal: what came of it is not known.",
@@ -94,7 +94,7 @@ class GoalRecovery:
         return True
 
     def _show_unreadable(self, why: TextLike) -> None:
-        text = say("goals_unread", why=why)
+        text = say("goal_recovery_failed", why=why)
         if text != self._unreadable_status.text:
             self._log.warning("%s", text)
         self._show(CommandStatus(busy=not self._press_log.is_bypassed, outcome="unknown", text=text))
@@ -122,7 +122,7 @@ class GoalRecovery:
         cut.set_result("")  # until its server is offered
         at = press.at / 1000
         pressed = format_time(at) if abs(time.time() - at) < TODAY_S else format_datetime(at)
-        doubt = say("goal_in_doubt", time=pressed)
+        doubt = say("goal_from_before_restart", time=pressed)
         own = goal_id(press.hash)
         self._log.info("press %s: tracking goal %s again: %s", press.press, own, doubt)
         self._actions.resume(

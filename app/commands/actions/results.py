@@ -66,14 +66,14 @@ class ResultWaiter:
         goal = self._goals.pop(task)
         if not task.cancelled() and task.exception():
             goal.state = UNKNOWN
-            self._finished(goal, Outcome("unknown", say("goal_fault")))
+            self._finished(goal, Outcome("unknown", say("goal_server_error")))
 
     async def _track(self, goal: Goal) -> None:
         while True:
             if goal.cut.done():
                 if goal.is_running and not goal.doubt:
                     goal.state = UNKNOWN
-                    self._cut(goal, goal.cut.result() or say("goal_cut"))
+                    self._cut(goal, goal.cut.result() or say("goal_connection_lost"))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
                 self._restored(goal)
@@ -82,7 +82,7 @@ class ResultWaiter:
             if not (goal.known or goal.cut.done()):
                 if not goal.doubt:
                     return  # the robot never reported it: the receipt stays as it is
-                answer = Outcome("unknown", say("goal_silent", seconds=number(f"{LATE_S:g}")))
+                answer = Outcome("unknown", say("goal_no_report", seconds=number(f"{LATE_S:g}")))
                 break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
@@ -103,11 +103,11 @@ class ResultWaiter:
             return None
         fields = await self._services.result(goal.widget, reply)
         if fields is None:
-            return Outcome("unknown", say("answer_unreadable", wanted=goal.widget.type))
+            return Outcome("unknown", say("call_response_unreadable", wanted=goal.widget.type))
         status = fields.get(STATUS)
         goal.state = status if status in ENDS else UNKNOWN
         if status not in ENDS:
-            return Outcome("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
+            return Outcome("unknown", say("goal_forgotten") if goal.known else say("goal_not_known"))
         outcome, ended, had_ended = ENDS[status]
         sentence = had_ended if goal.doubt else ended
         text = with_fields(goal.widget.result, fields, RESULT)

@@ -153,14 +153,14 @@ class HoldController:
     ) -> tuple[TextLike, Cause]:
         """Why the hold may not begin now ("" if it may), and the receipt's cause."""
         if self._closed:
-            return say("hold_by_stopping"), "interlock"
+            return say("hold_by_shutdown"), "interlock"
         if other := next(
             (one for one in self._held.values() if one.widget.topic == widget.topic), None
         ):
             code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
             return say(code, label=other.widget.label, topic=widget.topic), "interlock"
         if now >= sent + LEASE_S:
-            return say("hold_late"), "interlock"
+            return say("hold_press_too_late"), "interlock"
         if not (verdict := self._verdict(widget, context, now)).permitted:
             return verdict.reason or "", cause_of(verdict.code)
         return context.stale_reason(), "interlock"
@@ -194,7 +194,7 @@ class HoldController:
     def close(self) -> None:
         """Ends all holds and refuses new ones from now on."""
         self._closed = True
-        self.end_all("hold_by_stopping")
+        self.end_all("hold_by_shutdown")
 
     def judge(self) -> None:
         """Ends holds whose lease or permission has ended. Call it after every change, and before any
@@ -258,7 +258,7 @@ class HoldController:
                 return
             self._arrivals.ingest()
             self.judge()
-        self.end(holding, "catching_up")
+        self.end(holding, "link_catching_up")
         raise PressRefused("", "interlock")
 
     def _end(self, holding: ActiveHold, code: str, why: TextLike) -> None:

@@ -92,7 +92,7 @@ class HoldReceipts:
         widget, lease = holding.widget, holding.lease
         sentence = RELEASED if code == RELEASED else "hold_ended"
         end = say(sentence, time=format_time(time.time()), seconds=number(f"{seconds:.1f}"), why=why)
-        text = joined([end, say("hold_unsaid", why=unsaid) if unsaid else ""])
+        text = joined([end, say("hold_stop_not_sent", why=unsaid) if unsaid else ""])
         outcome: OutcomeCode = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",

@@ -31,8 +31,8 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
     now = format_time(time.time())
     successful, reason, second = (response.get(path) for path in SET_PATHS)
     if successful is None or second is not None:
-        return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
+        return Outcome("unknown", say("call_response_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
     text = printable(plain_text(reason, MAX_VALUE_CHARS, without_terminal_codes)) if reason else ""
-    return Outcome("rejected", with_reply(say("said_no", time=now), text))
+    return Outcome("rejected", with_reply(say("call_rejected", time=now), text))

@@ -216,7 +216,7 @@ class ParameterSync:
         gets at most one query per `AGAIN_S` on demand. Returns why it can't be queried, else ""."""
         node = self._nodes[widget.node]
         if node.task is None:
-            return say("no_parameters", node=widget.node)
+            return say("parameter_node_unavailable", node=widget.node)
         fresh = time.monotonic() - node.answered_at < AGAIN_S
         if widget.id not in self._robot.querying and not fresh:
             node.request_query()

@@ -34,9 +34,16 @@ def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Valu
     several = _several(parameter, known, given)
     if len(several) > MAX_LIST_LENGTH:
         raise InputError(
-            say("list_long", label=parameter.label, most=MAX_LIST_LENGTH, count=len(several))
+            say(
+                "parameter_list_too_long",
+                label=parameter.label,
+                most=MAX_LIST_LENGTH,
+                count=len(several),
+            )
         )
-    named = (say("list_value", label=parameter.label, number=i + 1) for i in range(len(several)))
+    named = (
+        say("parameter_list_element", label=parameter.label, number=i + 1) for i in range(len(several))
+    )
     return tuple(_one(parameter, known, name, one) for name, one in zip(named, several, strict=True))
 
 
@@ -48,7 +55,9 @@ def _chosen(parameter: Parameter, given: Any) -> Any:
     if option is None:
         options = tuple(one.label for one in parameter.options)
         raise InputError(
-            say("no_option", label=parameter.label, options=options, given=format_value(given))
+            say(
+                "input_not_an_option", label=parameter.label, options=options, given=format_value(given)
+            )
         )
     return option.value
 
@@ -66,7 +75,7 @@ def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[An
     except ValueError:
         text = limits_text(parameter, allowed_range(parameter, known))
         raise InputError(
-            say("no_list", label=parameter.label, limits=text, given=format_value(given))
+            say("parameter_not_a_list", label=parameter.label, limits=text, given=format_value(given))
         ) from None
 
 
@@ -90,7 +99,7 @@ def _one(parameter: Parameter, known: ParameterState, label: TextLike, given: An
                 return given
             raise InputError(
                 say(
-                    "no_toggle",
+                    "input_not_a_boolean",
                     label=label,
                     on=parameter.on,
                     off=parameter.off,
@@ -101,7 +110,7 @@ def _one(parameter: Parameter, known: ParameterState, label: TextLike, given: An
             if isinstance(given, str) and len(given) <= MAX_TEXT:
                 return given
             text = format_value(given)
-            raise InputError(say("no_text", label=label, most=MAX_TEXT, given=text))
+            raise InputError(say("parameter_not_a_text", label=label, most=MAX_TEXT, given=text))
     return _number(parameter, known, label, given)
 
 
@@ -109,7 +118,7 @@ def _number(parameter: Parameter, known: ParameterState, label: TextLike, given:
     limits = allowed_range(parameter, known)
     text = each_text(parameter, limits)
     if given == "" or given is None:
-        raise InputError(say("number_empty", label=label, limits=text))
+        raise InputError(say("input_number_empty", label=label, limits=text))
     value = _whole(given) if parameter.element_type == "integer" else _double(given)
     if value is None:
         raise InputError(no_number(label, text, given, whole=parameter.is_whole))
@@ -117,7 +126,7 @@ def _number(parameter: Parameter, known: ParameterState, label: TextLike, given:
         if not one.contains(value):
             text = each_text(parameter, one)
             raise InputError(
-                say("off_limits", label=label, limits=text, given=parameter.value_text(value))
+                say("input_outside_limits", label=label, limits=text, given=parameter.value_text(value))
             )
     return value
 

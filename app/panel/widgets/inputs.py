@@ -39,7 +39,7 @@ class TextInput(Input):
     @property
     def too_long(self) -> Text:
         """What is shown for a code that is longer than the input."""
-        return say("scan_too_long", max=self.max_length)
+        return say("input_scan_too_long", max=self.max_length)
 
     @property
     def default_value(self) -> str | None:
@@ -51,10 +51,12 @@ class TextInput(Input):
     def check_value(self, given: Any) -> str:
         """The text; lengths are in characters."""
         if not isinstance(given, str):
-            raise InputError(say("not_text", label=self.label, id=self.id, given=format_value(given)))
+            raise InputError(
+                say("input_not_text", label=self.label, id=self.id, given=format_value(given))
+            )
         if len(given) > self.max_length:
             raise InputError(
-                say("text_too_long", label=self.label, count=len(given), most=self.max_length)
+                say("input_text_too_long", label=self.label, count=len(given), most=self.max_length)
             )
         return given
 
@@ -119,7 +121,9 @@ class SelectInput(Input):
             if same_value(option.value, given) or option.key == given:
                 return option.value
         options = tuple(option.label for option in self.options)
-        raise InputError(say("no_option", label=self.label, options=options, given=format_value(given)))
+        raise InputError(
+            say("input_not_an_option", label=self.label, options=options, given=format_value(given))
+        )
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from option_faults(place, self.options)
@@ -160,7 +164,9 @@ class ToggleInput(Input):
     def check_value(self, given: Any) -> bool:
         if isinstance(given, bool):
             return given
-        what = say("no_toggle", label=self.label, on=self.on, off=self.off, given=format_value(given))
+        what = say(
+            "input_not_a_boolean", label=self.label, on=self.on, off=self.off, given=format_value(given)
+        )
         raise InputError(what)
 
 

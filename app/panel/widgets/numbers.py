@@ -27,7 +27,7 @@ else:
 def no_number(label: TextLike, limits: TextLike, given: Any, *, whole: bool) -> Text:
     """Why a value is refused that is not a number, or not written like one."""
     shown, example = format_value(given), number_like(whole=whole)
-    return say("no_number", label=label, limits=limits, given=shown, example=example)
+    return say("input_not_a_number", label=label, limits=limits, given=shown, example=example)
 
 
 class SteppedWidget(BaseWidget):
@@ -120,14 +120,14 @@ class Numeric(SteppedWidget, Input):
     def check_value(self, given: Any) -> int | float:
         label, allowed = self.label, self.limits_text
         if given == "" or given is None:
-            raise InputError(say("number_empty", label=label, limits=allowed))
+            raise InputError(say("input_number_empty", label=label, limits=allowed))
         if isinstance(given, bool) or not isinstance(given, int | float):
             raise InputError(no_number(label, allowed, given, whole=self.is_whole))
         # Limits first: a value beyond them may be no float, or take long to divide.
         if not self.min <= given <= self.max or not self.is_on_step(float(given)):
             small = isinstance(given, float) and abs(given) <= MAX_EXACT_NUMBER
             text = number(number_text(given) if small else format_value(given))
-            raise InputError(say("off_limits", label=label, limits=allowed, given=text))
+            raise InputError(say("input_outside_limits", label=label, limits=allowed, given=text))
         return self.to_type(float(given))
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:

@@ -142,12 +142,12 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
     @property
     def press_label(self) -> Text:
         """The accessible name of the button that sets the value."""
-        return say("set_named", label=self.label)
+        return say("parameter_set_label", label=self.label)
 
     @property
     def read_label(self) -> Text:
         """The accessible name of the button that queries the node again."""
-        return say("read_named", label=self.label)
+        return say("parameter_read_again_label", label=self.label)
 
     def find_option(self, value: Any) -> Option | None:
         """The option with this value; None without one."""

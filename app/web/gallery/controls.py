@@ -55,11 +55,14 @@ KEYS: Final = (
         "called",
         "call",
         CALL,
-        CALLED | {"busy": True, "result": say("waiting_for_answer")},
+        CALLED | {"busy": True, "result": say("call_waiting")},
         marks=PRESSED,
     ),
     Example(
-        "succeeded", "call", CALL, CALLED | {"outcome": "succeeded", "result": say("answered", time=AT)}
+        "succeeded",
+        "call",
+        CALL,
+        CALLED | {"outcome": "succeeded", "result": say("call_succeeded", time=AT)},
     ),
     Example("rejected, long", "call", CALL, CALLED | {"outcome": "rejected", "result": LONG}),
     Example("hold asked", "hold", HOLD, FREE | LET_GO, marks=REQUESTED),
@@ -103,7 +106,7 @@ STEPPED: Final[Table] = CALLED | {
 }
 MOVED: Final[tuple[OutcomeCode, TextLike]] = (
     "refused",
-    say("refused", time=AT, why=say("step_moved", label=texts.BELT_SPEED.shown, value="130")),
+    say("refused", time=AT, why=say("step_value_changed", label=texts.BELT_SPEED.shown, value="130")),
 )
 STEPS: Final = (
     Example("free", "step", STEP, STEPPED),
@@ -113,7 +116,7 @@ STEPS: Final = (
         "sent, waiting",
         "step",
         STEP,
-        STEPPED | {"enabled": False, "reason": say("busy")},
+        STEPPED | {"enabled": False, "reason": say("press_in_progress")},
     ),
     Example(
         "done",

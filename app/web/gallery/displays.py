@@ -99,7 +99,7 @@ LOGS: Final = (
         LOG,
         {"state": "waiting", "note": say("readout_waiting", topic="/rosout"), "count": "0"},
     ),
-    Example("cut off", "log", LOG, {"state": "old", "note": say("rosout_cut"), "count": "5"}),
+    Example("cut off", "log", LOG, {"state": "old", "note": say("rosout_no_connection"), "count": "5"}),
 )
 
 

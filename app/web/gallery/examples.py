@@ -94,10 +94,10 @@ RUNS: Final[Table] = {
     "stoppable": True,
     "result": texts.CONVEYOR.shown,
 }
-LONG: Final = say("with_reply", said=say("said_no", time=AT), reply=texts.STILL_GRIPS.shown)
+LONG: Final = say("with_reply", said=say("call_rejected", time=AT), reply=texts.STILL_GRIPS.shown)
 REFUSED: Final[tuple[OutcomeCode, TextLike]] = (
     "refused",
-    say("refused", time=AT, why=say("too_often")),
+    say("refused", time=AT, why=say("press_too_often")),
 )
 PRESSED: Final[Texts] = {'type="submit"': 'type="submit" aria-busy="true"'}
 ENABLED: Final[Texts] = {" disabled>": ">"}

@@ -48,7 +48,9 @@ OFF_LIMITS: Final[tuple[OutcomeCode, TextLike]] = (
     say(
         "refused",
         time=AT,
-        why=say("off_limits", label=texts.BELT_SPEED.shown, given="300", limits=KNOWN["limits"]),
+        why=say(
+            "input_outside_limits", label=texts.BELT_SPEED.shown, given="300", limits=KNOWN["limits"]
+        ),
     ),
 )
 PARAMETERS: Final = (
@@ -56,20 +58,20 @@ PARAMETERS: Final = (
         "waiting",
         "parameter",
         PARAMETER,
-        ABSENT | {"state": "waiting", "note": say("parameter_asking", node="/controller")},
+        ABSENT | {"state": "waiting", "note": say("parameter_waiting_for_node", node="/controller")},
     ),
     Example("live", "parameter", PARAMETER, KNOWN),
     Example(
         "old",
         "parameter",
         PARAMETER,
-        KNOWN | {"state": "old", "note": say("parameter_cut", time=BEFORE)},
+        KNOWN | {"state": "old", "note": say("parameter_read_before_disconnect", time=BEFORE)},
     ),
     Example(
         "missing",
         "parameter",
         PARAMETER,
-        ABSENT | {"state": "missing", "note": say("parameter_not_there", node="/controller")},
+        ABSENT | {"state": "missing", "note": say("parameter_not_declared", node="/controller")},
     ),
     Example("locked", "parameter", PARAMETER, KNOWN | LOCKED),
     Example("refused", "parameter", PARAMETER, KNOWN, 300, OFF_LIMITS),

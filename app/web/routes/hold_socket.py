@@ -99,13 +99,13 @@ class _HoldSocket:
             async with asyncio.timeout(BEGIN_WITHIN_S):
                 said = await self._read()
         except TimeoutError:
-            return refuse(by, say("hold_late"))
+            return refuse(by, say("hold_press_too_late"))
         if not self._limits.admit(self._who):
-            return refuse(by, say("too_often"), "limit", trace=False)
+            return refuse(by, say("press_too_often"), "limit", trace=False)
         if isinstance(said, End):
-            return refuse(by, say("hold_let_go"))
+            return refuse(by, say("hold_released_early"))
         if not isinstance(said, Begin):
-            return refuse(by, say("hold_by_nonsense"))
+            return refuse(by, say("hold_by_invalid_message"))
         sent = self._sent(said)
         inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
         try:
@@ -118,7 +118,7 @@ class _HoldSocket:
         except LogError as error:
             return refuse(by, error.text, "log")
         if not still_held:
-            return refuse(by, say("hold_let_go"))
+            return refuse(by, say("hold_released_early"))
         return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
 
     async def _log_begin(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
@@ -170,10 +170,10 @@ class _HoldSocket:
         """Applies a message to the hold; False once it has ended."""
         holds = self._session.holds
         if isinstance(said, End) and said.lease in ("", holding.lease.id):
-            holds.end(holding, END_REASONS.get(said.why, "hold_by_nonsense"))
+            holds.end(holding, END_REASONS.get(said.why, "hold_by_invalid_message"))
             return False
         if not isinstance(said, Beat) or said.lease != holding.lease.id:
-            holds.end(holding, "hold_by_nonsense")
+            holds.end(holding, "hold_by_invalid_message")
             return False
         return holds.beat(holding, said.number, self._sent(said), said.deflection)
 

@@ -93,7 +93,7 @@ class _PressSocket:
             await self._refuse(_id_in(given), error.status, error.text)
             return
         if len(self._under_way) >= MOST_AT_ONCE:
-            await self._refuse(said.id, 429, say("too_many_presses", most=MOST_AT_ONCE))
+            await self._refuse(said.id, 429, say("press_too_many_pending", most=MOST_AT_ONCE))
             return
         task = asyncio.create_task(self._press(said))
         self._under_way.add(task)
@@ -109,7 +109,7 @@ class _PressSocket:
             await self._answer(said.id, error.status, error=error.text)
         except Exception:
             log.exception("press %s broke off", said.id)
-            await self._answer(said.id, 500, error=say("log_broke_off"))
+            await self._answer(said.id, 500, error=say("press_server_error"))
         else:
             self._refused = self._refused + 1 if receipt.cause == "limit" else 0
             await self._answer(said.id, STATUS[receipt.cause], **receipt.as_json())
