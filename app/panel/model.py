@@ -19,7 +19,9 @@ from app.panel.base import (
     Id,
     Label,
     PictureFolder,
+    SaidLabel,
     TopicQos,
+    catalogue_default,
     parse_namespace,
 )
 from app.panel.condition import Condition
@@ -36,6 +38,7 @@ from app.panel.widgets.families import (
     BaseWidget,
     Command,
     DisplayWidget,
+    KeyCommand,
     PublishCommand,
     TopicSource,
     TopicWidget,
@@ -98,6 +101,7 @@ class Panel(Description):
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
+    stop_hint: SaidLabel = catalogue_default("stop_hint")
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
@@ -179,6 +183,11 @@ class Panel(Description):
     def commands(self) -> tuple[Command, ...]:
         """The widgets that can be pressed or held."""
         return tuple(w for w in self.widgets() if isinstance(w, Command))
+
+    @cached_property
+    def stops(self) -> tuple[Command, ...]:
+        """The widgets that stop the machine."""
+        return tuple(w for w in self.commands if isinstance(w, KeyCommand) and w.role == "stop")
 
     @cached_property
     def uniform_buttons(self) -> Mapping[tuple[str, ...], tuple[PublishPress, ...]]:

@@ -23,7 +23,7 @@ from app.permission.interlocks import (
     link_verdict,
 )
 from app.permission.principal import Principal
-from app.permission.verdict import PERMITTED, Verdict, locked
+from app.permission.verdict import PERMITTED, Verdict, locked, with_advice
 from app.robot.state import RobotState
 
 
@@ -123,7 +123,7 @@ def permissions(
     grounds: ServerConditions = NO_CONDITIONS,
 ) -> dict[str, Verdict]:
     """The verdicts of all commands of a panel, by their ids. Uniform buttons with the same interlocks
-    are judged once, and get one object."""
+    are judged once, and get one object. A lock of a stop button says what to use instead."""
 
     def judge(widget: Command) -> Verdict:
         own = [interlocks[name] for name in widget.interlocks]
@@ -139,6 +139,8 @@ def permissions(
     for widget in panel.commands:
         if widget.id not in verdicts:
             verdicts[widget.id] = judge(widget)
+    for widget in panel.stops:
+        verdicts[widget.id] = with_advice(verdicts[widget.id], panel.stop_hint)
     return verdicts
 
 

@@ -1,11 +1,11 @@
 """What permission is judged to be: permitted, or locked with a reason."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from app.i18n import TextLike, say
+from app.i18n import TextLike, joined, say
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,3 +33,11 @@ PERMITTED: Final = Verdict(True)
 def locked(code: str, **about: TextLike) -> Verdict:
     """The verdict for a sentence; the same one again for the same."""
     return Verdict(False, code, say(code, **about))
+
+
+@lru_cache(maxsize=256)
+def with_advice(verdict: Verdict, advice: TextLike) -> Verdict:
+    """A lock whose reason goes on with what to do; the same one again for the same."""
+    if verdict.permitted:
+        return verdict
+    return replace(verdict, reason=joined((verdict.reason or "", advice)))

@@ -120,7 +120,8 @@ export function lockWidget(root, lost, unknown) {
   const buttons = root.querySelectorAll("button[type=submit], .hold");
   for (const button of buttons) button.disabled = true;
   root.querySelector("dialog.ask")?.close();
-  const locks = { reason: lost, reasons: lost, more: "", enabled: false };
+  const reason = root.querySelector(".why")?.dataset.lost ?? lost; // of a stop button: what to use instead
+  const locks = { reason, reasons: reason, more: "", enabled: false };
   if (buttons.length) for (const [name, value] of Object.entries(locks)) showAttribute(root, name, value);
   if (!root.dataset.state) return;
   root.dataset.state = "old";

@@ -4,7 +4,7 @@ import time
 from functools import partial
 from typing import Any, Final, TypedDict
 
-from app.i18n import Text, say
+from app.i18n import Text, joined, say
 from app.panel.layout import Page
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
@@ -59,10 +59,12 @@ class Ask(TypedDict):
 
 
 def page_words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
-    """The `words` of a page's context; `pictures` is the path of the panel's picture files. `plot` and
+    """The `words` of a page's context; `pictures` is the path of the panel's picture files. `stop_lost`
+    is shown at a stop button of a page without its server. `plot` and
     `lines` are called by the macros of trends and logs, with the widget."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
     own |= {"asks": asks_of(session, page)}
+    own |= {"stop_lost": joined((say("server_lost"), session.panel.stop_hint))}
     own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
     return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
