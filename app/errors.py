@@ -126,6 +126,13 @@ class InterfaceError(KioskError):
         self.package = package
 
 
+class KindError(KioskError):
+    """A kind of widgets lacks a part, which the message names: an error of the program."""
+
+    def __init__(self, kind: str, part: str, remedy: str) -> None:
+        super().__init__(f'the widget kind "{kind}" has no {part}: {remedy}')
+
+
 class FieldError(KioskError):
     status = 422
 

@@ -33,7 +33,7 @@ from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
 from app.web.asgi import Application, ReadableStartupErrors
-from app.web.assets import load_assets
+from app.web.assets import load_assets, require_files
 from app.web.connections import Connection
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
@@ -194,6 +194,7 @@ async def _app_state(
         # In development the gallery shows all kinds.
         kinds = {*KINDS} if settings.dev else {widget.kind for widget in panel.widgets()}
         static_files, templates = shipped_path("static"), shipped_path("templates")
+        require_files(static_files, templates)
         own = (panel.picture_files, panel.styles, panel.templates)
         assets = load_assets(static_files, templates, panel.mm_per_px, kinds, *own)
         revision = f"{panel.revision}-{assets.revision}"

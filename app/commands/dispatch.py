@@ -17,7 +17,7 @@ from app.panel.constants import resolve_at
 from app.panel.model import Panel
 from app.panel.template import add_now, fill, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
-from app.panel.widgets.kinds import find_row
+from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call
@@ -99,6 +99,9 @@ class Dispatcher:
             Parameter: self._parameters.check_value,
             Step: self._check_step,
         }
+        require_rows("sender", self.senders, PressCommand)
+        require_rows("refusal", self.refusals, PressCommand)
+        require_rows("check of its entries", self.checks, EntryWidget)
 
     def _check_step(self, widget: Step, given: Any) -> float:
         """The value of a press, which is one step from the one that the robot reports now: what the

@@ -11,8 +11,8 @@ from typing import Final
 
 from app.diagnose.findings import Report
 from app.panel.checks import fit
-from app.panel.checks.tile_sizes import KEY_MM, Screen
 from app.panel.model import Panel
+from app.panel.widgets.tiles import KEY_MM, Screen
 
 DRM: Final = Path("/sys/class/drm")
 HEADER: Final = bytes.fromhex("00ffffffffffff00")

@@ -17,7 +17,7 @@ from app.interfaces import has_key
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
-from app.panel.widgets.kinds import find_row
+from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
@@ -192,3 +192,4 @@ COMMAND_CHECKS: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verd
     ServerCommand: call_blocked,
     Parameter: lambda of, robot, _: set_blocked(of, robot),
 }
+require_rows("check of its command", COMMAND_CHECKS, Command)

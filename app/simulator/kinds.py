@@ -16,13 +16,15 @@ from app.panel.machine_state import MachineState
 from app.panel.template import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.families import BaseWidget, Display, PublishCommand
+from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand
 from app.panel.widgets.gauge import Gauge, SetpointField
 from app.panel.widgets.joints import Joints
-from app.panel.widgets.kinds import find_row
+from app.panel.widgets.kinds import find_row, require_rows
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call, ServerCommand
+from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
@@ -92,7 +94,8 @@ Need = Shown | Published | Served | Acted | Declared
 
 def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
     """What a widget needs of the robot."""
-    yield from find_row(SIMULATED, widget)(widget, interfaces)
+    if (simulated := find_row(SIMULATED, widget)) is not None:
+        yield from simulated(widget, interfaces)
 
 
 def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Shown]:
@@ -228,15 +231,18 @@ def _parameter(parameter: Parameter, _: Interfaces) -> Iterator[Need]:
     yield Declared(widget=parameter)
 
 
-SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[Need]]]] = {
-    BaseWidget: lambda *_: iter(()),
+# None: it needs no topic, or its topics need no more than values of their types.
+SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[Need]] | None]] = {
+    Static: None,
+    Input: None,
     Display: lambda of, _: _shown(of),
     Readout: _readout,
     Indicator: _indicator,
     MachineState: _machine_state,
     Gauge: _gauge,
     Joints: _joints,
-    Table: lambda *_: iter(()),
+    Table: None,
+    LogView: None,
     Camera: _camera,
     Trend: _trend,
     PublishCommand: _published,
@@ -247,3 +253,4 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Action: _action,
     Parameter: _parameter,
 }
+require_rows("simulation", SIMULATED, BaseWidget)

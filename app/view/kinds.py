@@ -14,7 +14,7 @@ from app.panel.widgets.families import BaseWidget, Command, Display, Input, Pres
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.joints import Joints
-from app.panel.widgets.kinds import find_row
+from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
@@ -47,6 +47,7 @@ UNDER_WAY: Final[Mapping[str, str]] = {
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
 AttributesUntil = tuple[Attributes, float]
+AttributesOf = Callable[[Any, RobotState, Verdict, float], AttributesUntil]
 
 
 class Enabled(TypedDict):
@@ -138,9 +139,7 @@ def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> A
     return pressed | reported, until
 
 
-ATTRIBUTES: Final[
-    Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], AttributesUntil]]
-] = {
+ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: lambda of, robot, verdict, now: ({}, math.inf),
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),
@@ -160,3 +159,4 @@ ATTRIBUTES: Final[
     Table: lambda of, robot, verdict, now: table(of, robot, now),
     Trend: lambda of, robot, verdict, now: trend(of, robot, now),
 }
+require_rows("attributes", ATTRIBUTES, BaseWidget)

@@ -3,8 +3,8 @@
 The stylesheet is the layers of `static/css` in their order, with what families of the panel's widgets
 need and its millimetres: one request instead of five; what only the log's page, the gallery or a keypad
 that opens needs is a file of its own.
-Scripts keep their names, so that modules find each other, and their lines. A kind of widgets may have
-`css/kinds/<kind>.css` and `js/kinds/<kind>.js`, which pages with the kind load. Comments, what lines
+Scripts keep their names, so that modules find each other, and their lines. Pages with a kind of widgets
+load its own stylesheet and script, if its row in the table of kinds has them. Comments, what lines
 are indented by and what only sets styles apart stay here.
 """
 
@@ -14,20 +14,13 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
-from app.panel.widgets.families import BaseWidget, Input
-from app.panel.widgets.gauge import Gauge
-from app.panel.widgets.joints import Joints
+from app.errors import KindError
 from app.panel.widgets.kinds import KINDS
-from app.panel.widgets.parameter import Parameter
 
 LAYERS: Final = ("guard", "tokens", "base", "layout", "widgets", "keys", "floor")
-# Which kinds and families of widgets need a stylesheet.
-OF_FAMILIES: Final[Mapping[str, tuple[type[BaseWidget], ...]]] = {
-    "entries": (Input, Parameter),
-    "marks": (Gauge, Joints),
-}
+SHARED: Final = ("entries", "marks")  # by several kinds of widgets
 OWN_PAGES: Final = ("log",)
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
@@ -69,8 +62,11 @@ class Assets:
 
     files: dict[str, Asset]
     revision: str
-    scripts: frozenset[str] = frozenset()  # the kinds of widgets that have a script of their own
-    styles: frozenset[str] = frozenset()  # and those that have a stylesheet
+    # The kinds of widgets that have a script of their own, and those that have a stylesheet.
+    scripts: ClassVar[frozenset[str]] = frozenset(name for name, kind in KINDS.items() if kind.script)
+    styles: ClassVar[frozenset[str]] = frozenset(
+        name for name, kind in KINDS.items() if "own" in kind.styles
+    )
 
 
 def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
@@ -103,8 +99,7 @@ def load_assets(
     widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
     layer, so that they win, and as they are written.
     """
-    widgets = [KINDS[kind] for kind in kinds]
-    needed = [name for name, of in OF_FAMILIES.items() if any(issubclass(one, of) for one in widgets)]
+    needed = [name for name in SHARED if any(name in KINDS[kind].styles for kind in kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     sheet = asset(b"".join([*layers, millimetre]), ".css")
@@ -124,6 +119,20 @@ def load_assets(
         digest.update(name.encode() + b"\0" + sent.content + b"\0")
     for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
-    own_scripts = {script.stem for script in (scripts / "kinds").glob("*.js")}
-    own_styles = {name.removeprefix("kinds/") for name in of_kinds}
-    return Assets(files, digest.hexdigest()[:12], frozenset(own_scripts), frozenset(own_styles))
+    return Assets(files, digest.hexdigest()[:12])
+
+
+def require_files(static: Path, templates: Path) -> None:
+    """Checks that each kind of widgets has the files that its row names, and no others: a KindError
+    names the kind and the file."""
+    for name, kind in KINDS.items():
+        parts = {
+            "template": (True, templates / f"widgets/{name}.html"),
+            "stylesheet": ("own" in kind.styles, static / f"css/kinds/{name}.css"),
+            "script": (kind.script, static / f"js/kinds/{name}.js"),
+        }
+        for part, (is_named, file) in parts.items():
+            if is_named and not file.is_file():
+                raise KindError(name, part, f"add {file}")
+            if file.is_file() and not is_named:
+                raise KindError(name, part, f"name it in the row of KINDS, or remove {file}")

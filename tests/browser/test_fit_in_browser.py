@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
-from app.panel.checks.tile_sizes import LOW_SCREEN, Screen
+from app.panel.widgets.tiles import LOW_SCREEN, Screen
 from tests.support.browser.pages import DRAWN, ROWS, place
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_width, reason, row_heights
-from app.panel.checks.tile_sizes import Screen
+from app.panel.widgets.tiles import Screen
 from tests.support.browser.pages import ROWS, widget
 from tests.support.parts import ROOT, Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server, panel_file

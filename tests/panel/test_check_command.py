@@ -146,7 +146,8 @@ def test_the_whole_message_of_each_press_is_printed(
     assert main(["-v", str(path)]) == 0
     first, _, said = capsys.readouterr().out.partition("\n")
     assert "good" in first
-    assert said == (TESTS / "everything.txt").read_text()
+    without_lines = re.sub(r", line \d+:", ":", said)
+    assert without_lines == (TESTS / "everything.txt").read_text()
 
 
 @pytest.mark.parametrize(("text", "status"), [(SHIPPED.read_text(), 0), (NO_TITLE, 1), ("title =", 2)])

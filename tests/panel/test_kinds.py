@@ -1,17 +1,30 @@
-"""Every kind of widgets has its row in each table, and a macro of its name."""
+"""The table of widget kinds: each kind has all its parts, and one that lacks a part is named."""
 
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
 from app.commands.dispatch import Dispatcher
+from app.errors import KindError
 from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCommand
-from app.panel.widgets.kinds import KINDS, find_row
+from app.panel.widgets.kinds import KINDS, find_row, require_rows
+from app.panel.widgets.publish import Publish
 from app.permission.interlocks import COMMAND_CHECKS
 from app.settings import shipped_path
+from app.simulator.kinds import SIMULATED
 from app.view.kinds import ATTRIBUTES
 from tests.support.builders import FakeTransport, panel_of, robot_there, sending_of
 
-EACH = pytest.mark.parametrize(("kind", "of"), KINDS.items())
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_is_the_one_that_its_class_names(kind: str) -> None:
+    assert KINDS[kind].model.model_json_schema()["properties"]["kind"]["const"] == kind
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_has_a_macro_of_its_name(kind: str) -> None:
+    environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
+    macro = getattr(environment.get_template(f"widgets/{kind}.html").module, kind)
+    assert macro.arguments == ("widget", "shown", "inputs", "receipt", "words")
 
 
 @pytest.fixture(scope="module")
@@ -20,38 +33,31 @@ def dispatcher() -> Dispatcher:
     return sending_of(panel, robot_there(panel), FakeTransport())
 
 
-def widget(of: type[BaseWidget], kind: str) -> BaseWidget:
-    return of.model_construct(id="one", label="One", kind=kind)
+def test_each_part_of_a_kind_is_required(dispatcher: Dispatcher) -> None:
+    """Without the rows of a family, the first kind of the family is named."""
+    for rows, family in (
+        (ATTRIBUTES, BaseWidget),
+        (COMMAND_CHECKS, Command),
+        (SIMULATED, BaseWidget),
+        (dispatcher.senders, PressCommand),
+        (dispatcher.refusals, PressCommand),
+        (dispatcher.checks, EntryWidget),
+    ):
+        require_rows("part", rows, family)
+        with pytest.raises(KindError, match=r'^the widget kind "\w+" has no part: add a row for'):
+            require_rows("part", {}, family)
 
 
-@EACH
-def test_a_kind_is_the_one_that_its_class_names(kind: str, of: type[BaseWidget]) -> None:
-    assert of.model_json_schema()["properties"]["kind"]["const"] == kind
+def test_the_kind_and_the_missing_part_are_named() -> None:
+    rows = {family: row for family, row in ATTRIBUTES.items() if not issubclass(Publish, family)}
+    with pytest.raises(KindError) as caught:
+        require_rows("attributes", rows, BaseWidget)
+    assert str(caught.value) == (
+        'the widget kind "publish" has no attributes: add a row for Publish or its family'
+    )
 
 
-@EACH
-def test_a_kind_is_shown(kind: str, of: type[BaseWidget]) -> None:
-    assert callable(find_row(ATTRIBUTES, widget(of, kind)))
-
-
-@EACH
-def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[BaseWidget]) -> None:
-    environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
-    macro = getattr(environment.get_template(f"widgets/{kind}.html").module, kind)
-    assert macro.arguments == ("widget", "shown", "inputs", "receipt", "words")
-
-
-@EACH
-def test_a_command_is_judged_and_sent(kind: str, of: type[BaseWidget], dispatcher: Dispatcher) -> None:
-    if issubclass(of, Command):
-        assert callable(find_row(COMMAND_CHECKS, widget(of, kind)))
-    if issubclass(of, PressCommand):
-        assert callable(find_row(dispatcher.senders, widget(of, kind)))
-        assert callable(find_row(dispatcher.refusals, widget(of, kind)))
-    if issubclass(of, EntryWidget):
-        assert callable(find_row(dispatcher.checks, widget(of, kind)))
-
-
-def test_a_kind_without_a_row_is_named() -> None:
-    with pytest.raises(TypeError, match='no row for a widget of the kind "text"'):
-        find_row(COMMAND_CHECKS, widget(KINDS["text"], "text"))
+def test_a_widget_without_a_row_is_named() -> None:
+    widget = KINDS["text"].model.model_construct(id="one", label="One", kind="text")
+    with pytest.raises(KindError, match='the widget kind "text" has no row'):
+        find_row(COMMAND_CHECKS, widget)

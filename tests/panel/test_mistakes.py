@@ -115,7 +115,7 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     together = {key: value for page in pages for key, value in page.items()}
     # Those are files beside the panel file; test_page_templates.py has them.
     assert list(lacking(together, Page)) == ["template", "styles"]
-    for kind, model in KINDS.items():
+    for kind, (model, *_) in KINDS.items():
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
         assert list(lacking(own | ({"qos": qos} if qos else {}), model)) == [], kind

@@ -11,14 +11,13 @@ import pytest
 from app.interfaces import DISTROS
 from app.interfaces.names import Qos
 from app.panel import Panel, load_panel
-from app.panel.widgets.families import BaseWidget, Display
-from app.panel.widgets.kinds import KINDS, find_row
+from app.panel.widgets.families import Display
 from app.panel.widgets.publish import SinglePublish
 from app.permission.conditions import permits
 from app.robot.parameter_state import EMPTY_VALUE
 from app.simulator.in_process import robots_of
 from app.simulator.interlocks import APART_S
-from app.simulator.kinds import SIMULATED, Published, Shown, needs_of
+from app.simulator.kinds import Published, Shown, needs_of
 from app.simulator.panel_robot import PanelRobot
 from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
@@ -606,11 +605,6 @@ def test_a_new_kind_needs_no_row_where_its_family_says_all(
     (press,) = needs_of(Big.model_validate(BIG | {"message": {"data": True}}), INTERFACES)
     assert isinstance(press, Published)
     assert (press.topic, press.template) == ("/b", {"data": True})
-
-
-@pytest.mark.parametrize(("kind", "of"), KINDS.items())
-def test_each_kind_is_simulated(kind: str, of: type[BaseWidget]) -> None:
-    assert callable(find_row(SIMULATED, of.model_construct(id="one", label="One", kind=kind)))
 
 
 def test_a_topic_without_a_row_has_values_all_the_same(

@@ -3,6 +3,7 @@
 The code is that of the page, put into a copy of the project that then runs a panel of these kinds.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -108,6 +109,22 @@ def test_a_new_command_takes_no_other_input_than_its_own(kiosk: Server) -> None:
 
     refused: httpx.Response = until(judged, "the demo robot permits")
     assert (refused.status_code, refused.json()["outcome"]) == (422, "refused")
+
+
+def test_the_server_does_not_start_with_a_kind_without_its_macro(project: Path, tmp_path: Path) -> None:
+    shutil.copytree(project, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "templates/widgets/lines.html").unlink()
+    started = subprocess.run(
+        [sys.executable, "-m", "app.cli", "run", "panel.toml", "--port", "0"],
+        cwd=tmp_path,
+        env={**os.environ, "KIOSK_DATA": str(tmp_path / "data")},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert started.returncode != 0
+    assert 'the widget kind "lines" has no template: add ' in started.stderr
+    assert "Traceback" not in started.stderr
 
 
 def test_app_check_knows_a_new_kind(project: Path) -> None:

@@ -1,15 +1,17 @@
 """The static files in memory: the stylesheet in its order, and a name that changes with any of them."""
 
 import gzip
+import shutil
 from pathlib import Path
-from typing import Literal
 
 import pytest
 
+from app.errors import KindError
+from app.panel.widgets.families import EntryWidget
 from app.panel.widgets.kinds import KINDS
-from app.panel.widgets.numbers import Numeric
+from app.panel.widgets.step import Step
 from app.settings import shipped_path
-from app.web.assets import LATER, LAYERS, OF_FAMILIES, OWN_PAGES, Assets, load_assets
+from app.web.assets import LATER, LAYERS, OWN_PAGES, SHARED, Assets, load_assets, require_files
 from tests.support.parts import ROOT
 
 
@@ -18,7 +20,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, *OF_FAMILIES, *OWN_PAGES, LATER):
+    for layer in (*LAYERS, *SHARED, *OWN_PAGES, LATER):
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")
@@ -59,18 +61,15 @@ def test_the_stylesheet_has_what_the_panels_widgets_need(
     assert (".entries a" in sent) is needed
 
 
-def test_a_new_kind_of_input_has_the_styles_of_its_family(
-    static: Path, templates: Path, monkeypatch: pytest.MonkeyPatch
+def test_every_input_has_the_styles_of_entries() -> None:
+    for name, kind in KINDS.items():
+        if issubclass(kind.model, EntryWidget) and not issubclass(kind.model, Step):
+            assert "entries" in kind.styles, name
+
+
+def test_the_styles_and_the_script_of_a_kind_are_files_of_its_name(
+    static: Path, templates: Path
 ) -> None:
-    class Dial(Numeric):
-        kind: Literal["dial"]
-
-    monkeypatch.setattr("app.web.assets.KINDS", {**KINDS, "dial": Dial})
-    sent = loaded(static, templates, 0.25, "dial").files["kiosk.css"].content.decode()
-    assert ".entries a" in sent
-
-
-def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates: Path) -> None:
     for suffix in ("css", "js"):
         (static / suffix / "kinds").mkdir()
     (static / "css/kinds/gauge.css").write_text(".gauge {}\n")
@@ -79,8 +78,40 @@ def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates
     assert b".gauge" not in assets.files["kiosk.css"].content
     assert assets.files["kinds/gauge.css"].content == b".gauge{}"
     assert assets.files["kinds/gauge.js"].content == b"gauge();\n"
-    assert assets.styles == {"gauge"}
-    assert assets.scripts == {"gauge"}
+    assert "gauge" in assets.styles & assets.scripts
+    assert "publish" not in assets.styles | assets.scripts
+
+
+PART_FILES = {
+    "template": "templates/widgets/gauge.html",
+    "stylesheet": "static/css/kinds/gauge.css",
+    "script": "static/js/kinds/gauge.js",
+}
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> Path:
+    """A copy of the shipped files."""
+    for name in ("static", "templates"):
+        shutil.copytree(shipped_path(name), tmp_path / "shipped" / name)
+    return tmp_path / "shipped"
+
+
+def test_each_kind_has_the_files_of_its_row(shipped: Path) -> None:
+    require_files(shipped / "static", shipped / "templates")
+
+
+@pytest.mark.parametrize(("part", "file"), PART_FILES.items())
+def test_a_missing_file_of_a_kind_is_named(shipped: Path, part: str, file: str) -> None:
+    (shipped / file).unlink()
+    with pytest.raises(KindError, match=f'"gauge" has no {part}: add .*/{file}$'):
+        require_files(shipped / "static", shipped / "templates")
+
+
+def test_a_script_that_no_row_names_is_an_error(shipped: Path) -> None:
+    (shipped / "static/js/kinds/publish.js").write_text("")
+    with pytest.raises(KindError, match='"publish" has no script: name it in the row of KINDS'):
+        require_files(shipped / "static", shipped / "templates")
 
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:

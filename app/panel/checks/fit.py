@@ -8,19 +8,11 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from app.errors import Note
-from app.panel.checks.tile_sizes import (
-    GAP_MM,
-    KEY_MM,
-    MIDDLE,
-    NARROW,
-    TOUCH,
-    Screen,
-    height_of,
-    width_needed,
-)
 from app.panel.layout import COLUMNS, Group, Page
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.tiles import GAP_MM, KEY_MM, MIDDLE, NARROW, TOUCH, Screen
 
 GAP: Final = 12.0  # between groups, and between the rows of a group
 HEAD: Final = 48.0  # of a group
@@ -128,7 +120,7 @@ def row_heights(group: Group, screen: Screen) -> list[float]:
     heights: list[float] = []
     for widget, row, rows in placed(group.widgets, group):
         heights += [0.0] * (row + rows - len(heights))
-        needed = (height_of(widget, screen) - GAP * (rows - 1)) / rows
+        needed = (KINDS[widget.kind].tile.height(widget, screen) - GAP * (rows - 1)) / rows
         for at in range(row, row + rows):
             heights[at] = max(heights[at], needed)
     return heights
@@ -159,7 +151,8 @@ def too_narrow(group: Group, width: float, screen: Screen) -> str:
     column = (width - gap * (group.grid - 1)) / group.grid
     for widget in group.widgets:
         span = group.span_of(widget)
-        has, needs = column * span + gap * (span - 1), width_needed(widget, screen)
+        has = column * span + gap * (span - 1)
+        needs = KINDS[widget.kind].tile.width(widget, screen)
         if has < needs - 0.5:
             return f'"{widget.label}" would be {has:.0f} px wide and needs {needs:.0f}'
     return ""

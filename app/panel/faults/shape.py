@@ -72,7 +72,7 @@ def _resolve_location(location: tuple[str | int, ...]) -> tuple[Model, Path]:
     before: str | int = ""
     for step in location:
         if path[-2:-1] == ("widget",) and isinstance(before, int) and step in KINDS:
-            model = KINDS[str(step)]
+            model = KINDS[str(step)].model
         else:
             path = (*path, step)
             model = inner_model(model, step) or model

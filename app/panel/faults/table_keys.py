@@ -141,9 +141,9 @@ def _other_tables(table: TableKeys) -> Iterator[tuple[str, Model]]:
             yield (f"{header}.{key}" if header else key), model
     for kind in KINDS.values():
         if table.path[-2:-1] != ("widget",):
-            yield "[[page.widget]]", kind
-        for key in known_keys(kind):
-            if model := inner_model(kind, key):
+            yield "[[page.widget]]", kind.model
+        for key in known_keys(kind.model):
+            if model := inner_model(kind.model, key):
                 yield f"page.widget.{key}", model
     for key in known_keys(Panel):
         if model := inner_model(Panel, key):
@@ -154,9 +154,10 @@ def _wrong_kind(table: TableKeys, follow: Consequences) -> list[Fault]:
     """A fault of a widget that has the keys of another kind."""
     keys = set(table.table)
     kinds = [
-        kind
-        for kind, model in KINDS.items()
-        if table.path[-2:-1] == ("widget",) and _required_keys(model) <= keys <= set(known_keys(model))
+        name
+        for name, kind in KINDS.items()
+        if table.path[-2:-1] == ("widget",)
+        and _required_keys(kind.model) <= keys <= set(known_keys(kind.model))
     ]
     if not kinds or not table.unknown:
         return []

@@ -1,12 +1,14 @@
-"""The table of widget kinds."""
+"""The table of widget kinds: a row for each, with its parts that need no other room."""
 
 from collections.abc import Mapping
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypeVar
 
 from pydantic import Field
 
+from app.errors import KindError
+from app.panel.widgets import tiles
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget
@@ -23,47 +25,81 @@ from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.static import PageLink, Picture, TextLabel
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
+from app.panel.widgets.tiles import Tile
 from app.panel.widgets.trend import Trend
 
-KINDS: Final[Mapping[str, type[BaseWidget]]] = {
-    "text": TextInput,
-    "number": NumberInput,
-    "slider": SliderInput,
-    "select": SelectInput,
-    "toggle": ToggleInput,
-    "publish": Publish,
-    "hold": Hold,
-    "step": Step,
-    "joystick": Joystick,
-    "call": Call,
-    "action": Action,
-    "parameter": Parameter,
-    "readout": Readout,
-    "indicator": Indicator,
-    "gauge": Gauge,
-    "joints": Joints,
-    "table": Table,
-    "camera": Camera,
-    "log": LogView,
-    "trend": Trend,
-    "label": TextLabel,
-    "image": Picture,
-    "link": PageLink,
+Stylesheet = Literal["entries", "marks", "own"]
+
+
+class WidgetKind(NamedTuple):
+    """A kind of widgets.
+
+    `model` has its keys and their checks, `tile` the size that it needs on a page. `styles` are the
+    stylesheets of a page with the kind: "own" is `css/kinds/<kind>.css`, the others are shared by
+    several kinds. `script`: whether it has a script, `js/kinds/<kind>.js`. Its template is
+    `widgets/<kind>.html`. How a kind is shown, judged, sent and simulated is in a table of each of the
+    rooms above; `require_rows` checks them.
+    """
+
+    model: type[BaseWidget]
+    tile: Tile
+    styles: tuple[Stylesheet, ...]
+    script: bool
+
+
+KINDS: Final[Mapping[str, WidgetKind]] = {
+    "text": WidgetKind(TextInput, tiles.ENTRY, styles=("entries",), script=False),
+    "number": WidgetKind(NumberInput, tiles.NUMBER, styles=("entries",), script=False),
+    "slider": WidgetKind(SliderInput, tiles.SLIDER, styles=("entries",), script=False),
+    "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script=False),
+    "toggle": WidgetKind(ToggleInput, tiles.ENTRY, styles=("entries",), script=False),
+    "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
+    "hold": WidgetKind(Hold, tiles.KEY, styles=(), script=True),
+    "step": WidgetKind(Step, tiles.STEP, styles=("own",), script=True),
+    "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script=True),
+    "call": WidgetKind(Call, tiles.KEY, styles=(), script=False),
+    "action": WidgetKind(Action, tiles.ACTION, styles=(), script=False),
+    "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script=True),
+    "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
+    "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
+    "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
+    "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
+    "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),
+    "camera": WidgetKind(Camera, tiles.CAMERA, styles=("own",), script=True),
+    "log": WidgetKind(LogView, tiles.LOG, styles=("own",), script=True),
+    "trend": WidgetKind(Trend, tiles.TREND, styles=("own",), script=True),
+    "label": WidgetKind(TextLabel, tiles.LABEL, styles=(), script=False),
+    "image": WidgetKind(Picture, tiles.DISPLAY, styles=(), script=False),
+    "link": WidgetKind(PageLink, tiles.KEY, styles=(), script=False),
 }
 
 # The description of a widget's table, by its "kind".
 if TYPE_CHECKING:
     Widget = BaseWidget
 else:
-    Widget = Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]
+    Widget = Annotated[
+        reduce(or_, (kind.model for kind in KINDS.values())), Field(discriminator="kind")
+    ]
 
 Row = TypeVar("Row")
 
 
 def find_row(rows: Mapping[type[Any], Row], widget: BaseWidget) -> Row:
     """The row of a widget's kind in a table by kinds and families, else that of its nearest family.
-    TypeError without one."""
-    for of in type(widget).__mro__:
-        if of in rows:
-            return rows[of]
-    raise TypeError(f'there is no row for a widget of the kind "{widget.kind}"')
+    KindError without one."""
+    return _nearest_row(rows, type(widget), widget.kind, "row in a table of kinds")
+
+
+def require_rows(part: str, rows: Mapping[type[Any], Any], family: type[BaseWidget]) -> None:
+    """Checks a table by kinds and families: each kind of `family` has a row. KindError names the kind
+    and the `part` that it lacks."""
+    for name, kind in KINDS.items():
+        if issubclass(kind.model, family):
+            _nearest_row(rows, kind.model, name, part)
+
+
+def _nearest_row(rows: Mapping[type[Any], Row], model: type[BaseWidget], name: str, part: str) -> Row:
+    for family in model.__mro__:
+        if family in rows:
+            return rows[family]
+    raise KindError(name, part, f"add a row for {model.__name__} or its family")

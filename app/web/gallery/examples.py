@@ -32,7 +32,7 @@ class Example(NamedTuple):
     def widget(self, number: int) -> BaseWidget:
         """Its description; `number` makes its id."""
         table = {"label": texts.PRINT.table, **self.table, "kind": self.kind, "id": f"example_{number}"}
-        return KINDS[self.kind].model_validate(table)
+        return KINDS[self.kind].model.model_validate(table)
 
     def receipt_of(self, widget: BaseWidget) -> Receipt | None:
         """Its receipt, as the page has that of the last press."""

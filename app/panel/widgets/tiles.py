@@ -1,0 +1,161 @@
+"""The sizes of widgets' tiles and of a page's parts, as static/css has them, in CSS pixels."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple, Self
+
+from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.joints import Joints
+from app.panel.widgets.log_view import LogView
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.table import Table
+from app.panel.widgets.trend import Trend
+
+WIDE, MIDDLE, NARROW = 1200, 900, 600  # from these widths on a page has all columns, two, one
+KEY_MM, ENTRY_MM, GAP_MM = 20.0, 14.0, 5.0
+UPRIGHT: Final = 1000  # from this height on a narrow screen has two rows of groups
+LOW_SCREEN: Final = 560  # up to this height a row with a cancel key is as low as an entry
+TOUCH: Final = 44.0  # the least of what is touched
+ROW_GAP: Final = 12.0
+LABEL_HEIGHT: Final = 25.0  # above an entry
+DISPLAY_HEIGHT, LOW_DISPLAY_HEIGHT = 72.0, 66.0
+PARAMETER_HEIGHT: Final = 80.0  # name, value and note
+PARAMETER_WIDTH: Final = 314.0  # its entry and its key side by side
+SLIDER_WIDTH: Final = 200.0
+NUMBER_WIDTH: Final = 100.0
+DISPLAY_WIDTH: Final = 80.0
+UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
+GAUGE_WIDTH: Final = 130.0
+JOINTS_FRAME: Final = 41.0  # name and note
+JOINT, LOW_JOINT = 34.0, 25.0
+JOINTS_WIDTH: Final = 220.0
+TABLE_FRAME: Final = 69.0  # name, heads of the columns and note
+ROW, LOW_ROW = 36.0, 30.0
+TABLE_WIDTH: Final = 280.0
+STEP_VALUE: Final = 116.0  # the value between the keys
+PAD_MM: Final = 60.0
+LOG_HEIGHT, LOG_WIDTH = 100.0, 300.0  # of some lines
+PICTURE_HEIGHT, PICTURE_WIDTH = 120.0, 160.0  # the least in which a picture is readable
+TREND_HEIGHT: Final = 150.0  # names and values of the pens, plot and time axis
+TREND_WIDTH: Final = 240.0
+TREND_KEYS: Final = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """A screen's size, and its CSS pixels to a millimetre."""
+
+    width: int
+    height: int
+    mm: float
+
+    @classmethod
+    def of(cls, size: str, mm_per_px: float) -> Self:
+        """From a size like "1280x800"."""
+        width, height = map(int, size.split("x"))
+        return cls(width, height, 1 / mm_per_px)
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether all groups stand side by side, with the tabs at the side."""
+        return self.width >= WIDE and self.width >= self.height
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the first group stays above the others, which take turns."""
+        return self.width < MIDDLE and self.height >= UPRIGHT
+
+    @property
+    def pad(self) -> float:
+        """Around and inside groups."""
+        return 8.0 if self.width < MIDDLE else 12.0
+
+    def touch(self, millimetres: float) -> float:
+        """The height of what is touched."""
+        return max(TOUCH, millimetres * self.mm)
+
+
+class Tile(NamedTuple):
+    """What the tile of a kind needs, from (widget, screen): the height, with what stands above and
+    below it, and the least width in which the widget can be used."""
+
+    height: Callable[[Any, Screen], float]
+    width: Callable[[Any, Screen], float]
+
+
+def _key_height(_: BaseWidget, screen: Screen) -> float:
+    """Keys have their distance above and below too."""
+    return _key(screen, KEY_MM)
+
+
+def _action_height(_: BaseWidget, screen: Screen) -> float:
+    return _key(screen, ENTRY_MM if screen.height <= LOW_SCREEN else KEY_MM)
+
+
+def _key(screen: Screen, height_mm: float) -> float:
+    return screen.touch(height_mm) + GAP_MM * screen.mm - ROW_GAP
+
+
+def _display_height(_: BaseWidget, screen: Screen) -> float:
+    return LOW_DISPLAY_HEIGHT if screen.height <= LOW_SCREEN else DISPLAY_HEIGHT
+
+
+def _entry_height(_: BaseWidget, screen: Screen) -> float:
+    return LABEL_HEIGHT + screen.touch(ENTRY_MM)
+
+
+def _parameter_height(_: Parameter, screen: Screen) -> float:
+    return PARAMETER_HEIGHT + screen.touch(ENTRY_MM)
+
+
+def _log_height(_: LogView, screen: Screen) -> float:
+    return screen.touch(10) + LABEL_HEIGHT + LOG_HEIGHT
+
+
+def _gauge_height(gauge: Gauge, screen: Screen) -> float:
+    if gauge.orientation == "horizontal":
+        return LYING_GAUGE
+    return LOW_UPRIGHT_GAUGE if screen.height <= LOW_SCREEN else UPRIGHT_GAUGE
+
+
+def _joints_height(widget: Joints, screen: Screen) -> float:
+    return JOINTS_FRAME + len(widget.joints) * (LOW_JOINT if screen.height <= LOW_SCREEN else JOINT)
+
+
+def _table_height(table: Table, screen: Screen) -> float:
+    return TABLE_FRAME + table.rows_shown * (LOW_ROW if screen.height <= LOW_SCREEN else ROW)
+
+
+def _trend_height(trend: Trend, screen: Screen) -> float:
+    return TREND_HEIGHT + (screen.touch(KEY_MM) + 8 if trend.keys else 0.0)
+
+
+def _trend_width(trend: Trend, screen: Screen) -> float:
+    if not trend.keys:
+        return TREND_WIDTH
+    return (TREND_KEYS * KEY_MM + (TREND_KEYS - 1) * GAP_MM) * screen.mm
+
+
+def _key_width(_: BaseWidget, screen: Screen) -> float:
+    return KEY_MM * screen.mm
+
+
+DISPLAY: Final = Tile(_display_height, lambda widget, screen: DISPLAY_WIDTH)
+KEY: Final = Tile(_key_height, _key_width)
+ACTION: Final = Tile(_action_height, lambda widget, screen: (2 * KEY_MM + GAP_MM) * screen.mm)
+STEP: Final = Tile(_key_height, lambda widget, screen: 2 * KEY_MM * screen.mm + STEP_VALUE)
+ENTRY: Final = Tile(_entry_height, _key_width)
+NUMBER: Final = Tile(_entry_height, lambda widget, screen: NUMBER_WIDTH)
+SLIDER: Final = Tile(_entry_height, lambda widget, screen: SLIDER_WIDTH)
+PARAMETER: Final = Tile(_parameter_height, lambda widget, screen: PARAMETER_WIDTH)
+JOYSTICK: Final = Tile(
+    lambda widget, screen: screen.touch(PAD_MM), lambda widget, screen: PAD_MM * screen.mm
+)
+LABEL: Final = Tile(lambda widget, screen: LABEL_HEIGHT, lambda widget, screen: DISPLAY_WIDTH)
+LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH)
+CAMERA: Final = Tile(lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH)
+GAUGE: Final = Tile(_gauge_height, lambda widget, screen: GAUGE_WIDTH)
+JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH)
+TABLE: Final = Tile(_table_height, lambda widget, screen: TABLE_WIDTH)
+TREND: Final = Tile(_trend_height, _trend_width)
