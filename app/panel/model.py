@@ -12,6 +12,7 @@ from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
 from app.interfaces.validation import format_value
+from app.panel.alarm import Alarm, AlarmRules
 from app.panel.base import (
     Description,
     Endpoint,
@@ -121,6 +122,8 @@ class Panel(Description):
     log: LogRules = LogRules()
     demo_story: StoryName | None = None
     demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
+    alarm_rules: AlarmRules = Field(AlarmRules(), alias="alarms")
+    alarms: Annotated[tuple[Alarm, ...], Field(strict=False)] = Field((), alias="alarm")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.
@@ -252,10 +255,12 @@ class Panel(Description):
                 yield widget.confirm
 
     def monitored(self) -> Iterator[TopicSource]:
-        """What conditions and displays listen to."""
+        """What conditions, alarms and displays listen to."""
         for condition in self.conditions:
             field = (condition.field,)
             yield TopicSource(condition.topic, condition.type, condition.qos, field)
+        for alarm in self.alarms:
+            yield from alarm.topic_sources()
         for display in self.displays:
             yield from display.sources()
         for command in self.commands:

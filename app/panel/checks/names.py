@@ -15,6 +15,9 @@ def spelling_faults(panel: Panel, widgets: Iterator[tuple[str, BaseWidget]]) -> 
     """Faults of names that are below the namespace and written as if they were not, beside the other
     way: what the panel knows of a topic, it knows by one name."""
     names = [(f"interlock[{i}].topic", one.topic) for i, one in enumerate(panel.interlocks)]
+    for i, alarm in enumerate(panel.alarms):
+        named = (("topic", alarm.topic), ("node", alarm.node))
+        names += [(f"alarm[{i}].{key}", name) for key, name in named if name]
     for place, widget in widgets:
         names += _names(place, widget)
     if not any(name.startswith(GLOBAL) for _, name in names):

@@ -7,6 +7,7 @@ from itertools import islice
 from app.errors import Fault, InterfaceError
 from app.i18n.values import alike
 from app.interfaces import Interfaces
+from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.names import spelling_faults
@@ -52,8 +53,13 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
         *faulty,
         *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, reported)),
     }
-    found = [*_interlock_faults(panel, interfaces), *_widget_faults(panel, interfaces, faulty)]
-    missed = {"interlock" if fault.place.startswith("interlock") else "input" for fault in ids}
+    found = [
+        *_interlock_faults(panel, interfaces),
+        *_widget_faults(panel, interfaces, faulty),
+        *alarm_faults(panel, interfaces, faulty),
+    ]
+    missed = {fault.place.partition("[")[0] for fault in ids}
+    missed |= {"input", "control"} if missed - {"interlock", "alarm"} else set()
     found = [fault for fault in found if fault.cause.partition(" ")[0] not in missed]
     yield from found
     yield from _topic_conflicts(panel, [fault.place for fault in found])
@@ -71,6 +77,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
 def _id_faults(panel: Panel) -> Iterator[Fault]:
     """Faults of ids. Their items may be missing elsewhere under the correct id."""
     yield from _duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
+    yield from _duplicate_ids("alarm", [alarm.id for alarm in panel.alarms])
     yield from _duplicate_widget_ids(panel)
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:
@@ -247,6 +254,8 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     places: list[tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
+    for i, alarm in enumerate(panel.alarms):
+        places.extend((f"alarm[{i}]", source) for source in alarm.topic_sources())
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())

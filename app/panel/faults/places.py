@@ -10,9 +10,9 @@ from app.panel.faults.toml_lines import Path, lines_of
 
 MAX_ID: Final = 64
 _OWNER: Final = re.compile(
-    r"(?:^|\.)(page|group|frame|widget|interlock|robot)(?:\[([0-9]+)\])?(?=\.|$)"
+    r"(?:^|\.)(page|group|frame|widget|interlock|alarm|robot)(?:\[([0-9]+)\])?(?=\.|$)"
 )
-_WITH_ID: Final = ("page", "widget", "interlock", "robot")
+_WITH_ID: Final = ("page", "widget", "interlock", "alarm", "robot")
 _QUOTED: Final = re.compile(r"[/\[]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 
@@ -43,7 +43,7 @@ def add_locations(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Itera
 
 
 def id_at(place: str, tables: Any) -> str:
-    """The id of the widget, page, interlock or robot around a place; "" without one."""
+    """The id of the widget, page, interlock, alarm or robot around a place; "" without one."""
     known: Any = ""
     around = tables
     for name, index in _OWNER.findall(place):
@@ -52,7 +52,7 @@ def id_at(place: str, tables: Any) -> str:
             known = around["id"] if name in _WITH_ID else known
         except (LookupError, TypeError):
             return ""
-        if name == "widget":
+        if name in ("widget", "alarm"):
             break
     is_valid = isinstance(known, str) and known.isprintable() and '"' not in known
     return known[:MAX_ID] if is_valid else ""

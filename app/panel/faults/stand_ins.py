@@ -14,14 +14,14 @@ from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
 
-TABLES: Final = ("interlock", "page")
+TABLES: Final = ("interlock", "page", "frame", "robot")
 
 
 @dataclass(frozen=True, slots=True)
 class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
-    are kinds of causes that can't be checked: the existing "interlock"s or "input"s, or the topics that
-    the panel "listens" to."""
+    are kinds of causes that can't be checked: the existing "interlock"s, "input"s or "control"s, or the
+    topics that the panel "listens" to."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -51,29 +51,35 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 return None  # all types may be different
             case ("page", int(p), "group", int(g), str(key), *_):
                 rest.tables["page"][p]["group"][g].pop(key, None)
-                rest.undecidable.update(("input", "listens"))
+                rest.undecidable.update(("input", "control", "listens"))
             case ("page", int(p), str(key), *_):
                 page = rest.tables["page"][p]
                 page.pop(key, None)
                 rest.tables["page"][p] = {"id": f"faulty_{p}", "title": "?"} | page
-                rest.undecidable.update(("input", "listens", "page"))
+                rest.undecidable.update(("input", "control", "listens", "page"))
             case ("interlock", int(i), *_):
                 rest.tables["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | {
                     "topic": f"/faulty_{i}"
                 }
                 rest.undecidable.update(("listens", *_unnamed("interlock", tables["interlock"][i])))
+            case ("alarm", int(i), *_):
+                stand_in = _stand_in(tables["alarm"][i], str(i))
+                rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}
+                rest.undecidable.add("listens")
             case ("robot", int(r), *_):
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
+                rest.undecidable.update(_unnamed("robot", tables["robot"][r]))
                 rest.tables["robot"][r] = {"id": _stand_in(tables["robot"][r], str(r))["id"], **names}
             case (str(key),) if closest_name(key, ("interfaces", "distro")):
                 return None
             case (str(key), *_):
                 rest.tables.pop(key, None)
                 rest.tables.setdefault("title", "?")
+                rest.undecidable.add("control")
                 if closest_name(key, ("pictures",)):
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
-                    rest.undecidable.update(("interlock", "listens", "page"))
+                    rest.undecidable.update(("interlock", "listens", "page", "robot"))
     return rest
 
 
@@ -86,7 +92,7 @@ def _widget(rest: StandIns, tables: dict[str, Any], path: Path) -> None:
     stand_in = _stand_in(old, "_".join(str(step) for step in path if isinstance(step, int)))
     around[path[-1]] = stand_in | {"kind": "text"}
     rest.faulty.add(stand_in["id"])
-    rest.undecidable.update(("listens", *_unnamed("input", old)))
+    rest.undecidable.update(("listens", "control", *_unnamed("input", old)))
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:

@@ -35,6 +35,8 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "screens": 'sizes in CSS pixels: write ["1280x800"]',
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",
+    "alarm": "tables: write [[alarm]]",
+    "inhibits": 'ids of controls: write ["start"]',
 }
 # The limits of a number, by pydantic's names.
 LIMITS: Final[Mapping[str, str]] = {

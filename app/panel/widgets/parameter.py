@@ -50,6 +50,9 @@ def _check_node(given: str) -> str:
     return given
 
 
+NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
+
+
 class Parameter(SteppedWidget, EntryWidget, PressCommand):
     """A parameter of a node; `min`, `max` and `step` narrow the range that the node describes.
 
@@ -57,7 +60,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
     """
 
     kind: Literal["parameter"]
-    node: Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
+    node: NodeName
     parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
     type: Literal["bool", "integer", "double", "string", "bool[]", "integer[]", "double[]", "string[]"]
     unit: Unit = ""

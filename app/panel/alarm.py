@@ -1,0 +1,194 @@
+"""The descriptions of alarms: `[[alarm]]` and `[alarms]` of a panel file."""
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from app.i18n import PanelText
+from app.interfaces.validation import format_value
+from app.panel.base import (
+    Description,
+    FieldPath,
+    File,
+    Id,
+    Seconds,
+    Topic,
+    TopicQos,
+    Type,
+    panel_text,
+)
+from app.panel.widgets.families import TopicSource
+from app.panel.widgets.numbers import Unit
+from app.panel.widgets.parameter import NodeName
+from app.panel.widgets.table import MAX_ENTRIES, READ_BY_DEFAULT, ListPath
+
+Priority = Annotated[int, Field(ge=1, le=4)]
+Delay = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
+Limit = Annotated[float, Field(allow_inf_nan=False)]
+SourceKind = Literal["limits", "stale", "node", "lost", "diagnostics", "list"]
+
+LIMIT_KEYS: Final = ("low_low", "low", "high", "high_high")
+# The keys that decide from what an alarm is raised, and the source that they stand for.
+SOURCE_KEYS: Final[Mapping[str, SourceKind]] = {
+    **dict.fromkeys(LIMIT_KEYS, "limits"),
+    "stale_s": "stale",
+    "node": "node",
+    "lost": "lost",
+    "diagnostics": "diagnostics",
+    "list": "list",
+}
+DIAGNOSTICS: Final = "/diagnostics"
+DIAGNOSTIC_ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
+SHIFT_S: Final = 8 * 3600.0
+
+if TYPE_CHECKING:
+    AlarmText = str | PanelText
+else:
+    AlarmText = panel_text(400)
+
+
+def _parse_patterns(given: Any) -> tuple[str, ...]:
+    """The patterns, from one or a list of them."""
+    patterns = [given] if isinstance(given, str) else given
+    if not isinstance(patterns, list | tuple) or not all(isinstance(p, str) and p for p in patterns):
+        raise ValueError(
+            f"must be a name, in which * stands for any text, or a list, not {format_value(given)}"
+        )
+    if not patterns:
+        raise ValueError('is empty: write "*" for all names')
+    return tuple(patterns)
+
+
+def _check_unique(ids: tuple[str, ...]) -> tuple[str, ...]:
+    for i, name in enumerate(ids):
+        if name in ids[:i]:
+            raise ValueError(f"names {format_value(name)} twice")
+    return ids
+
+
+def _check_levels(given: Mapping[str, int]) -> Mapping[str, int]:
+    for level in given:
+        if not LEVEL.fullmatch(level):
+            raise ValueError(f"{format_value(level)} is not a level: a number, or a text in capitals")
+    return given
+
+
+LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
+Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
+Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
+
+
+class AlarmList(Description):
+    """Alarms that a robot publishes as a list: the `field` of the message that is the list, and the
+    fields of each entry. Without `active` each entry is active. The `catalogue` has texts by `code`."""
+
+    field: ListPath
+    code: FieldPath
+    text: FieldPath | None = None
+    level: FieldPath | None = None
+    active: FieldPath | None = None
+    priorities: Annotated[Mapping[str, Priority], AfterValidator(_check_levels)] = Field(
+        default_factory=dict
+    )
+    catalogue: File | None = None
+    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = READ_BY_DEFAULT
+
+    @property
+    def own_fields(self) -> tuple[str, ...]:
+        """The fields of an entry that are read."""
+        named = (self.code, self.text, self.level, self.active)
+        return tuple(dict.fromkeys(path for path in named if path is not None))
+
+
+class Alarm(Description):
+    """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
+    publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR."""
+
+    id: Id
+    robot: Id | None = None
+    priority: Priority = 3
+    critical_priority: Priority | None = None
+    text: AlarmText | None = None
+    cause: AlarmText | None = None
+    consequence: AlarmText | None = None
+    action: AlarmText | None = None
+    picture: str | None = None
+    group: AlarmText | None = None
+    latched: bool = False
+    ack: Literal["required", "none"] = "required"
+    inhibits: Widgets = ()
+    on_delay_s: Delay = 0.0
+    off_delay_s: Delay = 0.0
+    on_unknown: Literal["keep", "raise"] = "keep"
+    max_shelf_s: Annotated[float, Field(gt=0, le=SHIFT_S, allow_inf_nan=False)] = SHIFT_S
+    topic: Topic | None = None
+    type: Type | None = None
+    field: FieldPath = "data"
+    unit: Unit = ""
+    max_age_s: Seconds | None = None
+    qos: TopicQos = TopicQos()
+    low_low: Limit | None = None
+    low: Limit | None = None
+    high: Limit | None = None
+    high_high: Limit | None = None
+    deadband: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    stale_s: Seconds | None = None
+    node: NodeName | None = None
+    lost: Literal["link", "robot"] | None = None
+    diagnostics: Patterns | None = None
+    listed: AlarmList | None = Field(None, alias="list")
+
+    @property
+    def source(self) -> SourceKind | None:
+        """From what it is raised; None if no key says so."""
+        return next((SOURCE_KEYS[key] for key in self.given_source_keys), None)
+
+    @property
+    def given_source_keys(self) -> tuple[str, ...]:
+        """The given keys of `SOURCE_KEYS`."""
+        names = {"list": "listed"}
+        return tuple(key for key in SOURCE_KEYS if getattr(self, names.get(key, key)) is not None)
+
+    @cached_property
+    def limits(self) -> Mapping[str, float]:
+        """Key → value of the given limits."""
+        given = {key: getattr(self, key) for key in LIMIT_KEYS}
+        return {key: value for key, value in given.items() if value is not None}
+
+    @property
+    def topic_name(self) -> str | None:
+        """Its topic: /diagnostics where diagnostics name none."""
+        return self.topic or (DIAGNOSTICS if self.diagnostics else None)
+
+    @property
+    def topic_type(self) -> str | None:
+        return self.type or (DIAGNOSTIC_ARRAY if self.diagnostics else None)
+
+    @property
+    def priorities(self) -> tuple[int, int]:
+        """Those of its two levels. By default the second is one step more urgent."""
+        return self.priority, self.critical_priority or max(1, self.priority - 1)
+
+    def is_for(self, robot: str | None) -> bool:
+        """Whether it is an alarm of this robot; None is the robot without a name."""
+        return self.robot in (None, robot)
+
+    def topic_sources(self) -> Iterator[TopicSource]:
+        """The topic that it listens to."""
+        topic, type_name = self.topic_name, self.topic_type
+        if topic is not None and type_name is not None:
+            fields = (self.field,) if self.source == "limits" else ()
+            yield TopicSource(topic, type_name, self.qos, fields)
+
+
+class AlarmRules(Description):
+    """The table `[alarms]`. `panel`: the panel raises alarms of its own. The oldest entries of the
+    history are removed after `days`, or when the file is larger than `size_mb` megabytes."""
+
+    panel: bool = True
+    disk_free_mb: Annotated[float, Field(ge=1, le=1_000_000, allow_inf_nan=False)] = 500.0
+    days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
+    size_mb: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 64.0

@@ -1,0 +1,185 @@
+"""Checks of alarms: one source each, with the keys, fields and limits that it needs."""
+
+import itertools
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any, Final
+
+from app.errors import Fault, InterfaceError
+from app.interfaces import Interfaces, has_key
+from app.panel.alarm import DIAGNOSTIC_ARRAY, LIMIT_KEYS, Alarm, AlarmList, SourceKind
+from app.panel.checks.types import field_faults, type_fault
+from app.panel.constants import NUMBERS
+from app.panel.fault_catalogue import CatalogueError, read_catalogue
+from app.panel.faults.wording import list_names
+from app.panel.model import Panel
+from app.panel.values import number_text
+
+RESERVED: Final = "panel_"  # begins the ids of the panel's own alarms
+NO_SOURCE: Final = (
+    "has no source: give it topic, type and a limit (low_low, low, high, high_high), or stale_s, node, "
+    "lost, diagnostics or [alarm.list]"
+)
+TOPIC: Final = ("topic", "type", "qos")
+# The keys that only some sources read.
+OWN_KEYS: Final[Mapping[SourceKind, tuple[str, ...]]] = {
+    "limits": (*TOPIC, "field", "unit", "max_age_s", "deadband", "critical_priority", *LIMIT_KEYS),
+    "stale": (*TOPIC, "stale_s"),
+    "node": ("node",),
+    "lost": ("lost",),
+    "diagnostics": (*TOPIC, "diagnostics", "max_age_s", "critical_priority"),
+    "list": (*TOPIC, "listed", "max_age_s"),
+}
+KEYS: Final = frozenset(key for keys in OWN_KEYS.values() for key in keys)
+
+
+def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
+    """The faults of all alarms. `faulty` are the ids of widgets whose faults are reported already."""
+    commands = [*(widget.id for widget in panel.commands), *faulty]
+    robots = [robot.id for robot in panel.robots]
+    for i, alarm in enumerate(panel.alarms):
+        place = f"alarm[{i}]"
+        if alarm.id.startswith(RESERVED):
+            what = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
+            yield Fault(f"{place}.id", f"{what}: choose another id")
+        yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
+        yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
+        yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
+        yield from _source_faults(place, alarm, interfaces, panel.language)
+
+
+def _reference_faults(
+    place: str, kind: str, names: tuple[str, ...] | str | None, known: Any
+) -> Iterator[Fault]:
+    """Faults of names of things that the panel does not have."""
+    listed = isinstance(names, tuple)
+    for i, name in enumerate(names if isinstance(names, tuple) else (names,) if names else ()):
+        if name not in known:
+            at = f"{place}[{i}]" if listed else place
+            what = f'no {kind} "{name}"; there is {list_names(known)}'
+            yield Fault(at, what, cause=f"{kind} {name}")
+
+
+def _source_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: str) -> Iterator[Fault]:
+    source, keys = alarm.source, alarm.given_source_keys
+    if source is None:
+        yield Fault(place, NO_SOURCE, cause=f"source {place}")
+        return
+    other = next((key for key in keys if key not in _names(source)), None)
+    if other is not None:
+        what = f'is another source than "{keys[0]}": an alarm has one; write a second [[alarm]]'
+        yield Fault(f"{place}.{other}", what, cause=f"source {place}")
+        return
+    for key in sorted(alarm.model_fields_set & KEYS - {*OWN_KEYS[source]}):
+        yield Fault(f"{place}.{key}", f'has no meaning for "{keys[0]}": leave it out')
+    if alarm.text is None and source not in ("diagnostics", "list"):
+        yield Fault(f"{place}.text", "is missing: the text that an operator reads")
+    yield from CHECKS[source](place, alarm, interfaces, language)
+
+
+def _names(source: SourceKind) -> tuple[str, ...]:
+    return ("list",) if source == "list" else OWN_KEYS[source]
+
+
+def _topic_faults(place: str, alarm: Alarm, interfaces: Interfaces) -> Iterator[Fault]:
+    for key in ("topic", "type"):
+        if getattr(alarm, key) is None:
+            yield Fault(f"{place}.{key}", f'is missing: "{alarm.given_source_keys[0]}" is of a topic')
+    if alarm.type is not None:
+        try:
+            interfaces.require(alarm.type)
+        except InterfaceError as error:
+            yield type_fault(f"{place}.type", error)
+
+
+def _limit_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> Iterator[Fault]:
+    faults = list(_topic_faults(place, alarm, interfaces))
+    yield from faults
+    if faults or alarm.type is None:
+        return
+    faults = list(field_faults(place, alarm.type, alarm.field, interfaces))
+    yield from faults
+    kind = None if faults else interfaces.field_type(alarm.type, alarm.field)
+    if kind is not None and kind not in NUMBERS:
+        yield Fault(f"{place}.field", f'"{alarm.field}" is {kind}: limits are for one number')
+    for (below, low), (above, high) in itertools.pairwise(alarm.limits.items()):
+        if low >= high:
+            what = f"{number_text(high)} is not above {below} ({number_text(low)})"
+            yield Fault(f"{place}.{above}", what)
+    if "low" in alarm.limits and "high" in alarm.limits:
+        room = alarm.limits["high"] - alarm.limits["low"]
+        if 0 < room <= alarm.deadband:
+            what = f"{number_text(alarm.deadband)} is more than there is between low and high"
+            yield Fault(f"{place}.deadband", what)
+
+
+def _stale_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> Iterator[Fault]:
+    yield from _topic_faults(place, alarm, interfaces)
+
+
+def _diagnostic_faults(place: str, alarm: Alarm, _: Interfaces, __: str) -> Iterator[Fault]:
+    if alarm.topic_type != DIAGNOSTIC_ARRAY:
+        yield Fault(f"{place}.type", f"diagnostics are {DIAGNOSTIC_ARRAY}; see [alarm.list]")
+
+
+def _list_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: str) -> Iterator[Fault]:
+    listed = alarm.listed
+    faults = list(_topic_faults(place, alarm, interfaces))
+    yield from faults
+    if listed is None:
+        return
+    yield from _catalogue_faults(place, alarm, listed, language)
+    if faults or alarm.type is None:
+        return
+    faults = list(field_faults("", alarm.type, listed.field, interfaces))
+    yield from (Fault(f"{place}.list.field", fault.message) for fault in faults)
+    if faults:
+        return
+    kind = interfaces.type_at(alarm.type, listed.field)
+    if kind.container != "sequence":
+        yield Fault(f"{place}.list.field", f'"{listed.field}" is {kind}: it must be a list')
+        return
+    for key in ("code", "text", "level", "active"):
+        yield from _entry_faults(f"{place}.list.{key}", key, alarm.type, listed, interfaces)
+
+
+def _entry_faults(
+    place: str, key: str, type_name: str, listed: AlarmList, interfaces: Interfaces
+) -> Iterator[Fault]:
+    """Faults of a field of each entry, which must be a single value."""
+    path = getattr(listed, key)
+    if path is None:
+        return
+    try:
+        kind = interfaces.type_at(type_name, f"{listed.field}[0].{path}")
+    except InterfaceError as error:
+        yield Fault(place, str(error))
+        return
+    if kind.is_nested or kind.container != "one" or has_key(path):
+        yield Fault(place, f'"{path}" of an entry is {kind}: it must be one value')
+    elif key == "active" and kind.name != "bool":
+        yield Fault(place, f'"{path}" of an entry is {kind}: it must be a bool')
+
+
+def _catalogue_faults(place: str, alarm: Alarm, listed: AlarmList, language: str) -> Iterator[Fault]:
+    if listed.catalogue is None:
+        if listed.text is None and alarm.text is None:
+            yield Fault(f"{place}.list.text", "is missing: the field with the text, or a catalogue")
+        return
+    try:
+        read_catalogue(listed.catalogue, language)
+    except CatalogueError as error:
+        yield Fault(f"{place}.list.catalogue", f"{listed.catalogue.name}, {error}")
+
+
+def _no_faults(*_: Any) -> Iterator[Fault]:
+    yield from ()
+
+
+CHECKS: Final[Mapping[SourceKind, Callable[[str, Alarm, Interfaces, str], Iterator[Fault]]]] = {
+    "limits": _limit_faults,
+    "stale": _stale_faults,
+    "node": _no_faults,
+    "lost": _no_faults,
+    "diagnostics": _diagnostic_faults,
+    "list": _list_faults,
+}
