@@ -326,7 +326,7 @@ def test_a_widget_that_cannot_be_shown_leaves_the_others(
     command, display = (built.view["widgets"][name] for name in names)
     assert (command["enabled"], command["reason"].code) == (False, "widget_failed")
     assert frame.view["widgets"][names[1]] == display
-    assert (display["state"], display["note"].code) == ("interlock_unreadable", "widget_failed")
+    assert (display["state"], display["note"].code) == ("unreadable", "widget_failed")
     assert set(built.failures) == set(names)
     assert set(frame.failures) == {names[1]}
     assert frame.displays[names[1]] == NOW + 1.0
