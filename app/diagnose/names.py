@@ -21,7 +21,7 @@ from app.survey.model import (
     Node,
     RobotGraph,
     Server,
-    Topic,
+    SurveyedTopic,
     TopicEndpoint,
     near,
 )
@@ -84,7 +84,7 @@ class PanelNames:
                 if within(f"/{key}", graph.namespace) and (own == name or name not in SHARED_TOPICS):
                     yield graph, own
 
-    def topics(self, name: str) -> list[Topic]:
+    def topics(self, name: str) -> list[SurveyedTopic]:
         return [topic for graph, own in self.places(name) if (topic := graph.topic(own)) is not None]
 
     def publishers(self, name: str) -> list[TopicEndpoint]:
@@ -162,7 +162,7 @@ def _best(known: Iterable[Forwarding | None]) -> Forwarding | None:
     return next((one for one in order if one in there), None)
 
 
-def _of(graph: RobotGraph, kind: str) -> tuple[Topic, ...] | tuple[Server, ...]:
+def _of(graph: RobotGraph, kind: str) -> tuple[SurveyedTopic, ...] | tuple[Server, ...]:
     match kind:
         case "topics":
             return graph.topics

@@ -22,7 +22,7 @@ TOLERANCE: Final = 0.1  # of the size of a key
 
 
 @dataclass(frozen=True, slots=True)
-class Display:
+class ConnectedScreen:
     """A connected screen: pixels, and mm (0 where it does not say)."""
 
     name: str
@@ -36,7 +36,7 @@ class Display:
         return self.width_mm / self.width
 
 
-def displays(root: Path = DRM) -> Iterator[Display]:
+def displays(root: Path = DRM) -> Iterator[ConnectedScreen]:
     """The screens that are connected."""
     for folder in sorted(root.glob("card*-*")):
         try:
@@ -49,7 +49,7 @@ def displays(root: Path = DRM) -> Iterator[Display]:
             yield found
 
 
-def parsed(name: str, edid: bytes) -> Display | None:
+def parsed(name: str, edid: bytes) -> ConnectedScreen | None:
     """What a screen says of itself; None where that is no EDID."""
     if len(edid) < LEAST_SIZE or not edid.startswith(HEADER):
         return None
@@ -60,7 +60,7 @@ def parsed(name: str, edid: bytes) -> Display | None:
     size = timing[12] | (timing[14] & 0xF0) << 4, timing[13] | (timing[14] & 0x0F) << 8
     if not all(size):
         size = edid[21] * 10, edid[22] * 10
-    return Display(name, width, height, *(size if all(size) else (0, 0)))
+    return ConnectedScreen(name, width, height, *(size if all(size) else (0, 0)))
 
 
 def check_screens(report: Report, panel: Panel, root: Path = DRM) -> None:
@@ -79,7 +79,7 @@ def check_screens(report: Report, panel: Panel, root: Path = DRM) -> None:
                 report.find("page_too_large", page.id, screen=size, detail=why)
 
 
-def _check_size(report: Report, panel: Panel, display: Display, named: str) -> None:
+def _check_size(report: Report, panel: Panel, display: ConnectedScreen, named: str) -> None:
     real = KEY_MM * display.mm_per_px / panel.mm_per_px
     details = {
         "screen": f"{display.mm_per_px:.3g}",

@@ -11,7 +11,7 @@ from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
 from app.install.panel_files import copies_for, users_file
 from app.install.release import CheckedPanel, Current, Release
-from app.install.step import Step
+from app.install.step import InstallStep
 from app.install.system import Packages, Unit, User
 
 SYSTEMS: Final = {("debian", "12"), ("debian", "13"), ("ubuntu", "24.04")}
@@ -54,7 +54,7 @@ class Options:
     any_system: bool = False
 
 
-def steps(options: Options, host: Host) -> list[Step]:
+def steps(options: Options, host: Host) -> list[InstallStep]:
     """All steps; SettingsError if this system or an option can't be used."""
     assets = Assets(options.wheel)
     release = Release(
@@ -85,10 +85,10 @@ def steps(options: Options, host: Host) -> list[Step]:
     ]
 
 
-def own_files(assets: Assets, screen: bool) -> list[Step]:
+def own_files(assets: Assets, screen: bool) -> list[InstallStep]:
     """The files that each release has its own of."""
     unit = "/etc/systemd/system"
-    files: list[Step] = [
+    files: list[InstallStep] = [
         OwnFile(
             path=f"{unit}/{SERVER}", content=assets.text(f"deploy/{SERVER}"), about="the server's unit"
         )
@@ -101,9 +101,9 @@ def own_files(assets: Assets, screen: bool) -> list[Step]:
     return files
 
 
-def _of_the_screen(options: Options, assets: Assets) -> list[Step]:
+def _of_the_screen(options: Options, assets: Assets) -> list[InstallStep]:
     users = "/etc/sysusers.d/operator-panel.conf"
-    found: list[Step] = [
+    found: list[InstallStep] = [
         OwnFile(path=users, content=assets.text("deploy/sysusers.conf"), about="the browser's user"),
         User(USER, users),
         UsersFile(
@@ -117,7 +117,7 @@ def _of_the_screen(options: Options, assets: Assets) -> list[Step]:
     return found
 
 
-def uninstall_steps(host: Host) -> list[Step]:
+def uninstall_steps(host: Host) -> list[InstallStep]:
     """All that an installation may have made."""
     here = Path(__file__)  # the names of files count here, not what is in them
     return [

@@ -7,7 +7,7 @@ from app.install.host import Host
 from app.install.system import Unit
 
 
-class Step(Protocol):
+class InstallStep(Protocol):
     """One thing that is so when it is done. `do` and `undo` may be repeated."""
 
     def describe(self, host: Host) -> str:
@@ -22,13 +22,13 @@ class Step(Protocol):
         """Takes it back; returns what was done, "" for nothing."""
 
 
-def describe(steps: Sequence[Step], host: Host) -> Iterator[str]:
+def describe(steps: Sequence[InstallStep], host: Host) -> Iterator[str]:
     """A line for each step: what it would do, or that it is done."""
     for step in steps:
         yield f"{'done' if step.is_done(host) else 'to do':5}  {step.describe(host)}"
 
 
-def apply(steps: Sequence[Step], host: Host, say: Callable[[str], object]) -> int:
+def apply(steps: Sequence[InstallStep], host: Host, say: Callable[[str], object]) -> int:
     """Does the steps that are not done, in their order; returns how many there were. A unit that
     runs is started again after any of them, so that it has what they changed."""
     done = 0
@@ -40,7 +40,7 @@ def apply(steps: Sequence[Step], host: Host, say: Callable[[str], object]) -> in
     return done
 
 
-def revert(steps: Sequence[Step], host: Host, say: Callable[[str], object]) -> None:
+def revert(steps: Sequence[InstallStep], host: Host, say: Callable[[str], object]) -> None:
     """Takes the steps back, the last first."""
     for step in reversed(steps):
         if said := step.undo(host):

@@ -36,17 +36,17 @@ class Key(NamedTuple):
     value: str | int
 
 
-Step = str | int | Key
+PathStep = str | int | Key
 
 
 class _Parsed(NamedTuple):
-    steps: tuple[Step, ...]
+    steps: tuple[PathStep, ...]
     parent: str  # the path of the message that contains the last name, "" for the whole message
 
 
 @lru_cache(4096)
 def _parse(path: str) -> _Parsed:
-    steps: list[Step] = []
+    steps: list[PathStep] = []
     at = last = 0
     while at < len(path) or not steps:
         match = _STEP.match(path, at)
@@ -70,7 +70,7 @@ def _unquote(text: str) -> str:
     return text[1:-1].replace(quote * 2, quote) if quote in "'\"" else text
 
 
-def path_steps(path: str) -> tuple[Step, ...]:
+def path_steps(path: str) -> tuple[PathStep, ...]:
     """The steps of a path: names, indexes and keys; InterfaceError for a malformed path."""
     return _parse(path).steps
 

@@ -15,7 +15,7 @@ from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import Definitions, Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
 from app.interfaces.distributions import read_distribution
-from app.interfaces.field_path import Step
+from app.interfaces.field_path import PathStep
 from app.interfaces.mcap_schema import definition_text
 from app.interfaces.package_folders import (
     file_stamps,
@@ -116,7 +116,7 @@ class Interfaces:
         self.require(type_name)
         return self._resolver.type_at(type_name, path)
 
-    def typed_steps(self, type_name: str, path: str) -> tuple[Step, ...]:
+    def typed_steps(self, type_name: str, path: str) -> tuple[PathStep, ...]:
         """The steps of a path, whose keys have the values that a message has: 5, not "5"."""
         self.require(type_name)
         return self._resolver.typed_steps(type_name, path)

@@ -38,12 +38,12 @@ class PageStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class PageDecision:
     action: Action
     reason: str = ""
 
 
-GOOD: Final = Verdict(Action.NONE)
+GOOD: Final = PageDecision(Action.NONE)
 
 
 class Judge:
@@ -55,37 +55,37 @@ class Judge:
         self._pause_s = SILENT_AFTER_S
         self._silent_before = -LONGEST_PAUSE_S
 
-    def judge(self, look: PageStatus, server_answers: bool | None, now: float) -> Verdict:
+    def judge(self, look: PageStatus, server_answers: bool | None, now: float) -> PageDecision:
         """`server_answers` is None if it was not queried: a page with young events shows that it does.
         `now` is in seconds of a monotonic clock."""
         verdict = self._judge(look, server_answers, now)
         if verdict.action is Action.OPEN_PANEL and not look.waiting:
             self._opened = [at for at in self._opened if now - at < OPENED_WITHIN_S] + [now]
             if len(self._opened) > MOST_OPENED:
-                verdict = Verdict(Action.RESTART, f"{verdict.reason}, again and again")
+                verdict = PageDecision(Action.RESTART, f"{verdict.reason}, again and again")
         if verdict.action is Action.RESTART:
             self._since.clear()
             self._opened.clear()
         return verdict
 
-    def _judge(self, look: PageStatus, server: bool | None, now: float) -> Verdict:
+    def _judge(self, look: PageStatus, server: bool | None, now: float) -> PageDecision:
         opened = Action.OPEN_WAITING if server is False else Action.OPEN_PANEL
         if look.crashed:
-            return Verdict(opened, "the page crashed")
+            return PageDecision(opened, "the page crashed")
         if not look.responds:
-            return Verdict(Action.RESTART, "the page did not respond")
+            return PageDecision(Action.RESTART, "the page did not respond")
         if self._lasts("undrawn", not look.drawn, UNDRAWN_AFTER_S, now):
-            return Verdict(Action.RESTART, f"the page drew nothing for {UNDRAWN_AFTER_S:g} s")
+            return PageDecision(Action.RESTART, f"the page drew nothing for {UNDRAWN_AFTER_S:g} s")
         if look.waiting:
-            return Verdict(Action.OPEN_PANEL, "the server answers") if server else GOOD
+            return PageDecision(Action.OPEN_PANEL, "the server answers") if server else GOOD
         if not look.on_panel:
-            return Verdict(opened, "another page is shown")
+            return PageDecision(opened, "another page is shown")
         if self._lasts("foreign", not look.ours, FOREIGN_AFTER_S, now):
             self._since.pop("foreign")
-            return Verdict(opened, "no page of the panel is shown")
+            return PageDecision(opened, "no page of the panel is shown")
         return self._silence(look, server, now)
 
-    def _silence(self, look: PageStatus, server: bool | None, now: float) -> Verdict:
+    def _silence(self, look: PageStatus, server: bool | None, now: float) -> PageDecision:
         """A page whose events are old while the server answers is opened again, then the browser
         restarted, each time after a longer pause."""
         if look.age_s is not None and look.age_s < SILENT_AFTER_S:
@@ -101,7 +101,7 @@ class Judge:
         self._silent_before = now
         self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
         action = Action.RESTART if again else Action.OPEN_PANEL
-        return Verdict(action, "the page has no events though the server answers")
+        return PageDecision(action, "the page has no events though the server answers")
 
     def _lasts(self, what: str, holds: bool, for_s: float, now: float) -> bool:
         """Whether `what` has held for `for_s` seconds or longer."""

@@ -17,7 +17,7 @@ from app.panel.model import Panel
 from app.panel.widgets.table import Table
 from app.robot.sample import Sample
 from app.robot.slices import Slices
-from app.robot.table_order import NO_ROWS, Entry, TableRows, ordered
+from app.robot.table_order import NO_ROWS, TableEntry, TableRows, ordered
 
 MAX_KEYS: Final = 5_000
 MAX_QUEUED: Final = 64
@@ -36,7 +36,7 @@ class _Entries:
         default_factory=lambda: BoundedQueue(MAX_QUEUED, MAX_QUEUED_BYTES)
     )
     walk: tuple[Walk[Rows], Sample] | None = None
-    by_key: dict[str, Entry] = field(default_factory=dict)
+    by_key: dict[str, TableEntry] = field(default_factory=dict)
     shown: TableRows = NO_ROWS
 
     @property
@@ -64,8 +64,8 @@ class _Entries:
             self._keep(rows, sample)
 
     def _keep(self, rows: Rows, sample: Sample) -> None:
-        entries: Sequence[Entry] = [
-            Entry(tuple(map(_cut, values)), sample.at, sample.wall) for values in rows.values
+        entries: Sequence[TableEntry] = [
+            TableEntry(tuple(map(_cut, values)), sample.at, sample.wall) for values in rows.values
         ]
         unread = rows.total - len(rows.values)
         if self.table.key is not None:
@@ -73,7 +73,7 @@ class _Entries:
             entries = list(self.by_key.values())
         self.shown = ordered(self.table, entries, unread)
 
-    def _keep_by_key(self, entries: Sequence[Entry]) -> int:
+    def _keep_by_key(self, entries: Sequence[TableEntry]) -> int:
         """Keeps the newest entry of each key; returns how many keys were too many. The oldest go."""
         place = self.table.own_fields.index(self.table.key)
         for entry in entries:

@@ -15,7 +15,7 @@ NORMAL: Final = frozenset({"grey", "white", "black"})  # colours of states that 
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class TableEntry:
     """An entry: its values in the order of `Table.own_fields`; `at` and `wall` as in `Sample`."""
 
     values: tuple[Any, ...]
@@ -28,7 +28,7 @@ class TableRows:
     """The `first` entries in the table's order; `hidden` more were read, of which `abnormal` ones have
     these states (index in the column's states → number); `unread` were not read, or not kept."""
 
-    first: tuple[Entry, ...] = ()
+    first: tuple[TableEntry, ...] = ()
     hidden: int = 0
     abnormal: Mapping[int, int] = field(default_factory=dict)
     unread: int = 0
@@ -37,7 +37,7 @@ class TableRows:
 NO_ROWS: Final = TableRows()
 
 
-def ordered(table: Table, entries: Sequence[Entry], unread: int) -> TableRows:
+def ordered(table: Table, entries: Sequence[TableEntry], unread: int) -> TableRows:
     """What a table shows of all its entries."""
     first = tuple(_first(table, entries))
     counted = Counter(_abnormal(table, entries))
@@ -46,7 +46,7 @@ def ordered(table: Table, entries: Sequence[Entry], unread: int) -> TableRows:
     return TableRows(first, len(entries) - len(first), abnormal, unread)
 
 
-def _first(table: Table, entries: Sequence[Entry]) -> Sequence[Entry]:
+def _first(table: Table, entries: Sequence[TableEntry]) -> Sequence[TableEntry]:
     sort, most = table.sort, table.rows_shown
     if sort is None:
         return entries[:most]
@@ -73,7 +73,7 @@ def states_of(table: Table) -> tuple[int, tuple[LampState, ...]]:
     return 0, ()
 
 
-def _abnormal(table: Table, entries: Sequence[Entry]) -> Iterator[int]:
+def _abnormal(table: Table, entries: Sequence[TableEntry]) -> Iterator[int]:
     """The index of the state of each entry that is abnormal."""
     place, states = states_of(table)
     known: dict[Hashable, int | None] = {}

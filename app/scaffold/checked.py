@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 from app.errors import Fault
-from app.scaffold.entry import Draft
+from app.scaffold.draft_parts import Draft
 from app.scaffold.toml_text import toml_text, written
 
 Part = tuple[str, str]  # (kind, name) of a widget; ("interlock", topic) of a candidate

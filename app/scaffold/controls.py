@@ -6,11 +6,11 @@ from typing import Any, Final
 
 from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES
-from app.scaffold.entry import Entry, Omission
+from app.scaffold.draft_parts import DraftWidget, Omission
 from app.scaffold.fields import NUMBERS
 from app.scaffold.naming import label_of, place_of, words_of
 from app.scaffold.reasons import NO_MESSAGE
-from app.survey.model import Server, Topic
+from app.survey.model import Server, SurveyedTopic
 from app.survey.node_services import NodeParameter
 
 TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
@@ -26,7 +26,7 @@ MAX_COMMENT: Final = 200  # characters of a value, and of a description
 ROLES: Final = {"start": "start", "stop": "stop", "reset": "reset"}
 
 
-def publishers(topic: Topic, interfaces: Interfaces) -> Iterator[Entry | Omission]:
+def publishers(topic: SurveyedTopic, interfaces: Interfaces) -> Iterator[DraftWidget | Omission]:
     """Keys that publish on a topic that the robot listens to."""
     nodes = {node for one in topic.subscribers for node in one.nodes}
     about = {"label": label_of(topic.name), "topic": topic.name, "type": topic.type}
@@ -55,7 +55,7 @@ def _message(type_name: str, interfaces: Interfaces) -> dict[str, Any] | None:
     return {one.name: True if one.type.name == "bool" else "text"}
 
 
-def calls(service: Server, interfaces: Interfaces) -> Iterator[Entry]:
+def calls(service: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     """Keys that call a service whose request is empty or one bool."""
     if service.type.startswith(OF_EVERY_NODE):
         return
@@ -76,7 +76,7 @@ def calls(service: Server, interfaces: Interfaces) -> Iterator[Entry]:
             yield _control("call", service.name, service.nodes, labelled, id_word=word)
 
 
-def goals(action: Server, interfaces: Interfaces) -> Iterator[Entry]:
+def goals(action: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     """A key that sends a goal with default values."""
     goal = interfaces.action_types(action.type).goal
     fields = interfaces.structures[goal].fields
@@ -86,7 +86,7 @@ def goals(action: Server, interfaces: Interfaces) -> Iterator[Entry]:
     yield _control("action", action.name, action.nodes, keys, comment)
 
 
-def parameter(of: NodeParameter) -> Iterator[Entry]:
+def parameter(of: NodeParameter) -> Iterator[DraftWidget]:
     """An entry for a parameter that can be set."""
     kind = of.type.removesuffix("[]")
     hidden = of.name.startswith("qos_overrides.") or of.name == "use_sim_time"
@@ -117,10 +117,10 @@ def _control(
     keys: Mapping[str, Any],
     comment: str = "",
     id_word: str = "",
-) -> Entry:
+) -> DraftWidget:
     own_name = f"{name}/{id_word}" if id_word else name
     scope = name.rpartition("/")[0]
-    return Entry(
+    return DraftWidget(
         kind=kind,
         name=own_name,
         keys=keys,

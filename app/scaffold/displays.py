@@ -6,12 +6,12 @@ from math import ceil, degrees, pi
 from typing import Any, Final
 
 from app.interfaces import Interfaces
-from app.scaffold.entry import Entry, Omission
+from app.scaffold.draft_parts import DraftWidget, Omission
 from app.scaffold.fields import NUMBERS, Shown, range_for, shown_fields
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import NEGATIVE, label_of, place_of
 from app.scaffold.reasons import NO_JOINTS, too_long, why_no_display
-from app.survey.model import Topic
+from app.survey.model import SurveyedTopic
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
@@ -26,8 +26,8 @@ MISSED: Final = 5  # messages, until a value looks old
 
 
 def displays(
-    topic: Topic, interfaces: Interfaces, sample: Any = None, period_s: float | None = None
-) -> Iterator[Entry | Omission]:
+    topic: SurveyedTopic, interfaces: Interfaces, sample: Any = None, period_s: float | None = None
+) -> Iterator[DraftWidget | Omission]:
     """The widgets of a topic that the robot publishes, or why it has none. `sample` is one of its
     messages, or None; `period_s` are the seconds between two, None if it is not published regularly."""
     nodes = {node for one in topic.publishers for node in one.nodes}
@@ -37,14 +37,14 @@ def displays(
     match topic.type:
         case t if t in PICTURES:
             keys = {"label": label, "topic": topic.name, "type": topic.type, "span": 6}
-            yield Entry(kind="camera", name=topic.name, place=place, keys=keys)
+            yield DraftWidget(kind="camera", name=topic.name, place=place, keys=keys)
         case t if t == JOINTS:
             yield from _joints(topic, label, place, about, sample)
         case t if t == DIAGNOSTICS:
             yield _diagnostics(topic, label, about)
         case t if t == LOG:
             keys = {"label": "Log of the nodes", "topic": topic.name}
-            yield Entry(kind="log", name=topic.name, place=(NODES_PAGE,), keys=keys)
+            yield DraftWidget(kind="log", name=topic.name, place=(NODES_PAGE,), keys=keys)
         case _:
             fields = list(shown_fields(topic.type, interfaces))
             for shown in fields:
@@ -54,12 +54,12 @@ def displays(
                 yield Omission(f"{topic.name} ({topic.type})", why)
 
 
-def _qos(topic: Topic) -> dict[str, Any]:
+def _qos(topic: SurveyedTopic) -> dict[str, Any]:
     """Reliable is the panel's default; a best-effort publisher does not match it."""
     return {} if topic.reliable else {"qos": {"reliability": "best_effort"}}
 
 
-def _max_age(topic: Topic, period_s: float | None) -> dict[str, Any]:
+def _max_age(topic: SurveyedTopic, period_s: float | None) -> dict[str, Any]:
     """A value that is not refreshed any more looks old. A latched one stays valid."""
     if period_s is None or topic.latched:
         return {}
@@ -74,8 +74,8 @@ def _value(sample: Any, path: str) -> Any:
 
 
 def _field(
-    topic: Topic, place: Place, about: Mapping[str, Any], shown: Shown, value: Any
-) -> Entry | Omission:
+    topic: SurveyedTopic, place: Place, about: Mapping[str, Any], shown: Shown, value: Any
+) -> DraftWidget | Omission:
     label = " ".join(filter(None, (label_of(topic.name), shown.word)))
     name = topic.name if not shown.word else f"{topic.name}/{shown.field.replace('.', '_')}"
     field = {} if shown.field == "data" else {"field": shown.field}
@@ -87,27 +87,27 @@ def _field(
     if isinstance(value, str) and len(value) > LONGEST_TEXT:
         return Omission(name, too_long(len(value)))
     if shown.kind not in NUMBERS:
-        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 6})
+        return DraftWidget(kind="readout", name=name, place=place, keys={**keys, "span": 6})
     keys |= {"unit": shown.unit} if shown.unit else {}
     keys |= {"scale": shown.scale} if shown.scale != 1.0 else {}
     keys |= {"format": shown.format} if shown.format else {}
     if shown.low is None and shown.unit:
-        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 3})
+        return DraftWidget(kind="readout", name=name, place=place, keys={**keys, "span": 3})
     seen = float(value) * shown.scale if isinstance(value, int | float) else None
     ends = range_for(shown, (shown.field, topic.name), seen)
     if ends is None:
-        return Entry(kind="readout", name=name, place=place, keys={**keys, "span": 3})
+        return DraftWidget(kind="readout", name=name, place=place, keys={**keys, "span": 3})
     low, high = ends
     comment = "" if shown.low is not None else "The ends of the scale are a guess."
     keys |= {"min": _whole(low), "max": _whole(high), "span": 3}
-    return Entry(kind="gauge", name=name, place=place, keys=keys, comment=comment)
+    return DraftWidget(kind="gauge", name=name, place=place, keys=keys, comment=comment)
 
 
 def _whole(value: float) -> float:
     return int(value) if float(value).is_integer() else value
 
 
-def _lamp(name: str, place: Place, keys: dict[str, Any], label: str) -> Entry:
+def _lamp(name: str, place: Place, keys: dict[str, Any], label: str) -> DraftWidget:
     """A lamp; that of a fault is red where it is on."""
     on, off = {"value": True, "text": "On"}, {"value": False, "text": "Off"}
     if NEGATIVE.search(name):
@@ -117,10 +117,10 @@ def _lamp(name: str, place: Place, keys: dict[str, Any], label: str) -> Entry:
         on |= {"shape": "circle"}
         off |= {"shape": "cross", "colour": "white"}
     keys["states"] = [on, off]
-    return Entry(kind="indicator", name=name, place=place, keys={**keys, "span": 3})
+    return DraftWidget(kind="indicator", name=name, place=place, keys={**keys, "span": 3})
 
 
-def _lamps(name: str, place: Place, keys: dict[str, Any], constants: Sequence[str]) -> Entry:
+def _lamps(name: str, place: Place, keys: dict[str, Any], constants: Sequence[str]) -> DraftWidget:
     """A lamp with a state for each constant; that of a fault is red."""
     begins = zip(*(one.split("_")[:-1] for one in constants), strict=False)
     begin = "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
@@ -130,12 +130,14 @@ def _lamps(name: str, place: Place, keys: dict[str, Any], constants: Sequence[st
         | ({"shape": "cross", "colour": "red"} if NEGATIVE.search(value) else {})
         for value, text in zip(constants, texts, strict=True)
     ]
-    return Entry(kind="indicator", name=name, place=place, keys={**keys, "states": states, "span": 3})
+    return DraftWidget(
+        kind="indicator", name=name, place=place, keys={**keys, "states": states, "span": 3}
+    )
 
 
 def _joints(
-    topic: Topic, label: str, place: Place, about: Mapping[str, Any], sample: Any
-) -> Iterator[Entry | Omission]:
+    topic: SurveyedTopic, label: str, place: Place, about: Mapping[str, Any], sample: Any
+) -> Iterator[DraftWidget | Omission]:
     names = [] if sample is None else list(sample.name)[:MAX_JOINTS]
     positions = [] if sample is None else list(sample.position)
     joints = [_joint(name, at) for name, at in zip(names, positions, strict=False) if name]
@@ -143,7 +145,7 @@ def _joints(
         yield Omission(topic.name, NO_JOINTS)
     else:
         keys = {"label": label, **about, "joint": joints, "span": 6}
-        yield Entry(
+        yield DraftWidget(
             kind="joints",
             name=topic.name,
             place=place,
@@ -158,7 +160,7 @@ def _joint(name: str, position: float) -> dict[str, Any]:
     return {"name": name, "label": label_of(name), "min": -end, "max": end}
 
 
-def _diagnostics(topic: Topic, label: str, about: Mapping[str, Any]) -> Entry:
+def _diagnostics(topic: SurveyedTopic, label: str, about: Mapping[str, Any]) -> DraftWidget:
     levels = (
         ("OK", "OK", "circle", ""),
         ("WARN", "Warning", "triangle", "yellow"),
@@ -182,7 +184,7 @@ def _diagnostics(topic: Topic, label: str, about: Mapping[str, Any]) -> Entry:
             {"label": "Message", "field": "message", "width": 4},
         ],
     }
-    return Entry(
+    return DraftWidget(
         kind="table",
         name=topic.name,
         place=(NODES_PAGE,),

@@ -9,12 +9,12 @@ from app.interfaces import Interfaces
 from app.interfaces.names import GLOBAL
 from app.scaffold import controls
 from app.scaffold.displays import displays
-from app.scaffold.entry import Draft, Entry, Omission
+from app.scaffold.draft_parts import Draft, DraftWidget, Omission
 from app.scaffold.interlocks import interlock_candidates, interlock_for
 from app.scaffold.labels import with_own_labels
 from app.scaffold.pages import MOST_PAGES, make_pages
 from app.scaffold.reasons import OF_NAMES
-from app.survey.model import Server, Topic
+from app.survey.model import Server, SurveyedTopic
 from app.survey.node_services import NodeParameter
 
 LEFT_OUT: Final = frozenset(("/parameter_events", "/clock", *OF_NAMES))
@@ -35,7 +35,7 @@ class Known:
     regularly. `unreadable` are nodes whose parameters can't be read. `denied` are the names of topics
     that the bridge's file holds back, `lost` those of topics and services that the bridge has lost."""
 
-    topics: Sequence[Topic] = ()
+    topics: Sequence[SurveyedTopic] = ()
     services: Sequence[Server] = ()
     actions: Sequence[Server] = ()
     parameters: Sequence[NodeParameter] = ()
@@ -46,12 +46,12 @@ class Known:
     lost: Collection[str] = ()
 
 
-def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
+def shown(topics: Iterable[SurveyedTopic]) -> Iterator[SurveyedTopic]:
     """The topics that a panel may have: not ROS's own, not hidden ones, none that is held back."""
     return (topic for topic in topics if topic.announced and _is_public(topic))
 
 
-def _is_public(topic: Topic) -> bool:
+def _is_public(topic: SurveyedTopic) -> bool:
     return _is_public_name(topic.name)
 
 
@@ -84,11 +84,11 @@ def make_draft(
     `checked_draft`. `live`: controls are no comments."""
     candidates = interlock_candidates(shown(known.topics))
     interlocks = [one for one in candidates if ("interlock", one.topic) not in left_out]
-    entries: list[Entry] = []
+    entries: list[DraftWidget] = []
     remarks: list[str] = []
     for topic in (topic for topic in known.topics if topic.announced):
         for found in _of_topic(topic, interfaces, known):
-            if isinstance(found, Entry):
+            if isinstance(found, DraftWidget):
                 entries.append(found)
             else:
                 remarks.append(f"{found.name}: {found.why}")
@@ -116,7 +116,7 @@ LOST: Final = "the bridge does not forward it: restart its node, or else the bri
 CYCLONE_ONLY: Final = "the bridge reaches services on Cyclone DDS only (RMW_IMPLEMENTATION)"
 
 
-def _check(topic: Topic, interfaces: Interfaces) -> None:
+def _check(topic: SurveyedTopic, interfaces: Interfaces) -> None:
     if len(topic.types) > 1:
         raise InterfaceError(f"it has several types: {', '.join(topic.types)}")
     interfaces.require(topic.type)
@@ -128,7 +128,9 @@ def _check(topic: Topic, interfaces: Interfaces) -> None:
         )
 
 
-def _of_topic(topic: Topic, interfaces: Interfaces, known: Known) -> Iterator[Entry | Omission]:
+def _of_topic(
+    topic: SurveyedTopic, interfaces: Interfaces, known: Known
+) -> Iterator[DraftWidget | Omission]:
     """The widgets of a topic, or why it has none. A hidden one, and one of ROS's own, has neither."""
     if not _is_public(topic):
         if why := OF_NAMES.get(_own_name(topic.name)):
@@ -145,7 +147,7 @@ def _of_topic(topic: Topic, interfaces: Interfaces, known: Known) -> Iterator[En
         yield Omission(topic.name, str(error))
 
 
-def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> list[Entry]:
+def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> list[DraftWidget]:
     make = controls.goals if "/action/" in server.type else controls.calls
     try:
         found = list(make(server, interfaces))

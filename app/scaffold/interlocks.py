@@ -5,15 +5,15 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from app.dialect.endpoint import within
-from app.scaffold.entry import Entry, InterlockCandidate
+from app.scaffold.draft_parts import DraftWidget, InterlockCandidate
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import NEGATIVE, id_of, label_of, permits
-from app.survey.model import Topic
+from app.survey.model import SurveyedTopic
 
 BOOL: Final = "std_msgs/msg/Bool"
 
 
-def interlock_candidates(topics: Iterable[Topic]) -> list[InterlockCandidate]:
+def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandidate]:
     """Bools that look like permissions: those whose name permits first, of these the latched ones."""
     likely = [
         topic
@@ -41,19 +41,19 @@ def interlock_candidates(topics: Iterable[Topic]) -> list[InterlockCandidate]:
     return found
 
 
-def _several(topic: Topic) -> str:
+def _several(topic: SurveyedTopic) -> str:
     """The names of the nodes if a topic has several publishers; "" if it has one."""
     if max(Counter(one.bridge for one in topic.publishers).values()) == 1:
         return ""
     return ", ".join(sorted({node for one in topic.publishers for node in one.nodes})) or "?"
 
 
-def _may_permit(topic: Topic) -> bool:
+def _may_permit(topic: SurveyedTopic) -> bool:
     """A latched bool is a state that other nodes act on. That of a fault permits nothing."""
     return permits(topic.name) or (topic.latched and not NEGATIVE.search(topic.name))
 
 
-def interlock_for(control: Entry, candidates: Sequence[InterlockCandidate]) -> str:
+def interlock_for(control: DraftWidget, candidates: Sequence[InterlockCandidate]) -> str:
     """The id of the candidate for a control; "" for none. It is that of the nearest namespace around
     the control, there of the control's own node if there is one: the permission of another arm says
     nothing of this one. A control without a namespace may depend on those of a single namespace."""

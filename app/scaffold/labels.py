@@ -5,13 +5,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from app.scaffold.entry import Entry
+from app.scaffold.draft_parts import DraftWidget
 from app.scaffold.naming import words_of
 
 MAX_LABEL: Final = 100
 
 
-def with_own_labels(entries: Sequence[Entry]) -> list[Entry]:
+def with_own_labels(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     """The entries, no two with the same label."""
     labels = own_labels([(str(one.keys["label"]), one.name) for one in entries])
     return [

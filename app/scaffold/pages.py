@@ -6,7 +6,7 @@ from itertools import takewhile
 from typing import Final
 
 from app.scaffold.displays import NODES_PAGE
-from app.scaffold.entry import Entry
+from app.scaffold.draft_parts import DraftWidget
 from app.scaffold.labels import with_own_labels
 from app.scaffold.naming import GENERAL
 
@@ -20,25 +20,27 @@ ORDER: Final = ("indicator", "gauge", "readout", "joints", "camera", "table", "l
 Place = tuple[str, ...]
 
 
-def make_pages(entries: Sequence[Entry], live: bool) -> tuple[dict[str, Sequence[Entry]], list[Entry]]:
+def make_pages(
+    entries: Sequence[DraftWidget], live: bool
+) -> tuple[dict[str, Sequence[DraftWidget]], list[DraftWidget]]:
     """Page → widgets, and the widgets beyond the most pages. Displays come first, then their trend,
     then controls; `live`: controls take room too, as they are not comments."""
     arranged = (_arranged(entries, own, live) for own in range(MOST_PAGES, -1, -1))
-    pages: dict[str, list[Entry]] = {}
+    pages: dict[str, list[DraftWidget]] = {}
     for pages in arranged:
         if len(pages) <= MOST_PAGES:
             break
     fullest = sorted(pages, key=lambda page: (page != NODES_PAGE, -len(pages[page])))[:MOST_PAGES]
     rest = [entry for page, part in pages.items() if page not in fullest for entry in part]
-    kept: dict[str, Sequence[Entry]] = {
+    kept: dict[str, Sequence[DraftWidget]] = {
         page: _whole(page, part) for page, part in pages.items() if page in fullest
     }
     return kept or {GENERAL: []}, rest
 
 
-def _arranged(entries: Sequence[Entry], own: int, live: bool) -> dict[str, list[Entry]]:
+def _arranged(entries: Sequence[DraftWidget], own: int, live: bool) -> dict[str, list[DraftWidget]]:
     """The entries by the titles of pages: the `own` largest places have pages of their own."""
-    pages: dict[str, list[Entry]] = {}
+    pages: dict[str, list[DraftWidget]] = {}
     by_place = _by_place(entries, own)
     for place in sorted(by_place, key=lambda place: (place == (NODES_PAGE,), place)):
         is_general = place == (GENERAL,)
@@ -49,27 +51,27 @@ def _arranged(entries: Sequence[Entry], own: int, live: bool) -> dict[str, list[
     return pages
 
 
-def _by_place(entries: Sequence[Entry], own: int) -> dict[Place, list[Entry]]:
+def _by_place(entries: Sequence[DraftWidget], own: int) -> dict[Place, list[DraftWidget]]:
     """The entries by the first part of their places. Small places are put together."""
     sizes = Counter(one.place[:1] for one in entries)
     kept = {place for place, size in sizes.most_common(own) if size > 1} | {(NODES_PAGE,)}
-    found: defaultdict[Place, list[Entry]] = defaultdict(list)
+    found: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
     for one in entries:
         place = one.place[:1]
         found[place if place in kept else (GENERAL,)].append(one)
     return found
 
 
-def _parts(entries: Sequence[Entry], depth: int, live: bool) -> list[list[Entry]]:
+def _parts(entries: Sequence[DraftWidget], depth: int, live: bool) -> list[list[DraftWidget]]:
     """The entries in parts with at most `MOST_WIDGETS`, those of one place together where they fit."""
     if _room(entries, live) <= MOST_WIDGETS:
         return [_in_order(entries)]
     if all(len(one.place) <= depth for one in entries):
         return _cut(entries, live)
-    by_place: defaultdict[Place, list[Entry]] = defaultdict(list)
+    by_place: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
     for one in entries:
         by_place[one.place[: depth + 1]].append(one)
-    parts: list[list[Entry]] = []
+    parts: list[list[DraftWidget]] = []
     for place in sorted(by_place):
         for part in _parts(by_place[place], depth + 1, live):
             if parts and _room([*parts[-1], *part], live) <= MOST_WIDGETS:
@@ -79,39 +81,39 @@ def _parts(entries: Sequence[Entry], depth: int, live: bool) -> list[list[Entry]
     return parts
 
 
-def _room(entries: Sequence[Entry], live: bool) -> int:
+def _room(entries: Sequence[DraftWidget], live: bool) -> int:
     return sum(live or not one.control for one in entries)
 
 
-def _cut(entries: Sequence[Entry], live: bool) -> list[list[Entry]]:
+def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
     counted = [one for one in _in_order(entries) if live or not one.control]
     comments = [one for one in _in_order(entries) if one.control and not live]
     first, *others = (counted[n : n + MOST_WIDGETS] for n in range(0, len(counted), MOST_WIDGETS))
     return [[*first, *comments], *others]
 
 
-def _in_order(entries: Sequence[Entry]) -> list[Entry]:
+def _in_order(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     shown = [one for one in entries if not one.control]
     shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
     acting = sorted((one for one in entries if one.control), key=lambda one: (one.kind, one.name))
     return [*shown, *acting]
 
 
-def _common(entries: Sequence[Entry]) -> Place:
+def _common(entries: Sequence[DraftWidget]) -> Place:
     """The first parts of the places that all have."""
     places = zip(*(one.place for one in entries), strict=False)
     return tuple(parts[0] for parts in takewhile(lambda parts: len({*parts}) == 1, places))
 
 
-def _whole(page: str, entries: Sequence[Entry]) -> list[Entry]:
+def _whole(page: str, entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     shown = with_own_labels([one for one in entries if not one.control])
     if not shown:
         keys = {"label": CONTROLS_ONLY, "size": "small", "span": 12}
-        shown = [Entry(kind="label", name=f"{page}/note", keys=keys)]
+        shown = [DraftWidget(kind="label", name=f"{page}/note", keys=keys)]
     return [*shown, *_trend(shown, page), *(one for one in entries if one.control)]
 
 
-def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
+def _trend(entries: Sequence[DraftWidget], page: str) -> Iterator[DraftWidget]:
     """A trend of the gauges of the unit that most of them have."""
     gauges = [one for one in entries if one.kind == "gauge"]
     units = Counter(one.keys.get("unit", "") for one in gauges)
@@ -122,4 +124,4 @@ def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
         longest = max(one.keys.get("max_age_s", 0) for one in same[:MOST_PENS])
         keys |= {"max_age_s": longest} if longest > TREND_GAP_S else {}
         comment = "Its history is kept in memory; disk = true keeps it over a restart."
-        yield Entry(kind="trend", name=f"{page}/trend", keys=keys, comment=comment)
+        yield DraftWidget(kind="trend", name=f"{page}/trend", keys=keys, comment=comment)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from app.printable import printable
-from app.scaffold.entry import Draft, Entry
+from app.scaffold.draft_parts import Draft, DraftWidget
 from app.scaffold.naming import id_of, label_of
 
 WIDTH: Final = 100
@@ -32,7 +32,7 @@ def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
     return "\n".join(printable(line) for line in lines) + "\n"
 
 
-def written(draft: Draft, controls: bool = False, trial: bool = False) -> list[list[Entry]]:
+def written(draft: Draft, controls: bool = False, trial: bool = False) -> list[list[DraftWidget]]:
     """The entries of each page in the file's order, also those that are comments."""
     notes = not controls or trial  # a note stands for controls that are commented out
     return [
@@ -100,7 +100,7 @@ def _page(page: str, own_id: str) -> Iterator[str]:
     yield f"title = {_value(label_of(page))}"
 
 
-def _widget(entry: Entry, own_id: str, live: bool, taken: set[str]) -> Iterator[str]:
+def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Iterator[str]:
     taken.add(own_id)
     yield ""
     if entry.comment:

@@ -34,7 +34,7 @@ from app.simulator.robot import (
     echoed,
     own_parameters,
 )
-from app.simulator.simulated import Topic
+from app.simulator.simulated import SimulatedTopic
 from app.simulator.topics import simulated_topics
 from app.simulator.values.known_types import Moment
 
@@ -79,29 +79,33 @@ class PanelRobot:
         return min([STEP_S, *(one.period_s for one in self._topics.values())])
 
     @cached_property
-    def publishes(self) -> Mapping[str, Topic]:
-        own = {topic: Topic(name, LATCHED, self._hash(name)) for topic, name in self._own.items()}
+    def publishes(self) -> Mapping[str, SimulatedTopic]:
+        own = {
+            topic: SimulatedTopic(name, LATCHED, self._hash(name)) for topic, name in self._own.items()
+        }
         simulated = {
-            topic: Topic(one.type, self._panel.qos(topic).wire_qos, self._hash(one.type))
+            topic: SimulatedTopic(one.type, self._panel.qos(topic).wire_qos, self._hash(one.type))
             for topic, one in self._topics.items()
         }
-        events = Topic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
+        events = SimulatedTopic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
         return {**own, **dict(self._told_topics()), **simulated, EVENTS: events}
 
-    def _told_topics(self) -> Iterator[tuple[str, Topic]]:
+    def _told_topics(self) -> Iterator[tuple[str, SimulatedTopic]]:
         """The topics of the story. Those with states keep the last one for late subscribers."""
         if self._story is None:
             return
         for topic, kind in self._story.names.publishes.items():
             qos = LATCHED if self._story.is_latched(topic) else self._panel.qos(topic).wire_qos
-            yield topic, Topic(kind, qos, self._hash(kind))
+            yield topic, SimulatedTopic(kind, qos, self._hash(kind))
 
     @cached_property
-    def subscribes(self) -> Mapping[str, Topic]:
-        found = {topic: Topic(name, Qos(), self._hash(name)) for topic, name in LISTENS.items()}
+    def subscribes(self) -> Mapping[str, SimulatedTopic]:
+        found = {
+            topic: SimulatedTopic(name, Qos(), self._hash(name)) for topic, name in LISTENS.items()
+        }
         for topic, several in self._published.items():
             one = several[0]
-            found[topic] = Topic(one.type, one.qos.wire_qos, self._hash(one.type))
+            found[topic] = SimulatedTopic(one.type, one.qos.wire_qos, self._hash(one.type))
         return {topic: one for topic, one in found.items() if self._has(topic)}
 
     @cached_property

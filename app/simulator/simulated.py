@@ -10,7 +10,7 @@ from app.simulator.values.known_types import Moment
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class SimulatedTopic:
     """A topic that a robot publishes or subscribes to; `type_hash` is "" where it is not known."""
 
     type: str
@@ -26,9 +26,9 @@ class SimulatedRobot(Protocol):
         """How often it is stepped, in seconds."""
 
     @property
-    def publishes(self) -> Mapping[str, Topic]: ...
+    def publishes(self) -> Mapping[str, SimulatedTopic]: ...
     @property
-    def subscribes(self) -> Mapping[str, Topic]: ...
+    def subscribes(self) -> Mapping[str, SimulatedTopic]: ...
     @property
     def services(self) -> Mapping[str, str]:
         """Service → type."""

@@ -9,7 +9,7 @@ from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.interfaces import Interfaces, names
-from app.simulator.simulated import SimulatedRobot, Topic
+from app.simulator.simulated import SimulatedRobot, SimulatedTopic
 from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_action import Answer, PlayedAction, latched, served
 
@@ -72,7 +72,7 @@ class SimulatedZenohRobot:
     def _key(self, topic: str) -> str:
         return names.key_of(topic, self._namespace)
 
-    def _publisher(self, topic: str, about: Topic) -> Any:
+    def _publisher(self, topic: str, about: SimulatedTopic) -> Any:
         """A publisher; a TRANSIENT_LOCAL one keeps its last message for late subscribers."""
         if about.qos.transient_local:
             return latched(self._session, self._key(topic))

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Literal
 
-from app.survey.model import Bridge, Node, RobotGraph, Topic
+from app.survey.model import Bridge, Node, RobotGraph, SurveyedTopic
 
 Forwarding = Literal["forwarded", "denied", "lost"]
 # The lists of a bridge's `allow` and `deny`.
@@ -24,7 +24,9 @@ _REPEATED: Final = re.compile(r"\)[*+{]")  # of a group
 OF_ACTIONS: Final = "/_action/"  # the services that an action is made of
 
 
-def topic_forwarding(robot: RobotGraph, topic: Topic, lists: Sequence[TopicList] = BOTH) -> Forwarding:
+def topic_forwarding(
+    robot: RobotGraph, topic: SurveyedTopic, lists: Sequence[TopicList] = BOTH
+) -> Forwarding:
     """Of a topic's publishers, its subscribers, or both."""
     if topic.announced:
         return "forwarded"
@@ -42,7 +44,7 @@ def server_forwarding(robot: RobotGraph, kind: ServerList, name: str) -> Forward
     return ("denied" if all(held) else "lost") if held else None
 
 
-def lost_topics(robot: RobotGraph) -> Iterator[Topic]:
+def lost_topics(robot: RobotGraph) -> Iterator[SurveyedTopic]:
     """The topics that the bridge has lost."""
     return (topic for topic in robot.topics if topic_forwarding(robot, topic) == "lost")
 

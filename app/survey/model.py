@@ -92,7 +92,7 @@ class TopicEndpoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Topic:
+class SurveyedTopic:
     """A topic of a robot. `announced`: its bridge passes it on; else the bridge's `allow` or `deny`
     holds it back."""
 
@@ -191,7 +191,7 @@ class _Named(Protocol):
     def name(self) -> str: ...
 
 
-Entry = TypeVar("Entry", bound=_Named)
+NamedItem = TypeVar("NamedItem", bound=_Named)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +202,7 @@ class RobotGraph:
     namespace: str = ""
     bridges: tuple[Bridge, ...] = ()
     nodes: tuple[Node, ...] = ()
-    topics: tuple[Topic, ...] = ()
+    topics: tuple[SurveyedTopic, ...] = ()
     services: tuple[Server, ...] = ()
     actions: tuple[Server, ...] = ()
     routes: tuple[BridgeRoute, ...] = ()
@@ -212,7 +212,7 @@ class RobotGraph:
         """False if it is behind bridges of which none answers."""
         return not self.bridges or any(bridge.answers for bridge in self.bridges)
 
-    def topic(self, name: str) -> Topic | None:
+    def topic(self, name: str) -> SurveyedTopic | None:
         return find(self.topics, name)
 
     def node(self, name: str) -> Node | None:
@@ -252,7 +252,7 @@ class GraphSnapshot:
         return next((one for one in self.robots if one.namespace == namespace.rstrip("/")), None)
 
 
-def find(entries: Sequence[Entry], name: str) -> Entry | None:
+def find(entries: Sequence[NamedItem], name: str) -> NamedItem | None:
     return next((one for one in entries if one.name == name), None)
 
 

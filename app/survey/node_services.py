@@ -13,7 +13,7 @@ from app.errors import DecodeError, InterfaceError
 from app.interfaces import Interfaces
 from app.interfaces.definitions import Definitions
 from app.interfaces.type_descriptions import SERVICE, SERVICE_TYPE_NAME, definitions_of
-from app.survey.model import Node, RobotGraph, Topic
+from app.survey.model import Node, RobotGraph, SurveyedTopic
 
 # The names of rcl_interfaces/msg/ParameterType, by their numbers.
 PARAMETER_TYPES: Final = (
@@ -80,7 +80,7 @@ class NodeServices:
         pairs = zip(described.descriptors, values.values, strict=False)
         return tuple(_parameter(node.name, descriptor, value) for descriptor, value in pairs)
 
-    async def definitions(self, topic: Topic) -> Definitions | None:
+    async def definitions(self, topic: SurveyedTopic) -> Definitions | None:
         """The topic's type as one of its publishers or subscribers describes it; None if none does.
         InterfaceError for a description that can't be used."""
         for endpoint in (*topic.publishers, *topic.subscribers):

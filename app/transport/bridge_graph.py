@@ -21,7 +21,7 @@ from app.survey.model import (
     RouteDirection,
     RouteKind,
     Server,
-    Topic,
+    SurveyedTopic,
     TopicEndpoint,
 )
 
@@ -145,7 +145,7 @@ class _Robot:
         """The name on the robot of a key behind the bridge's namespace."""
         return f"/{key}".removeprefix(self._namespace)
 
-    def _topics(self) -> Iterator[Topic]:
+    def _topics(self) -> Iterator[SurveyedTopic]:
         publishers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
         subscribers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
         for one in self._entities:
@@ -159,7 +159,7 @@ class _Robot:
                 known[name].append(self._by_token(token, endpoint))
         for name in sorted(publishers.keys() | subscribers.keys()):
             if publishers[name] or subscribers[name]:
-                yield Topic(
+                yield SurveyedTopic(
                     name=name,
                     key=f"{self._namespace}{name}"[1:],
                     publishers=tuple(publishers[name]),

@@ -8,7 +8,7 @@ from app.clock import age_changes_at, format_age
 from app.i18n import TextLike, say
 from app.panel.widgets.table import Column, ColumnField, Table
 from app.robot.state import RobotState
-from app.robot.table_order import Entry, TableRows, states_of
+from app.robot.table_order import TableEntry, TableRows, states_of
 from app.view.display_values import NOTHING, cell_text, lamp_of, shown_time, topic_state
 from app.view.time_values import time_style
 
@@ -59,7 +59,7 @@ def _hidden(widget: Table, rows: TableRows) -> TextLike:
     return say("table_more_abnormal", number=rows.hidden, states=named)
 
 
-def _age(widget: Table, entry: Entry, now: float) -> tuple[TextLike, float]:
+def _age(widget: Table, entry: TableEntry, now: float) -> tuple[TextLike, float]:
     """How old an entry with a key is, and when that changes; of others the message has an age."""
     if widget.key is None or widget.max_age_s is None:
         return "", math.inf
@@ -77,7 +77,7 @@ def _constants(widget: Table, robot: RobotState) -> list[tuple[Column, ColumnFie
 
 def _cells(
     widget: Table,
-    entry: Entry,
+    entry: TableEntry,
     columns: list[tuple[Column, ColumnField, Mapping[str, Any]]],
     now: float,
 ) -> tuple[list[dict[str, TextLike]], float]:

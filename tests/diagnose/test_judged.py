@@ -32,7 +32,7 @@ from app.survey.model import (
     Node,
     RobotGraph,
     Server,
-    Topic,
+    SurveyedTopic,
     TopicEndpoint,
 )
 from tests.diagnose.setups import (
@@ -62,9 +62,9 @@ def robot(folder: Path, text: str) -> PanelRobot:
     return PanelRobot(load_panel(path))
 
 
-def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> Topic:
+def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> SurveyedTopic:
     one = TopicEndpoint(type=of, qos=qos, bridge="b1")
-    return Topic(name=name, key=name[1:], publishers=(one,))
+    return SurveyedTopic(name=name, key=name[1:], publishers=(one,))
 
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
@@ -336,7 +336,7 @@ def test_the_publishers_of_a_permission_are_named_if_there_are_several(
         TopicEndpoint(type=BOOL, qos=QOS, bridge=bridge, nodes=(node,) if node else ())
         for bridge, node in publishers
     )
-    known = (Topic(name="/permit", key="permit", publishers=ends),)
+    known = (SurveyedTopic(name="/permit", key="permit", publishers=ends),)
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
     report = Report()
     check_permissions(report, PanelNames.of(here, graph), ReceivedSamples(), INTERFACES)

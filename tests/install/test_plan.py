@@ -16,7 +16,7 @@ from app.install.host import Host, StepFailed, release_of
 from app.install.panel_files import UsersCopy
 from app.install.plan import PANEL, SCREEN, SERVER, Options, own_files, steps, touch_rule
 from app.install.release import Current, Release, link_to, linked, release_name
-from app.install.step import Step, apply, describe, revert
+from app.install.step import InstallStep, apply, describe, revert
 from app.install.system import Packages, Unit, User
 from tests.support.parts import ROOT
 
@@ -56,7 +56,7 @@ def path_on(host: Host, path: str) -> Path:
     return host.root / path.lstrip("/")
 
 
-def of_files(plan: list[Step]) -> list[Step]:
+def of_files(plan: list[InstallStep]) -> list[InstallStep]:
     """The steps that need no program of the machine."""
     return [step for step in plan if isinstance(step, (OwnFile, UsersCopy, UsersFile, Masked))]
 
@@ -132,7 +132,7 @@ def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: P
         '[[page]]\ntemplate = "pages/cell.html"\n'
     )
 
-    def plan() -> list[Step]:
+    def plan() -> list[InstallStep]:
         return of_files(steps(Options(wheel=wheel, panel=mine), host))
 
     assert "copy pictures into /etc/operator-panel (1 file)" in "\n".join(describe(plan(), host))

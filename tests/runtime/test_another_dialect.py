@@ -32,7 +32,7 @@ from app.survey.model import (
     Node,
     RobotGraph,
     Server,
-    Topic,
+    SurveyedTopic,
     TopicEndpoint,
 )
 from app.transport.admin_space import GraphLink
@@ -129,7 +129,7 @@ async def observe_tiny(
     names = [token.rpartition("/")[2] for token in tokens if "/node/" in token]
     nodes = [Node(name=f"/{name}", bridge="") for name in sorted(names)]
     topics = [
-        Topic(
+        SurveyedTopic(
             name=f"/{e.key}",
             key=e.key,
             publishers=(TopicEndpoint(type=e.type, qos=EndpointQos(), bridge=e.zid),),

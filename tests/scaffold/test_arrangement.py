@@ -13,11 +13,11 @@ from app.interfaces import Interfaces, load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
 from app.scaffold.draft import NO_ROOM, Known, make_draft
-from app.scaffold.entry import Draft
+from app.scaffold.draft_parts import Draft
 from app.scaffold.labels import own_labels
 from app.scaffold.pages import MOST_PAGES, MOST_WIDGETS
 from app.scaffold.toml_text import toml_text
-from app.survey.model import Topic
+from app.survey.model import SurveyedTopic
 from tests.scaffold.test_scaffold import BOOL, INTERFACES, heard, published, server, widgets
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -52,7 +52,7 @@ def text_of(
     return toml_text(draft, controls)
 
 
-def of_cell_msgs(folder: Path, *topics: Topic) -> str:
+def of_cell_msgs(folder: Path, *topics: SurveyedTopic) -> str:
     return text_of(load_interfaces("jazzy", [folder / "cell_msgs"]), folder, topics=topics)
 
 

@@ -16,9 +16,9 @@ from app.interfaces.names import is_valid_name
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
-from app.scaffold.entry import Draft
+from app.scaffold.draft_parts import Draft
 from app.scaffold.toml_text import toml_text
-from app.survey.model import EndpointQos, Server, Topic, TopicEndpoint
+from app.survey.model import EndpointQos, Server, SurveyedTopic, TopicEndpoint
 from app.survey.node_services import PARAMETER_TYPES, NodeParameter
 
 INTERFACES: Final = load_interfaces("jazzy")
@@ -80,11 +80,11 @@ def endpoints(draw: Callable[..., Any], type_name: str) -> TopicEndpoint:
 
 
 @some.composite
-def topics(draw: Callable[..., Any]) -> Topic:
+def topics(draw: Callable[..., Any]) -> SurveyedTopic:
     name, type_name = draw(names), draw(some.sampled_from(MESSAGES))
     ends = draw(some.lists(endpoints(type_name), min_size=1, max_size=2))
     listens = draw(some.booleans())
-    return Topic(
+    return SurveyedTopic(
         name=name,
         key=name[1:],
         publishers=() if listens else tuple(ends),

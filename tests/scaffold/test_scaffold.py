@@ -15,11 +15,11 @@ from app.panel import check_panel
 from app.panel.load import faults_of_text
 from app.scaffold.checked import checked_draft
 from app.scaffold.draft import Known, make_draft
-from app.scaffold.entry import Draft
+from app.scaffold.draft_parts import Draft
 from app.scaffold.fields import Shown, range_for, shown_fields
 from app.scaffold.naming import id_of, label_of, permits, place_of
 from app.scaffold.toml_text import toml_text
-from app.survey.model import EndpointQos, Server, Topic, TopicEndpoint
+from app.survey.model import EndpointQos, Server, SurveyedTopic, TopicEndpoint
 from app.survey.node_services import NodeParameter
 
 INTERFACES = load_interfaces("jazzy")
@@ -33,12 +33,12 @@ def endpoint(type_name: str, node: str, **qos: Any) -> TopicEndpoint:
     )
 
 
-def published(name: str, type_name: str, node: str = "/cell_io", **qos: Any) -> Topic:
-    return Topic(name=name, key=name[1:], publishers=(endpoint(type_name, node, **qos),))
+def published(name: str, type_name: str, node: str = "/cell_io", **qos: Any) -> SurveyedTopic:
+    return SurveyedTopic(name=name, key=name[1:], publishers=(endpoint(type_name, node, **qos),))
 
 
-def heard(name: str, type_name: str, node: str = "/cell_io") -> Topic:
-    return Topic(name=name, key=name[1:], subscribers=(endpoint(type_name, node),))
+def heard(name: str, type_name: str, node: str = "/cell_io") -> SurveyedTopic:
+    return SurveyedTopic(name=name, key=name[1:], subscribers=(endpoint(type_name, node),))
 
 
 def server(name: str, type_name: str, dds: str = "Cyclone DDS") -> Server:
@@ -252,12 +252,12 @@ def test_what_is_for_programs_is_no_gauge(name: str) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        lambda topic: Topic(name="/x", key="x", publishers=topic.publishers, announced=False),
-        lambda topic: Topic(name="/_hidden", key="_hidden", publishers=topic.publishers),
-        lambda topic: Topic(name="/clock", key="clock", publishers=topic.publishers),
+        lambda topic: SurveyedTopic(name="/x", key="x", publishers=topic.publishers, announced=False),
+        lambda topic: SurveyedTopic(name="/_hidden", key="_hidden", publishers=topic.publishers),
+        lambda topic: SurveyedTopic(name="/clock", key="clock", publishers=topic.publishers),
     ],
 )
-def test_what_is_not_for_a_panel_is_left_out(change: Callable[[Topic], Topic]) -> None:
+def test_what_is_not_for_a_panel_is_left_out(change: Callable[[SurveyedTopic], SurveyedTopic]) -> None:
     assert widgets(text_of(topics=[change(published("/y", "std_msgs/msg/Int32"))])) == {}
 
 
@@ -278,13 +278,13 @@ def test_a_value_looks_old_where_its_topic_is_published_regularly(tmp_path: Path
 
 
 def test_a_topic_that_the_bridge_holds_back_is_a_remark() -> None:
-    held = Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
+    held = SurveyedTopic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
     text = text_of(topics=[held], denied=["/x"])
     assert "# - /x: `allow` or `deny` in the bridge's configuration holds it back" in text
 
 
 def test_what_the_bridge_has_lost_is_a_remark_of_its_own() -> None:
-    held = Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
+    held = SurveyedTopic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
     text = text_of(topics=[held], lost=["/x", "/home", "/plc/get_parameters", "/rosout/_hidden"])
     remarks = [line for line in text.splitlines() if line.startswith("# - ")]
     assert remarks == [
@@ -295,14 +295,14 @@ def test_what_the_bridge_has_lost_is_a_remark_of_its_own() -> None:
 
 def test_two_types_on_one_topic_are_a_remark() -> None:
     publishers = (endpoint(BOOL, "/a"), endpoint("std_msgs/msg/Int32", "/b"))
-    text = text_of(topics=[Topic(name="/x", key="x", publishers=publishers)])
+    text = text_of(topics=[SurveyedTopic(name="/x", key="x", publishers=publishers)])
     assert "# - /x: it has several types: std_msgs/msg/Bool, std_msgs/msg/Int32" in text
 
 
 def test_a_type_of_another_definition_is_a_remark() -> None:
     for hash_, known in ((INTERFACES.type_hash(BOOL), True), ("RIHS01_0", False)):
         one = TopicEndpoint(type=BOOL, qos=EndpointQos(), bridge="a", type_hash=hash_)
-        text = text_of(topics=[Topic(name="/x", key="x", publishers=(one,))])
+        text = text_of(topics=[SurveyedTopic(name="/x", key="x", publishers=(one,))])
         assert ("x" in widgets(text)) is known
         assert ("# - /x: the robot's std_msgs/msg/Bool has another definition" in text) is not known
 

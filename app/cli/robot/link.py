@@ -23,7 +23,7 @@ from app.interfaces.names import GLOBAL, NAMESPACE
 from app.panel import load_panel
 from app.runtime.robot_access import ROBOT_ACCESS
 from app.settings import LOOPBACK_HOSTS, Settings
-from app.survey.model import GraphSnapshot, RobotGraph, Topic, near
+from app.survey.model import GraphSnapshot, RobotGraph, SurveyedTopic, near
 from app.transport.robot_observer import CONNECT_S, RobotObserver
 from app.transport.zenoh_config import config_from
 
@@ -177,7 +177,7 @@ def full_name(robot: RobotGraph, name: str) -> str:
     return f"{robot.namespace}{name}"
 
 
-def shown_topics(graph: GraphSnapshot, below: str) -> dict[str, tuple[RobotGraph, Topic]]:
+def shown_topics(graph: GraphSnapshot, below: str) -> dict[str, tuple[RobotGraph, SurveyedTopic]]:
     """The topics below a namespace, by their names without it."""
     return {
         name.removeprefix(below): (robot, topic)
@@ -209,7 +209,7 @@ def lost_text(about: str, code: str = "topic_unrouted") -> str:
     return f"{lost.what} {lost.do}"
 
 
-def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGraph, Topic]:
+def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGraph, SurveyedTopic]:
     """The topic of this name, which is not below the namespace if it begins with "//"; LinkError with
     similar names."""
     check_namespace(graph, place.namespace)

@@ -31,7 +31,7 @@ from app.interfaces import load_interfaces
 from app.panel.load import faults_of_text
 from app.scaffold.checked import LeftOut, checked_draft
 from app.scaffold.draft import lost_names, make_draft
-from app.scaffold.entry import Draft
+from app.scaffold.draft_parts import Draft
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text

@@ -15,7 +15,7 @@ from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, shown
 from app.scaffold.fields import shown_fields
 from app.survey.forwarding import lost_servers, lost_topics, topic_forwarding
-from app.survey.model import GraphSnapshot, RobotGraph, Server, Topic
+from app.survey.model import GraphSnapshot, RobotGraph, Server, SurveyedTopic
 from app.survey.node_services import NodeParameter, NodeServices
 from app.transport.robot_observer import RobotObserver
 
@@ -93,13 +93,13 @@ def _is_below(name: str, namespace: str) -> bool:
     return name.startswith(f"{namespace}/")
 
 
-def _is_of(topic: Topic, namespace: str) -> bool:
+def _is_of(topic: SurveyedTopic, namespace: str) -> bool:
     """Whether a topic is below a namespace, or a node below it has the topic by its absolute name."""
     nodes = (node for end in (*topic.publishers, *topic.subscribers) for node in end.nodes)
     return _is_below(topic.name, namespace) or any(_is_below(node, namespace) for node in nodes)
 
 
-def _topic(one: Topic, below: str) -> Topic:
+def _topic(one: SurveyedTopic, below: str) -> SurveyedTopic:
     """With its name as a panel file has it."""
     if _is_below(one.name, below):
         return replace(one, name=one.name.removeprefix(below))
@@ -110,7 +110,7 @@ def _server(one: Server, below: str) -> Server:
     return replace(one, name=one.name.removeprefix(below))
 
 
-def _has_use(topic: Topic, interfaces: Interfaces) -> bool:
+def _has_use(topic: SurveyedTopic, interfaces: Interfaces) -> bool:
     """Whether a message of it has names or values that the panel is made with."""
     return topic.type == JOINTS or any(shown_fields(topic.type, interfaces))
 
@@ -135,7 +135,7 @@ class Heard:
 
 
 async def _listen(
-    observer: RobotObserver, topics: Sequence[Topic], interfaces: Interfaces, listen_s: float
+    observer: RobotObserver, topics: Sequence[SurveyedTopic], interfaces: Interfaces, listen_s: float
 ) -> dict[str, Heard]:
     """What arrived on each topic that has a use, by the topic's name: until it is enough of all, or
     time is up."""

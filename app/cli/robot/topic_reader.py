@@ -15,7 +15,7 @@ from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import Qos
 from app.robot.sample import Sample
 from app.survey.forwarding import topic_forwarding
-from app.survey.model import GraphSnapshot, RobotGraph, Topic
+from app.survey.model import GraphSnapshot, RobotGraph, SurveyedTopic
 from app.survey.node_services import NodeServices
 from app.transport.robot_observer import RobotObserver
 
@@ -23,7 +23,7 @@ DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost
 HOW: Final = "give the folder of its package with --interfaces (a workspace's install/, or its source)"
 
 
-def endpoint_for(topic: Topic, type_name: str) -> OwnEndpoint:
+def endpoint_for(topic: SurveyedTopic, type_name: str) -> OwnEndpoint:
     """A subscription with the QoS of the topic's publishers."""
     hashes = [one.type_hash for one in topic.publishers if one.type_hash]
     qos = Qos(topic.reliable, topic.latched, DEPTH)
@@ -36,7 +36,7 @@ class TopicReader:
 
     observer: RobotObserver
     robot: RobotGraph
-    topic: Topic
+    topic: SurveyedTopic
     type: str
 
     @classmethod

@@ -25,14 +25,14 @@ from app.cli.robot.link import (
 from app.cli.robot.settled_graph import settled_graph
 from app.printable import one_line
 from app.survey.forwarding import Forwarding, topic_forwarding
-from app.survey.model import RobotGraph, Topic, TopicEndpoint
+from app.survey.model import RobotGraph, SurveyedTopic, TopicEndpoint
 
 PROG = "python -m app.cli topics"
 NOT_FORWARDED: Final[Mapping[Forwarding, str]] = {
     "denied": "the bridge's `allow` or `deny` holds it back",
     "lost": "the bridge has lost it",
 }
-Found = Mapping[str, tuple[RobotGraph, Topic]]
+Found = Mapping[str, tuple[RobotGraph, SurveyedTopic]]
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -84,7 +84,7 @@ def _described(robot: RobotGraph, one: TopicEndpoint) -> str:
     return f"{nodes}, {one.qos}" + (f", {one.dds}" if one.dds else "")
 
 
-def _plain(name: str, robot: RobotGraph, topic: Topic) -> dict[str, Any]:
+def _plain(name: str, robot: RobotGraph, topic: SurveyedTopic) -> dict[str, Any]:
     return {
         "name": name,
         "namespace": robot.namespace,

@@ -13,7 +13,7 @@ from app.interfaces.cdr.formats import LENGTH_BYTES
 from app.interfaces.cdr.layout import PHASES, end_offset
 from app.interfaces.cdr.reader import NATIVE, ByteOrder, Read
 from app.interfaces.cdr.selection import Lookup
-from app.interfaces.cdr.steps import Choice, Mark, Op, Step
+from app.interfaces.cdr.steps import Choice, Mark, Op, ScanStep
 from app.interfaces.definitions import Type
 
 ReaderFor = Callable[[Type], Read]
@@ -24,13 +24,13 @@ SLICE_ELEMENTS: Final = 100  # elements
 MAX_HITS: Final = 2  # of one key: two are ambiguous
 
 # The most frequent steps.
-TEXT: Final = Step.TEXT
-PASS: Final = Step.PASS
-NEXT: Final = Step.NEXT
-NUMBERS: Final = Step.NUMBERS
-EACH: Final = Step.EACH
-CHOSEN: Final = Step.CHOSEN
-END: Final = Step.END
+TEXT: Final = ScanStep.TEXT
+PASS: Final = ScanStep.PASS
+NEXT: Final = ScanStep.NEXT
+NUMBERS: Final = ScanStep.NUMBERS
+EACH: Final = ScanStep.EACH
+CHOSEN: Final = ScanStep.CHOSEN
+END: Final = ScanStep.END
 
 
 @dataclass(slots=True)
@@ -256,17 +256,17 @@ class Scan:
         return chosen
 
 
-HANDLERS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Position]]] = {
-    Step.WIDE_TEXT: Scan._skip_wstring,
-    Step.BOOL: Scan._skip_bool,
-    Step.ALIKE: Scan._skip_fixed_size,
-    Step.TIMES: Scan._begin_array,
-    Step.NOTE: Scan._mark,
-    Step.ROW: Scan._end_row,
-    Step.COMPARE: Scan._compare,
-    Step.CHOOSE: Scan._choose,
-    Step.BESIDE: Scan._choose_by_sibling,
-    Step.DONE: Scan._next_chosen,
+HANDLERS: Final[Mapping[ScanStep, Callable[[Scan, int, int, Any], Position]]] = {
+    ScanStep.WIDE_TEXT: Scan._skip_wstring,
+    ScanStep.BOOL: Scan._skip_bool,
+    ScanStep.ALIKE: Scan._skip_fixed_size,
+    ScanStep.TIMES: Scan._begin_array,
+    ScanStep.NOTE: Scan._mark,
+    ScanStep.ROW: Scan._end_row,
+    ScanStep.COMPARE: Scan._compare,
+    ScanStep.CHOOSE: Scan._choose,
+    ScanStep.BESIDE: Scan._choose_by_sibling,
+    ScanStep.DONE: Scan._next_chosen,
 }
 
 

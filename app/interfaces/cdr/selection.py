@@ -8,7 +8,7 @@ from typing import Any
 from app.errors import FieldError, InterfaceError
 from app.interfaces.cdr.formats import LENGTH_BYTES
 from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Structure, Type
-from app.interfaces.field_path import Key, Step, path_steps
+from app.interfaces.field_path import Key, PathStep, path_steps
 from app.interfaces.parsing import BOOLS
 from app.interfaces.validation import scalar_check
 
@@ -87,7 +87,7 @@ class Resolver:
         """The type of the field at a path."""
         return self._add_path(Selection(), Type(type_name), path)
 
-    def typed_steps(self, type_name: str, path: str) -> tuple[Step, ...]:
+    def typed_steps(self, type_name: str, path: str) -> tuple[PathStep, ...]:
         """The steps of a path, whose keys have the values that a message has: 5, not "5"."""
         return tuple(step for step, _, _ in self._steps(Type(type_name), path))
 
@@ -106,7 +106,7 @@ class Resolver:
         node.paths.append(path)
         return at
 
-    def _steps(self, whole: Type, path: str) -> Iterator[tuple[Step, bool, Type]]:
+    def _steps(self, whole: Type, path: str) -> Iterator[tuple[PathStep, bool, Type]]:
         """(step, whether it is a key of a list beside the list, type behind it)."""
         at, around = whole, whole
         for step in path_steps(path):

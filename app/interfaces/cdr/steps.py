@@ -14,7 +14,7 @@ from app.interfaces.cdr.selection import Lookup, Selection
 from app.interfaces.definitions import STRING_TYPES, Type
 
 
-class Step(IntEnum):
+class ScanStep(IntEnum):
     """The kinds of steps, with their operands."""
 
     PASS = auto()  # a Room
@@ -67,7 +67,7 @@ class Choice:
     key: Lookup | None = None
 
 
-Op = tuple[Step, Any, Any]
+Op = tuple[ScanStep, Any, Any]
 
 
 class ReadPlans:
@@ -81,7 +81,7 @@ class ReadPlans:
         """The program of a message. `each`: every element of its lists is a step, except numbers."""
         made = _ProgramBuilder(self._fields, self._sizes if not each else self._sizes_of_numbers)
         made.add_structure(type_name, wanted)
-        made.add(Step.END)
+        made.add(ScanStep.END)
         return tuple(made.steps)
 
     def _sizes_of_numbers(self, kind: Type) -> PaddedSizes | None:
@@ -102,7 +102,7 @@ class _ProgramBuilder:
         self._sizes = room
         self._pending = NO_SIZE
 
-    def add(self, do: Step, one: Any = None, other: Any = None) -> None:
+    def add(self, do: ScanStep, one: Any = None, other: Any = None) -> None:
         self._flush()
         self.steps.append((do, one, other))
 
@@ -114,7 +114,7 @@ class _ProgramBuilder:
 
     def _flush(self) -> None:
         if self._pending != NO_SIZE:
-            self.steps.append((Step.PASS, self._pending, None))
+            self.steps.append((ScanStep.PASS, self._pending, None))
             self._pending = NO_SIZE
 
     def add_structure(self, type_name: str, wanted: Selection | None, in_list: bool = False) -> None:
@@ -127,23 +127,23 @@ class _ProgramBuilder:
             child = inner.get(one.name)
             if child is not None and child.by_sibling:
                 places[one.name] = Mark(one.type)
-                self.add(Step.NOTE, places[one.name])
+                self.add(ScanStep.NOTE, places[one.name])
             self._add_field(one.type, child, keys.get(one.name), in_list)
         for name, place in places.items():
             for key, values in inner[name].by_sibling.items():
                 choice = self._make_choice(place.type)
                 choice.mark, choice.key = place, keys[key]
-                self._add_choice(Step.BESIDE, choice, place.type, {keys[key]: values}, Selection())
+                self._add_choice(ScanStep.BESIDE, choice, place.type, {keys[key]: values}, Selection())
 
     def _add_field(
         self, kind: Type, wanted: Selection | None, key: Lookup | None = None, in_list: bool = False
     ) -> None:
         if wanted is not None and wanted.paths:
-            self.add(Step.NOTE, Mark(kind, tuple(wanted.paths)))
+            self.add(ScanStep.NOTE, Mark(kind, tuple(wanted.paths)))
         if wanted is not None and wanted.lookup is not None:
             wanted.lookup.type = kind
             wanted.lookup.prepare()
-            self.add(Step.COMPARE, wanted.lookup)
+            self.add(ScanStep.COMPARE, wanted.lookup)
         if wanted is not None and wanted.each is not None:
             self._add_elements(kind, wanted.each)
         elif key is not None or (wanted is not None and (wanted.by_index or wanted.by_field)):
@@ -156,21 +156,21 @@ class _ProgramBuilder:
     def _skip(self, kind: Type, in_list: bool) -> None:
         """Skips a field. A malformed bool is detected, except in lists."""
         if kind == Type("bool") and not in_list:
-            self.add(Step.BOOL)
+            self.add(ScanStep.BOOL)
         elif kind.container == "one" and kind.is_nested and not in_list:
             self.add_structure(kind.name, None)
         elif room := self._sizes(kind):
             self._pending = concatenated(self._pending, room)
         elif kind.container == "sequence" and is_number(kind):
-            self.add(Step.NUMBERS, SIZES[kind.name])
+            self.add(ScanStep.NUMBERS, SIZES[kind.name])
         elif kind.container == "sequence" and (room := self._sizes(kind.element)):
-            self.add(Step.ALIKE, room)
+            self.add(ScanStep.ALIKE, room)
         elif kind.container != "one":
             self._skip_elements(kind)
         elif kind.is_nested:
             self.add_structure(kind.name, None, in_list)
         else:
-            self.add(Step.TEXT if kind.name == "string" else Step.WIDE_TEXT)
+            self.add(ScanStep.TEXT if kind.name == "string" else ScanStep.WIDE_TEXT)
 
     def _skip_elements(self, kind: Type) -> None:
         self._add_elements(kind, None)
@@ -178,14 +178,14 @@ class _ProgramBuilder:
     def _add_elements(self, kind: Type, wanted: Selection | None) -> None:
         """Adds a list whose elements are all scanned; those `wanted` are rows."""
         at = self._next_step
-        self.add(Step.EACH if kind.container == "sequence" else Step.TIMES, kind.size)
+        self.add(ScanStep.EACH if kind.container == "sequence" else ScanStep.TIMES, kind.size)
         body = self._next_step
         self._add_field(kind.element, wanted, in_list=True)
         if wanted is not None:
-            self.add(Step.ROW)
-        self.add(Step.NEXT, body)
+            self.add(ScanStep.ROW)
+        self.add(ScanStep.NEXT, body)
         if kind.container == "sequence":
-            self.steps[at] = (Step.EACH, self._next_step, min_size(kind.element))
+            self.steps[at] = (ScanStep.EACH, self._next_step, min_size(kind.element))
 
     def _select_elements(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
         """Adds a list with selected elements, or one that is a key itself."""
@@ -197,7 +197,7 @@ class _ProgramBuilder:
             found[lookup] = values
         choice = self._make_choice(kind, looked)
         choice.lookup = key
-        self._add_choice(Step.CHOOSE, choice, kind, found, wanted, looked)
+        self._add_choice(ScanStep.CHOOSE, choice, kind, found, wanted, looked)
 
     def _make_choice(self, kind: Type, looked: Selection | None = None) -> Choice:
         alone = looked is None or not (looked.lookup or looked.fields)
@@ -207,7 +207,7 @@ class _ProgramBuilder:
 
     def _add_choice(
         self,
-        do: Step,
+        do: ScanStep,
         choice: Choice,
         kind: Type,
         found: Mapping[Lookup, Mapping[Any, Selection]],
@@ -219,7 +219,7 @@ class _ProgramBuilder:
         choice.body = self._next_step
         if choice.sizes is None:
             self._add_field(kind.element, looked, in_list=True)
-            self.add(Step.CHOSEN)
+            self.add(ScanStep.CHOSEN)
         choice.indexes = {index: self._add_element(kind, one) for index, one in wanted.by_index.items()}
         for lookup, values in found.items():
             choice.by_lookup[lookup] = {
@@ -232,7 +232,7 @@ class _ProgramBuilder:
     def _add_element(self, kind: Type, wanted: Selection) -> int:
         at = self._next_step
         self._add_field(kind.element, wanted)
-        self.add(Step.DONE)
+        self.add(ScanStep.DONE)
         return at
 
 

@@ -10,7 +10,7 @@ import zstandard
 from app.errors import RecordingError
 from app.interfaces.names import MESSAGE_TYPE, TOPIC
 from app.simulator.bag.files import FORMAT, RecordedFile, RecordedTopic, opener, rescue
-from app.simulator.simulated import Topic
+from app.simulator.simulated import SimulatedTopic
 
 ZSTD_MAGIC: Final = b"\x28\xb5\x2f\xfd"  # no CDR begins so: its first byte is 0
 NS_PER_S: Final = 10**9
@@ -39,7 +39,7 @@ class Recording:
         except Exception as error:  # of a damaged file: of SQLite, of YAML, of struct
             raise RecordingError(f"{path} can't be read: {error}{rescue(path)}") from error
         self.notes: list[str] = list(self._file.notes)
-        self.topics: dict[str, Topic] = {}
+        self.topics: dict[str, SimulatedTopic] = {}
         for one in self._file.topics:
             self._add(one)
         self.notes = list(dict.fromkeys(self.notes))  # a folder's files each have its topics
@@ -79,7 +79,7 @@ class Recording:
         elif not TOPIC.fullmatch(one.topic) or not MESSAGE_TYPE.fullmatch(one.type):
             self.notes.append(f"{one.topic} ({one.type}) is left out: it is no ROS 2 topic")
         elif known is None:
-            self.topics[one.topic] = Topic(one.type, one.qos, one.hash)
+            self.topics[one.topic] = SimulatedTopic(one.type, one.qos, one.hash)
         elif known.type != one.type:
             what = f"{one.topic} is {known.type} and {one.type} in the recording"
             self.notes.append(f"{what}: messages of both are replayed as the first")

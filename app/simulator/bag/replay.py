@@ -6,7 +6,7 @@ from typing import Final
 from app.panel.model import Panel
 from app.simulator.bag.recording import Message, Recording
 from app.simulator.goals import ActionServer
-from app.simulator.simulated import Topic
+from app.simulator.simulated import SimulatedTopic
 from app.simulator.values.known_types import Moment
 
 STEP_S: Final = 0.01
@@ -35,8 +35,8 @@ class ReplayedRobot:
         self._ends_at: float | None = None
         self._ended = ended
         self.step_s = STEP_S
-        self.publishes: Mapping[str, Topic] = recording.topics
-        self.subscribes: Mapping[str, Topic] = {}
+        self.publishes: Mapping[str, SimulatedTopic] = recording.topics
+        self.subscribes: Mapping[str, SimulatedTopic] = {}
         self.services: Mapping[str, str] = {}
         self.actions: Mapping[str, ActionServer] = {}
 
@@ -71,7 +71,7 @@ class ReplayedRobot:
             self._ended()
 
 
-def missing(panel: Panel, topics: Mapping[str, Topic]) -> Iterator[str]:
+def missing(panel: Panel, topics: Mapping[str, SimulatedTopic]) -> Iterator[str]:
     """What a panel needs and a recording does not have, a sentence each."""
     for topic, name in panel.listened().items():
         if topic not in topics:

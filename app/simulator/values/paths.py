@@ -9,7 +9,7 @@ from typing import Any
 from app.interfaces import Structure, Type
 from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import zero_value
-from app.interfaces.field_path import Key, Step, path_steps
+from app.interfaces.field_path import Key, PathStep, path_steps
 
 Fields = dict[str, Any]
 Structures = Mapping[str, Structure]
@@ -27,7 +27,7 @@ def put(fields: Fields, type_name: str, path: str, value: Any, structures: Struc
 
 
 def _put(
-    fields: Fields, structure: Structure, steps: Sequence[Step], value: Any, of: Structures
+    fields: Fields, structure: Structure, steps: Sequence[PathStep], value: Any, of: Structures
 ) -> None:
     name, *rest = steps
     field = next(one for one in structure.fields if one.name == name)
@@ -48,7 +48,7 @@ def _put(
 
 
 def _index(
-    fields: Fields, items: list[Any], structure: Structure, kind: Type, step: Step, of: Structures
+    fields: Fields, items: list[Any], structure: Structure, kind: Type, step: PathStep, of: Structures
 ) -> int:
     """Which element a step names."""
     if not isinstance(step, Key):
@@ -75,7 +75,7 @@ def _grow(items: list[Any], kind: Type, index: int) -> None:
         items.append(zero_value(kind.element))
 
 
-def get(fields: Any, steps: Sequence[Step]) -> Any:
+def get(fields: Any, steps: Sequence[PathStep]) -> Any:
     """The value at a path; None where a message does not have it."""
     if not steps:
         return fields
@@ -89,7 +89,7 @@ def get(fields: Any, steps: Sequence[Step]) -> Any:
     return None
 
 
-def _get_by_key(fields: Mapping[str, Any], name: str, key: Key, rest: Sequence[Step]) -> Any:
+def _get_by_key(fields: Mapping[str, Any], name: str, key: Key, rest: Sequence[PathStep]) -> Any:
     items = fields.get(name, ())
     keys = fields.get(key.path)
     if not isinstance(keys, list | tuple):

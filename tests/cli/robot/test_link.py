@@ -13,18 +13,25 @@ from app.cli.robot.hz import Rate
 from app.cli.robot.link import Place, add_options, place_of, topic_named
 from app.cli.robot.topic_reader import TopicReader
 from app.errors import LinkError, PanelError
-from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import (
+    Bridge,
+    EndpointQos,
+    GraphSnapshot,
+    RobotGraph,
+    SurveyedTopic,
+    TopicEndpoint,
+)
 
 BOOL = "std_msgs/msg/Bool"
 
 
-def topic(name: str, *types: str, **more: Any) -> Topic:
+def topic(name: str, *types: str, **more: Any) -> SurveyedTopic:
     publishers = [TopicEndpoint(type=one, qos=EndpointQos(), bridge="a") for one in types or (BOOL,)]
-    return Topic(name=name, key=name[1:], publishers=tuple(publishers), **more)
+    return SurveyedTopic(name=name, key=name[1:], publishers=tuple(publishers), **more)
 
 
 def graph_of(
-    *robots: tuple[str, Sequence[Topic]], config: Mapping[str, Any] | None = None
+    *robots: tuple[str, Sequence[SurveyedTopic]], config: Mapping[str, Any] | None = None
 ) -> GraphSnapshot:
     return GraphSnapshot(
         robots=tuple(
@@ -103,7 +110,7 @@ def test_a_topic_that_is_not_there_is_a_sentence(
     ],
 )
 def test_a_topic_that_can_not_be_read_is_a_sentence(
-    of: Topic, type_name: str, sentence: str, monkeypatch: pytest.MonkeyPatch
+    of: SurveyedTopic, type_name: str, sentence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def settled(observer: Any, graph: GraphSnapshot, *_: Any) -> GraphSnapshot:
         return graph

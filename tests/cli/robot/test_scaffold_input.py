@@ -8,7 +8,14 @@ import pytest
 
 from app.cli.robot.scaffold import _base
 from app.cli.robot.scaffold_input import MOST_ROBOTS, Heard, read_scaffold_input, usable
-from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import (
+    Bridge,
+    EndpointQos,
+    GraphSnapshot,
+    RobotGraph,
+    SurveyedTopic,
+    TopicEndpoint,
+)
 from tests.cli.robot.test_link import place_below
 from tests.support.builders import INTERFACES
 
@@ -35,9 +42,9 @@ def test_of_a_latched_topic_one_message_is_enough() -> None:
     assert not Heard(arrivals=[1.0, 2.0, 3.0]).is_enough(latched=False)
 
 
-def topic(name: str, node: str) -> Topic:
+def topic(name: str, node: str) -> SurveyedTopic:
     end = TopicEndpoint(type="none_msgs/msg/None", qos=EndpointQos(), bridge="a", nodes=(node,))
-    return Topic(name=name, key=name[1:], publishers=(end,))
+    return SurveyedTopic(name=name, key=name[1:], publishers=(end,))
 
 
 def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
@@ -56,7 +63,7 @@ def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
 
 def graph_of(*namespaces: str) -> GraphSnapshot:
     end = TopicEndpoint(type="std_msgs/msg/Bool", qos=EndpointQos(), bridge="a")
-    topic = Topic(name="/enabled", key="enabled", publishers=(end,))
+    topic = SurveyedTopic(name="/enabled", key="enabled", publishers=(end,))
     return GraphSnapshot(robots=tuple(RobotGraph(namespace=one, topics=(topic,)) for one in namespaces))
 
 

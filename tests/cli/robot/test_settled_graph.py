@@ -10,7 +10,14 @@ import pytest
 
 from app.cli.robot.link import Place
 from app.cli.robot.settled_graph import settled_graph
-from app.survey.model import Bridge, EndpointQos, GraphSnapshot, RobotGraph, Topic, TopicEndpoint
+from app.survey.model import (
+    Bridge,
+    EndpointQos,
+    GraphSnapshot,
+    RobotGraph,
+    SurveyedTopic,
+    TopicEndpoint,
+)
 
 LONG_S = 60.0
 PLACE = Place(zenoh=Path("zenoh.json5"))
@@ -29,12 +36,12 @@ class Reader:
         return self._graphs.pop(0) if len(self._graphs) > 1 else self._graphs[0]
 
 
-def topic(name: str, announced: bool = True) -> Topic:
+def topic(name: str, announced: bool = True) -> SurveyedTopic:
     end = TopicEndpoint(type="std_msgs/msg/Bool", qos=EndpointQos(), bridge="b")
-    return Topic(name=name, key=name.strip("/"), publishers=(end,), announced=announced)
+    return SurveyedTopic(name=name, key=name.strip("/"), publishers=(end,), announced=announced)
 
 
-def graph_of(*topics: Topic, **config: Any) -> GraphSnapshot:
+def graph_of(*topics: SurveyedTopic, **config: Any) -> GraphSnapshot:
     bridge = Bridge(zid="b", version="1.10.2", config=config)
     return GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), topics=topics),))
 

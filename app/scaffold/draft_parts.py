@@ -6,7 +6,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class DraftWidget:
     """One widget. `keys` are its keys but for its id, in their order; a list of mappings becomes one
     inline table a line. `comment` stands above it. `control`: it acts on the robot.
 
@@ -57,5 +57,5 @@ class Draft:
     distro: str = "jazzy"
     interfaces: Sequence[str] = ()
     interlocks: Sequence[InterlockCandidate] = ()
-    pages: Mapping[str, Sequence[Entry]] = field(default_factory=dict)
+    pages: Mapping[str, Sequence[DraftWidget]] = field(default_factory=dict)
     remarks: Sequence[str] = ()
