@@ -232,6 +232,10 @@ def test_what_decides_knows_no_http(module: str) -> None:
     assert {name for name in imported()[module] if name.startswith(tuple(frameworks))} == set()
 
 
+def test_the_runner_of_acts_knows_none_of_their_tables() -> None:
+    assert {name for name in of_project("app.commands.acts") if "control" in name} == set()
+
+
 MOST_LINES = {"app": ("*.py", 300), "static": ("*.js", 200)}
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
-from app.audit.entry import Entry, Origin, new_entry
+from app.audit.entry import Entry, Kind, Origin, new_entry
 from app.audit.queries import OpenPress
 from app.errors import LogError
 from app.i18n import TextLike, render, say
@@ -152,13 +152,19 @@ class PressLog:
         return await self._log.closed(entry)
 
     async def acted(
-        self, action: str, act_id: str, origin: Origin, outcome: str, reason: TextLike
+        self,
+        kind: Kind,
+        action: str,
+        act_id: str,
+        origin: Origin,
+        outcome: str,
+        reason: TextLike,
+        values: Mapping[str, Any],
     ) -> TextLike:
-        """Writes an act on control authority. Returns "" when it is on the disk, else why it is not."""
+        """Writes an operator's act. Returns "" when it is on the disk, else why it is not."""
         about = self._columns("", act_id, action)
-        return await self._log.closed(
-            new_entry("control", origin, {}, outcome=outcome, reason=reason, **about)
-        )
+        entry = new_entry(kind, origin, values, outcome=outcome, reason=reason, **about)
+        return await self._log.closed(entry)
 
     def note(self, action: str, origin: Origin, reason: TextLike) -> None:
         """Writes a change of control that no act made, without waiting."""

@@ -84,7 +84,7 @@ class PressGuard:
         )
 
     def act_verdict(self, at: float | None) -> Verdict:
-        """Whether the server permits an act on control authority; `at` as in `context_for`."""
+        """Whether the server permits an operator's act; `at` as in `context_for`."""
         if self._ended:
             return locked("server_shutting_down")
         if self._log.lock:

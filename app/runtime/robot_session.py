@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from app.audit.press_record import Log, PressLog
-from app.commands.control_acts import ControlActs
+from app.commands.acts import ActRunner
 from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
 from app.commands.press_context import PressGuard
@@ -58,7 +58,7 @@ class RobotSession:
     base: str
     operators_log: Log
     control: ControlAuthority
-    control_acts: ControlActs
+    control_acts: ActRunner[ControlAuthority]
     press_guard: PressGuard
     press_log: PressLog
     refresher: ViewRefresher

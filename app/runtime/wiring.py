@@ -8,7 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from app.audit.press_record import Log, PressLog
-from app.commands.control_acts import ControlActs
+from app.commands.acts import ActContext, ActRunner
+from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.press_context import PressGuard
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
@@ -81,6 +82,7 @@ def wire_session(
         publisher, control, operators_log, panel.press_expires_s, others.instance_ids
     )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
+    act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
@@ -98,7 +100,7 @@ def wire_session(
         base=server.root_path + (f"/robots/{entry.id}" if entry else ""),
         operators_log=operators_log,
         control=control,
-        control_acts=ControlActs(control, press_guard, press_log, robot.name, signals.changed.emit),
+        control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
         press_guard=press_guard,
         press_log=press_log,
         refresher=refresher,
@@ -145,7 +147,7 @@ def _connect(signals: RobotSignals, session: RobotSession) -> None:
     signals.graph_read.connect(turn.on_graph_read)
     signals.late_reading.connect(turn.run_late_reading)
     signals.entries_decoded.connect(lambda key: refresher.refresh_values({key}))
-    signals.handed_over.connect(session.control_acts.log_hand_over)
+    signals.handed_over.connect(partial(log_hand_over, session.press_log))
     signals.link_lost.connect(session.renew)
     signals.route_lost.connect(session.reopen)
 

@@ -8,7 +8,8 @@ import pytest
 
 from app.audit import Entry, NullLog
 from app.audit.press_record import PressLog
-from app.commands.control_acts import ActReceipt, ActRequest, ControlActs
+from app.commands.acts import ActContext, ActReceipt, ActRequest, ActRunner
+from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN, log_hand_over
 from app.commands.press_context import PressGuard
 from app.errors import NotFound
 from app.panel.rules import ControlRules
@@ -60,12 +61,13 @@ class Bench:
             ControlRules(required=True),
             "Robot 1",
             monotonic=lambda: self.now,
-            on_hand_over=lambda hand_over: self.acts.log_hand_over(hand_over),
+            on_hand_over=lambda hand_over: log_hand_over(self.press_log, hand_over),
         )
         publisher = ViewPublisher(build_view(PANEL, robot_there(PANEL), NOW).view, "r1")
         self.guard = PressGuard(publisher, self.control, self.log, 3.0, lambda: ())
-        press_log = PressLog(self.log, "Robot 1")
-        self.acts = ControlActs(self.control, self.guard, press_log, "", self._show)
+        self.press_log = PressLog(self.log, "Robot 1")
+        context = ActContext(self.guard, self.press_log, "", self._show)
+        self.acts = ActRunner("control", CONTROL_ACTS, self.control, context)
 
     def _show(self) -> None:
         self.shown += 1
@@ -73,7 +75,7 @@ class Bench:
     async def do(
         self, act: str, who: Principal = ANN, act_id: str = "a1", to: str = "", at: float | None = None
     ) -> ActReceipt:
-        return await self.acts.act(ActRequest(act, who, to), act_id, at)
+        return await self.acts.act(ActRequest(act, who, to, at=at), act_id)
 
     @property
     def logged(self) -> list[tuple[str, str, str, str]]:
@@ -216,7 +218,7 @@ def test_who_keeps_no_cookie_is_refused_with_a_receipt(bench: Bench) -> None:
         program = Principal(anonymous("192.0.2.9"))
         receipt = await bench.do("take", program)
         assert (receipt.outcome, receipt.code) == ("refused", "control_no_cookie")
-        again = bench.acts.limited(ActRequest("take", program), "a9")
+        again = bench.acts.limited(ActRequest("take", program), "a9", TOO_OFTEN)
         assert (again.cause, again.code) == ("limit", "control_too_often")
         assert bench.acts.receipt("a9") is None
 
@@ -227,5 +229,5 @@ def test_there_is_no_other_act(bench: Bench) -> None:
     async def steal() -> None:
         await bench.do("steal")
 
-    with pytest.raises(NotFound, match="there is take, ask, give, keep, release, here"):
+    with pytest.raises(NotFound, match="there is take, ask, give, keep, release"):
         asyncio.run(steal())

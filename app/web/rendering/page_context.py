@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from app import clock
 from app.clock import format_datetime, format_time, iso_time
+from app.commands.control_acts import TOO_OFTEN
 from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike, say
 from app.panel.layout import Page
@@ -31,7 +32,6 @@ from app.web.rendering.page_words import page_words
 
 RELOADED: Final = "reloaded"  # by itself, without a tap
 RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a press on it is refused
-TOO_OFTEN: Final = "control_too_often"
 
 
 class PageContext(TypedDict):
@@ -141,7 +141,7 @@ def page_context(
 
 def _refused(session: RobotSession, query: str) -> TextLike:
     """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
-    if query == TOO_OFTEN:
-        return say(TOO_OFTEN)
+    if query == TOO_OFTEN.code:
+        return TOO_OFTEN
     receipt = session.control_acts.receipt(query)
     return receipt.reason if receipt else ""

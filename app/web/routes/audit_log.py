@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from starlette.types import Message, Receive, Scope, Send
 
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
-from app.commands.control_acts import ACTS
+from app.commands.control_acts import CONTROL_ACTS
 from app.errors import InputError, LogError, NotFound
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
@@ -43,7 +43,7 @@ router = APIRouter()
 ROWS_ON_PAGE: Final = 50
 # Entries of the kind "control": acts, and changes that no act made.
 CONTROL_ACTIONS: Final = (
-    *(f"control_{act}" for act in ACTS),
+    *(f"control_{act}" for act in CONTROL_ACTS),
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
 TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for

@@ -7,13 +7,13 @@ from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from app.commands.control_acts import ACTS, ActReceipt, ActRequest
+from app.commands.acts import ActReceipt, ActRequest
+from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
 from app.commands.press_context import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
 from app.i18n import localized
 from app.panel.base import ID
-from app.permission.control_authority import LIFE_S
 from app.permission.control_authority_view import for_role, role
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
@@ -26,11 +26,9 @@ from app.web.routes.presses import STATUS
 
 router = APIRouter()
 
-Act = Annotated[str, Path(json_schema_extra={"enum": list(ACTS)})]
+Act = Annotated[str, Path(json_schema_extra={"enum": list(CONTROL_ACTS)})]
 ASKER: Final = r"^[0-9a-f]{0,12}$"
 
-# A form's browser shows that it is there by reloading its page, at the latest after this time.
-FORM_LIFE_S: Final = 35.0
 FORM_FIELDS_MOST: Final = 8
 
 
@@ -81,7 +79,7 @@ class ControlAnswer(BaseModel):
 )
 async def keep_alive(request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    session.control.keepalive(principal_of(request, state), (await _given(KeepAlive, request)).touched)
+    session.control.keepalive(principal_of(request, state), (await _body(KeepAlive, request)).touched)
     return Response(status_code=204)
 
 
@@ -112,19 +110,17 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
     # Without a cookie the act is refused; with this one the next succeeds.
     _, token = principal_with_new_token(request, state)
     form = kind_of(request) == FORM
-    given = await _given(Acting, request)
+    body = await _body(Acting, request)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
-    act_id = (f"{given.id}.{act}" if form else given.id) if given.id else secrets.token_hex(8)
-    requested = ActRequest(act, who, given.to)
+    act_id = (f"{body.id}.{act}" if form else body.id) if body.id else secrets.token_hex(8)
+    at = None if form or body.at is None else body.at.timestamp()
+    requested = ActRequest(act, who, body.to, at=at, scripted=not form)
     if not state.limits.admit(who):
-        receipt = session.control_acts.limited(requested, act_id)
+        receipt = session.control_acts.limited(requested, act_id, TOO_OFTEN)
     else:
-        at = None if form or given.at is None else given.at.timestamp()
         with state.in_flight.track():
-            receipt = await session.control_acts.act(
-                requested, act_id, at, FORM_LIFE_S if form else LIFE_S
-            )
-    answer = _page(session, given.page, receipt) if form else _json(request, session, who, receipt)
+            receipt = await session.control_acts.act(requested, act_id)
+    answer = _page(session, body.page, receipt) if form else _json(request, session, who, receipt)
     return set_client_cookie(answer, request, token)
 
 
@@ -156,11 +152,11 @@ def _required(session: RobotSession) -> None:
         raise NotFound("this panel does not require control: its file has no [control] required = true")
 
 
-async def _given(model: type[Fields], request: Request) -> Fields:
+async def _body(model: type[Fields], request: Request) -> Fields:
     """The body as a model: JSON, a form, or nothing at all."""
-    kind, body = kind_of(request), await body_of(request)
+    kind, content = kind_of(request), await body_of(request)
     if kind == FORM:
-        return as_model(model, form_of(body, FORM_FIELDS_MOST))
+        return as_model(model, form_of(content, FORM_FIELDS_MOST))
     if kind not in (JSON, ""):
         raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
-    return as_model(model, json_of(body or b"{}"))
+    return as_model(model, json_of(content or b"{}"))
