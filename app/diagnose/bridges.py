@@ -30,7 +30,7 @@ def check_graph(report: Report, graph: GraphSnapshot, behind: PanelNames) -> boo
 
 def _check_bridge(report: Report, bridge: Bridge, robot: str) -> None:
     if not bridge.answers:
-        report.find("bridge_silent", bridge.zid, robot=robot)
+        report.find("link_bridge_silent", bridge.zid, robot=robot)
         return
     version = bridge.version.lstrip("v")
     if version not in (TESTED, DEMO_VERSION.strip('"')):

@@ -79,11 +79,11 @@ ERRORS: Final[Rows] = {
         "one, "
         "the bridge hangs: restart it. tls/ on one side needs tls/ on the other.",
     ),
-    "no_bridge": (
+    "link_no_bridge": (
         "A Zenoh router answers at {about}, but no ROS 2 bridge is connected to it.",
         "Start zenoh-bridge-ros2dds on the robot. It must listen there or connect to this router.",
     ),
-    "bridge_silent": (
+    "link_bridge_silent": (
         "The bridge {about} is known, but does not respond.",
         "Restart the bridge. If it happens again, look at its log.",
     ),

@@ -302,7 +302,7 @@ def test_a_port_where_no_zenoh_speaks(short_setup: Setup) -> None:
 
 def test_a_router_without_a_bridge(short_setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
     endpoint, _ = peer
-    assert named(short_setup.findings(WELL, endpoint)) == [("no_bridge", endpoint)]
+    assert named(short_setup.findings(WELL, endpoint)) == [("link_no_bridge", endpoint)]
 
 
 def test_a_bridge_with_another_namespace(domain: int, setup: Setup) -> None:
@@ -331,7 +331,7 @@ def test_a_frozen_bridge(domain: int, short_setup: Setup) -> None:
         assert named(short_setup.findings(WELL, bridge.endpoint)) == [("not_zenoh", bridge.endpoint)]
 
 
-@pytest.mark.parametrize(("frozen_s", "expected"), [(2.0, "wrong_rmw"), (60.0, "bridge_silent")])
+@pytest.mark.parametrize(("frozen_s", "expected"), [(2.0, "wrong_rmw"), (60.0, "link_bridge_silent")])
 def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
     shared: Bridge,
     robot: RosNode,
@@ -411,7 +411,7 @@ def test_a_bridge_that_is_there_and_does_not_respond(
 ) -> None:
     endpoint, session = peer
     token = session.liveliness().declare_token(f"@/{session.zid()}/@ros2_lv")
-    assert named(setup.findings(WELL, endpoint)) == [("bridge_silent", str(session.zid()))]
+    assert named(setup.findings(WELL, endpoint)) == [("link_bridge_silent", str(session.zid()))]
     token.undeclare()
 
 

@@ -58,11 +58,11 @@ def test_the_same_is_found_once_and_notes_do_not_count() -> None:
 def test_of_many_alike_some_are_listed_and_the_others_are_counted() -> None:
     report = Report()
     for number in range(1000):
-        report.find("bridge_silent", f"b{number}")
+        report.find("link_bridge_silent", f"b{number}")
         report.fact(f"checked b{number}")
     report.find("no_router", "there")
     lines = as_text(report).splitlines()
-    assert sum(line.startswith("error    bridge_silent") for line in lines) == MOST_ALIKE
+    assert sum(line.startswith("error    link_bridge_silent") for line in lines) == MOST_ALIKE
     assert lines[MOST_ALIKE] == f"         … and {1000 - MOST_ALIKE} more"
     assert lines[-1] == "Something is wrong: 1001 errors, 1000 checks were passed."
     assert len(report.facts) < 1000
