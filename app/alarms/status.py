@@ -86,6 +86,11 @@ class AlarmStatus:
         """Whether it counts: it is not normal, and neither shelved, suppressed nor out of service."""
         return not self.is_normal and self.override is None
 
+    def is_same_to_operators(self, other: "AlarmStatus") -> bool:
+        """Whether nothing differs but that the source of a normal alarm is known."""
+        is_normal = self.is_normal and other.is_normal and self.override == other.override
+        return self == other or (is_normal and self.override is None)
+
     @property
     def is_acknowledged(self) -> bool:
         return self.state in (State.NORMAL, State.ACKNOWLEDGED, State.LATCHED_ACKNOWLEDGED)

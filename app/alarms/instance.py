@@ -1,0 +1,109 @@
+"""An alarm of one robot: its definition, and what is known of it now."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+from app.alarms.delays import LIMIT_LEVELS, DelayedCondition, Delays, Limit, LimitName
+from app.alarms.entries import Entry
+from app.alarms.states import AlarmKind
+from app.alarms.status import NORMAL, AlarmRules, AlarmStatus
+from app.panel.alarm import Alarm
+from app.panel.model import Panel
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """An alarm of the panel file, of one robot ("" for the only one). `thresholds` are its limits, or
+    one None for a condition without a limit. `id` is unique in the panel."""
+
+    id: str
+    robot: str
+    alarm: Alarm
+    rules: AlarmRules
+    delays: Delays
+    thresholds: tuple[Limit | None, ...]
+
+    def of_entry(self, entry: Entry) -> "Definition":
+        """The definition of an alarm that the robot publishes itself."""
+        rules = replace(self.rules, priorities=entry.priorities)
+        return replace(self, id=f"{self.id}:{entry.name}", rules=rules)
+
+
+def define(panel: Panel, robots: Sequence[str]) -> Iterator[Definition]:
+    """The definitions of all alarms of all robots."""
+    for robot in robots:
+        for alarm in panel.alarms:
+            if alarm.is_for(robot or None):
+                yield _define(alarm, robot)
+
+
+def _define(alarm: Alarm, robot: str) -> Definition:
+    limits = (
+        Limit(cast(LimitName, name), value, alarm.deadband) for name, value in alarm.limits.items()
+    )
+    kind = AlarmKind(alarm.ack == "required", alarm.latched)
+    return Definition(
+        f"{alarm.id}@{robot}" if robot else alarm.id,
+        robot,
+        alarm,
+        AlarmRules(kind, alarm.priorities, alarm.on_unknown == "raise", alarm.max_shelf_s),
+        Delays(alarm.on_delay_s, alarm.off_delay_s),
+        tuple(limits) or (None,),
+    )
+
+
+@dataclass(slots=True)
+class AlarmInstance:
+    """`value` is the last one of its field. `entry` is what the robot published, for diagnostics and
+    lists, and `heard_at` when. `due` is when time alone changes it, and
+    `timer` when the engine looks at that. All in monotonic seconds."""
+
+    definition: Definition
+    status: AlarmStatus = NORMAL
+    conditions: tuple[DelayedCondition, ...] = field(init=False)
+    value: float | None = None
+    entry: Entry | None = None
+    heard_at: float = -math.inf
+    due: float = math.inf
+    timer: float = math.inf
+
+    def __post_init__(self) -> None:
+        self.conditions = (DelayedCondition(),) * len(self.definition.thresholds)
+
+    def level_of(self, limit: Limit | None) -> int:
+        """The level that is reached where a limit is exceeded; the robot says its own."""
+        if limit is not None:
+            return LIMIT_LEVELS[limit.name]
+        levels = len(self.definition.rules.priorities)
+        return max(1, min(self.entry.level, levels)) if self.entry else 1
+
+    @property
+    def priority(self) -> int:
+        """That of the highest level since it was raised and not acknowledged."""
+        return self.definition.rules.priority(max(self.status.level, self.status.raised_level))
+
+    @property
+    def is_unlisted(self) -> bool:
+        """Whether there is nothing to list: it is normal, and neither shelved, suppressed nor out of
+        service."""
+        return self.status.is_normal and self.status.override is None
+
+    @property
+    def inhibits(self) -> bool:
+        """Whether it locks the controls that it names: it is active or latched, or its source is
+        unknown. One that has returned does not."""
+        status = self.status
+        is_latched = self.definition.alarm.latched and not status.is_normal
+        return status.level > 0 or is_latched or status.unknown_since is not None
+
+    @property
+    def order(self) -> tuple[bool, int, float]:
+        """The unacknowledged first, by priority, then the newest."""
+        raised_at = self.status.raised_at
+        return (
+            self.status.is_acknowledged,
+            self.priority,
+            -(raised_at.monotonic if raised_at else 0.0),
+        )

@@ -1,0 +1,73 @@
+"""From a robot's state to what the source of an alarm says now. Pure functions."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
+
+from app.alarms.delays import Limit
+from app.panel.alarm import Alarm, SourceKind
+from app.permission.interlocks import link_verdict
+from app.robot.keyed_values import kept_s
+from app.robot.state import RobotState
+
+
+class SourceReading(NamedTuple):
+    """What a source says: `value` is that of a field, and `met` whether a condition without limits is.
+    Both are None while it is unknown. `until` (monotonic seconds) is when time alone changes it."""
+
+    value: float | None = None
+    met: bool | None = None
+    until: float = math.inf
+
+    @property
+    def is_known(self) -> bool:
+        return self.value is not None or self.met is not None
+
+    def exceeds(self, limit: Limit | None, before: bool) -> bool:
+        """Whether it exceeds a limit, or its condition is met if there is no limit."""
+        if limit is None or self.value is None:
+            return self.met is True
+        return limit.is_exceeded(self.value, before)
+
+
+UNKNOWN: Final = SourceReading()
+
+
+def read_source(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
+    """What the source of an alarm says at `now`; `began_at` is when the server began to listen. Both in
+    monotonic seconds."""
+    read = READERS.get(alarm.source) if alarm.source else None
+    return read(alarm, robot, now, began_at) if read else UNKNOWN
+
+
+def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
+    link = link_verdict(robot, now)
+    if alarm.topic is None or not link.permitted:
+        return SourceReading(until=link.until)
+    reading = robot.reading(alarm.topic).of_field(alarm.field, kept_s(alarm.max_age_s))
+    value = reading.value(alarm.field) if reading.status in ("message", "reading") else None
+    if not isinstance(value, int | float):
+        return UNKNOWN
+    stale_at = math.inf if alarm.max_age_s is None else reading.at + alarm.max_age_s
+    return SourceReading(value=value, until=stale_at) if now < stale_at else UNKNOWN
+
+
+def _read_age(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
+    if alarm.topic is None or alarm.stale_s is None:
+        return UNKNOWN
+    stale_at = max(robot.reading(alarm.topic).at, began_at) + alarm.stale_s
+    return SourceReading(met=True) if now >= stale_at else SourceReading(met=False, until=stale_at)
+
+
+def _read_loss(alarm: Alarm, robot: RobotState, _: float, __: float) -> SourceReading:
+    lost = not robot.link_up
+    if alarm.lost == "robot":
+        lost = lost or not robot.graph.peers or robot.graph.has_silent_peer or not robot.is_responding
+    return SourceReading(met=lost)
+
+
+READERS: Final[Mapping[SourceKind, Callable[[Alarm, RobotState, float, float], SourceReading]]] = {
+    "limits": _read_field,
+    "stale": _read_age,
+    "lost": _read_loss,
+}

@@ -1,0 +1,335 @@
+"""Alarms of a panel are raised from what its robots publish; only those that may have changed are
+evaluated."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from app.alarms import engine as engine_module
+from app.alarms.engine import MAX_ENTRIES, MAX_EVALUATED, AlarmEngine, Transition
+from app.alarms.entries import entries_of
+from app.alarms.instance import Definition
+from app.alarms.sources import read_source
+from app.alarms.states import State
+from app.alarms.status import (
+    ActResult,
+    AlarmStatus,
+    Moment,
+    Override,
+    TakenOut,
+    acknowledge,
+    shelve,
+)
+from app.panel import load_panel
+from app.robot.state import RobotState, Sample
+from tests.support.builders import BRIDGE, INTERFACES, robot_there
+from tests.support.words import english
+
+START = 1000.0
+PANEL = """
+title = "Cell"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Empty"
+message = {}
+"""
+AIR = """
+[[alarm]]
+id = "air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "Air pressure low"
+low = 5.0
+low_low = 4.0
+deadband = 0.5
+priority = 2
+inhibits = ["start"]
+"""
+DELAYED = AIR + "on_delay_s = 2.0\noff_delay_s = 3.0\n"
+OLD = AIR + "max_age_s = 2.0\n"
+STALE = """
+[[alarm]]
+id = "air_old"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "No air pressure"
+stale_s = 2.0
+"""
+LOST = '[[alarm]]\nid = "apart"\ntext = "No connection"\nlost = "robot"\n'
+HEALTH = '[[alarm]]\nid = "health"\ndiagnostics = "motor *"\nmax_age_s = 5.0\n'
+FAULTS = """
+[[alarm]]
+id = "faults"
+topic = "/faults"
+type = "diagnostic_msgs/msg/DiagnosticArray"
+[alarm.list]
+field = "status"
+code = "hardware_id"
+text = "message"
+level = "level"
+priorities = { "2" = 1 }
+"""
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+
+
+class Cell:
+    """A robot and the alarms of a panel, with a clock that is set."""
+
+    def __init__(self, folder: Path, alarms: str) -> None:
+        path = folder / "cell.toml"
+        path.write_text(PANEL + alarms)
+        self.panel = load_panel(path)
+        self.robot: RobotState = robot_there(self.panel)
+        self.now = START
+        self.transitions: list[Transition] = []
+        self.engine = AlarmEngine(
+            self.panel,
+            {"": self.robot},
+            lambda: Moment(self.now, self.now),
+            self.receive,
+        )
+        self.engine.evaluate()
+
+    def receive(self, transitions: Sequence[Transition]) -> None:
+        self.transitions.extend(transitions)
+
+    def publish(self, value: float, topic: str = "/air") -> None:
+        payload = INTERFACES.encode("std_msgs/msg/Float64", {"data": value})
+        key = self.robot.key(topic)
+        self.robot.update(key, Sample(payload, 1, self.now, self.now, BRIDGE))
+        self.engine.topics_changed("", [key])
+        self.engine.evaluate()
+
+    def publish_entries(self, alarm: str, *rows: tuple[object, ...]) -> None:
+        described = next(one for one in self.panel.alarms if one.id == alarm)
+        self.engine.entries_received("", alarm, entries_of(described, rows), self.now)
+        self.engine.evaluate()
+
+    def wait_until_due(self) -> float:
+        """Lets the time pass until the next evaluation is due; returns how many seconds that took."""
+        before, self.now = self.now, self.engine.due
+        self.engine.evaluate()
+        return self.now - before
+
+    def status(self, alarm: str = "air") -> AlarmStatus:
+        return self.engine.alarms[alarm].status
+
+    def acknowledge(self, alarm: str, occurrence: int) -> ActResult | None:
+        def apply(status: AlarmStatus, definition: Definition) -> ActResult:
+            return acknowledge(status, definition.rules, occurrence)
+
+        return self.engine.act(alarm, "acknowledge", apply, "Ann")
+
+    def inhibiting(self) -> list[str]:
+        return [alarm.definition.id for alarm in self.engine.inhibiting("", "start")]
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> partial[Cell]:
+    return partial(Cell, tmp_path)
+
+
+def test_a_limit_raises_and_returns_past_its_deadband(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    air.publish(6.0)
+    assert (air.status().state, air.transitions) == (State.NORMAL, [])
+    air.publish(4.9)
+    assert (air.status().state, air.status().occurrence) == (State.UNACKNOWLEDGED, 1)
+    air.publish(5.4)
+    assert air.status().state is State.UNACKNOWLEDGED
+    air.publish(5.5)
+    assert air.status().state is State.RETURNED_UNACKNOWLEDGED
+    assert [(t.after.state, t.value) for t in air.transitions] == [
+        (State.UNACKNOWLEDGED, 4.9),
+        (State.RETURNED_UNACKNOWLEDGED, 5.5),
+    ]
+    assert [t.seq for t in air.transitions] == [1, 2]
+
+
+def test_a_second_level_escalates_the_same_alarm(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    air.publish(4.5)
+    assert air.acknowledge("air", 1) is not None
+    air.publish(3.0)
+    (alarm,) = air.engine.standing()
+    assert (alarm.status.state, alarm.status.occurrence) == (State.UNACKNOWLEDGED, 2)
+    assert alarm.priority == 1
+
+
+def test_an_acknowledgement_names_its_occurrence_and_its_actor(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    air.publish(4.5)
+    refused = air.acknowledge("air", 0)
+    assert refused is not None
+    assert refused.refusal is not None
+    assert refused.refusal.code == "alarm_came_again"
+    assert len(air.transitions) == 1
+    air.acknowledge("air", 1)
+    air.acknowledge("air", 1)
+    assert [(t.act, t.actor) for t in air.transitions[1:]] == [("acknowledge", "Ann")]
+    assert air.acknowledge("oil", 1) is None
+
+
+def test_delays_pass_without_a_message(cell: partial[Cell]) -> None:
+    air = cell(DELAYED)
+    air.publish(4.9)
+    assert air.status().is_normal
+    assert air.wait_until_due() == 2.0
+    assert air.status().state is State.UNACKNOWLEDGED
+    air.publish(6.0)
+    assert air.wait_until_due() == 3.0
+    assert air.status().state is State.RETURNED_UNACKNOWLEDGED
+
+
+def test_a_dip_that_is_shorter_than_its_delay_raises_nothing(cell: partial[Cell]) -> None:
+    air = cell(DELAYED)
+    air.publish(4.9)
+    air.now += 1.9
+    air.publish(6.0)
+    air.now += 10.0
+    air.engine.evaluate()
+    assert air.transitions == []
+
+
+def test_an_old_value_is_not_known_and_the_alarm_stays(cell: partial[Cell]) -> None:
+    air = cell(OLD)
+    air.publish(4.5)
+    assert air.wait_until_due() == 2.0
+    assert (air.status().state, air.status().unknown_since) == (
+        State.UNACKNOWLEDGED,
+        Moment(START + 2.0, START + 2.0),
+    )
+    air.publish(6.0)
+    assert air.status().state is State.RETURNED_UNACKNOWLEDGED
+
+
+def test_messages_that_keep_a_value_fresh_need_one_timer(cell: partial[Cell]) -> None:
+    air = cell(OLD)
+    for _ in range(100):
+        air.publish(6.0)
+        air.now += 0.1
+    assert len(air.engine._timers) == 1
+
+
+def test_an_alarm_whose_source_is_unknown_locks_what_it_inhibits(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    assert air.inhibiting() == ["air"]
+    air.publish(6.0)
+    assert air.inhibiting() == []
+    air.publish(4.5)
+    assert air.inhibiting() == ["air"]
+    air.acknowledge("air", 1)
+    assert air.inhibiting() == ["air"]
+    air.publish(6.0)
+    assert air.inhibiting() == []
+
+
+def test_a_lost_link_makes_sources_unknown_and_raises_its_own_alarm(cell: partial[Cell]) -> None:
+    air = cell(AIR + LOST)
+    air.publish(4.5)
+    air.robot.mark_link_lost()
+    air.engine.robot_changed("")
+    air.engine.evaluate()
+    assert air.status().unknown_since is not None
+    assert air.status("apart").state is State.UNACKNOWLEDGED
+    assert [alarm.definition.id for alarm in air.engine.standing()] == ["air", "apart"]
+
+
+def test_a_topic_that_is_silent_raises_its_alarm_at_its_time(cell: partial[Cell]) -> None:
+    air = cell(STALE)
+    assert air.wait_until_due() == 2.0
+    assert air.status("air_old").state is State.UNACKNOWLEDGED
+    air.publish(6.0)
+    assert air.status("air_old").state is State.RETURNED_UNACKNOWLEDGED
+    assert air.wait_until_due() == 2.0
+    assert air.status("air_old").occurrence == 2
+
+
+def test_a_shelf_ends_at_its_time(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    air.publish(4.5)
+    moment = Moment(air.now, air.now)
+
+    def apply(status: AlarmStatus, definition: Definition) -> ActResult:
+        return shelve(status, definition.rules, TakenOut(moment, "Tests", "Ann", air.now + 60.0))
+
+    air.engine.act("air", "shelve", apply, "Ann")
+    air.engine.evaluate()
+    assert air.status().override is Override.SHELVED
+    assert air.wait_until_due() == 60.0
+    assert (air.status().override, air.status().occurrence) == (None, 2)
+
+
+def test_each_status_of_diagnostics_is_an_alarm(cell: partial[Cell]) -> None:
+    robot = cell(HEALTH)
+    rows = [(f"motor {i}", OK, "", "") for i in range(300)]
+    rows[7] = ("motor 7", WARN, "Hot", "M7")
+    rows[8] = ("motor 8", ERROR, "Burnt", "M8")
+    robot.publish_entries("health", *rows, ("lamp", ERROR, "Dark", ""))
+    first, second = robot.engine.standing()
+    assert [first.definition.id, second.definition.id] == ["health:motor 8", "health:motor 7"]
+    assert (first.priority, second.priority) == (2, 3)
+    assert first.entry is not None
+    assert english(first.entry.text) == "Burnt"
+
+
+def test_a_status_that_disappears_is_not_known(cell: partial[Cell]) -> None:
+    robot = cell(HEALTH)
+    robot.publish_entries("health", ("motor 7", WARN, "Hot", ""))
+    assert robot.wait_until_due() == 5.0
+    status = robot.status("health:motor 7")
+    assert (status.state, status.is_standing) == (State.UNACKNOWLEDGED, True)
+    assert status.unknown_since is not None
+    robot.publish_entries("health", ("motor 7", OK, "", ""))
+    assert robot.status("health:motor 7").state is State.RETURNED_UNACKNOWLEDGED
+
+
+def test_a_list_of_active_alarms_ends_those_that_are_missing(cell: partial[Cell]) -> None:
+    robot = cell(FAULTS)
+    robot.publish_entries("faults", ("E1", "Axis 1 hot", WARN), ("E2", "Axis 2 broken", ERROR))
+    assert [(a.definition.id, a.priority) for a in robot.engine.standing()] == [
+        ("faults:E2", 1),
+        ("faults:E1", 3),
+    ]
+    robot.publish_entries("faults", ("E2", "Axis 2 broken", ERROR))
+    assert robot.status("faults:E1").state is State.RETURNED_UNACKNOWLEDGED
+    assert robot.status("faults:E2").state is State.UNACKNOWLEDGED
+
+
+def test_the_alarms_that_a_robot_publishes_are_bounded(cell: partial[Cell]) -> None:
+    robot = cell(HEALTH)
+    robot.publish_entries("health", *((f"motor {i}", WARN, "", "") for i in range(MAX_ENTRIES + 5)))
+    assert len(robot.engine.alarms) == MAX_ENTRIES
+    assert robot.engine.refused_entries == 5
+
+
+def test_an_evaluation_looks_only_at_what_may_have_changed(
+    cell: partial[Cell], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = "".join(
+        AIR.replace('"air"', f'"air{i}"').replace("/air", f"/air{i % 10}") for i in range(5_000)
+    )
+    air = cell(many)
+    while air.engine.due == 0.0:
+        air.engine.evaluate()
+    read: list[str] = []
+
+    def counted(alarm, *about):  # type: ignore[no-untyped-def]
+        read.append(alarm.id)
+        return read_source(alarm, *about)
+
+    monkeypatch.setattr(engine_module, "read_source", counted)
+    air.publish(4.5, "/air3")
+    assert len(read) == len(air.transitions) == 500
+    air.engine.robot_changed("")
+    air.engine.evaluate()
+    assert len(read) == 500 + MAX_EVALUATED
+    assert air.engine.due == 0.0
