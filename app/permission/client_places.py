@@ -70,7 +70,7 @@ class ClientPlaces:
     def full(self, client: str) -> bool:
         """Whether all places are taken that a client like this may have."""
         limits, kiosk = self.limits, client in KIOSK
-        own = sum(self._taken[one] for one in KIOSK)
+        own = sum(self._taken[place] for place in KIOSK)
         return self._total >= limits.total or (not kiosk and self._total - own >= limits.others)
 
     def has_place(self, client: str) -> bool:
@@ -97,13 +97,13 @@ def client_key(address: str) -> str:
     if not address:
         return "127.0.0.1"
     try:
-        found = ip_address(address.partition("%")[0])
+        parsed = ip_address(address.partition("%")[0])
     except ValueError:
         return address[:64]
-    if not isinstance(found, IPv6Address):
-        return str(found)
-    if found.ipv4_mapped:
-        return str(found.ipv4_mapped)
-    if found.is_link_local or found.is_loopback:
-        return str(found)
-    return str(ip_network((found, SUBNET_BITS), strict=False))
+    if not isinstance(parsed, IPv6Address):
+        return str(parsed)
+    if parsed.ipv4_mapped:
+        return str(parsed.ipv4_mapped)
+    if parsed.is_link_local or parsed.is_loopback:
+        return str(parsed)
+    return str(ip_network((parsed, SUBNET_BITS), strict=False))

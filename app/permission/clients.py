@@ -81,7 +81,7 @@ class Clients:
         return browser
 
     def _free_number(self, local: bool) -> int:
-        taken = {one.number for one in self._known.values() if one.local == local}
+        taken = {client.number for client in self._known.values() if client.local == local}
         return next(n for n in range(1, len(taken) + 2) if n not in taken)
 
 
@@ -111,9 +111,9 @@ def public_id(token: str) -> str:
 def where(address: str) -> tuple[str, bool]:
     """The address as it is shown, and whether it is this machine's."""
     try:
-        found = ip_address(address.partition("%")[0])
+        parsed = ip_address(address.partition("%")[0])
     except ValueError:
         return render(say("unknown")), False  # as the log has it
-    if isinstance(found, IPv6Address) and found.ipv4_mapped:
-        found = found.ipv4_mapped
-    return str(found), found.is_loopback
+    if isinstance(parsed, IPv6Address) and parsed.ipv4_mapped:
+        parsed = parsed.ipv4_mapped
+    return str(parsed), parsed.is_loopback

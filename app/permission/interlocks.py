@@ -130,11 +130,11 @@ def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict |
     return find_row(COMMAND_CHECKS, widget)(widget, robot, now)
 
 
-def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
+def publish_blocked(command: PublishCommand, robot: RobotState) -> Verdict | None:
     """Why a message may not be published: another type, or the last one's effect is awaited."""
-    if mismatch := topic_mismatch("MP", of, robot):
+    if mismatch := topic_mismatch("MP", command, robot):
         return mismatch
-    if of.one_at_a_time and robot.command_status.get(of.id, IDLE).busy:
+    if command.one_at_a_time and robot.command_status.get(command.id, IDLE).busy:
         return locked("press_in_progress")
     return None
 
@@ -153,24 +153,24 @@ def blocked_buttons(buttons: tuple[PublishPress, ...], robot: RobotState) -> fro
 def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | None, Verdict]:
     """The value from which a step is made, None where it is not known now; and why that locks, or until
     when it counts."""
-    of = step.value
-    if mismatch := topic_mismatch("MS", of, robot):
+    source = step.value
+    if mismatch := topic_mismatch("MS", source, robot):
         return None, mismatch
-    reading = robot.reading(of.topic).of_field(of.field, kept_s(of.max_age_s))
+    reading = robot.reading(source.topic).of_field(source.field, kept_s(source.max_age_s))
     if reading.status != "message":
-        return None, unread(reading, of.topic, of.type)
-    value = reading.value(of.field)
+        return None, unread(reading, source.topic, source.type)
+    value = reading.value(source.field)
     if value is None:
-        return None, locked("interlock_field_missing", field=of.field, topic=of.topic)
+        return None, locked("interlock_field_missing", field=source.field, topic=source.topic)
     if not math.isfinite(value):
         return None, locked(
-            "interlock_not_a_number", field=of.field, topic=of.topic, value=not_finite(value)
+            "interlock_not_a_number", field=source.field, topic=source.topic, value=not_finite(value)
         )
-    if of.max_age_s is None:
+    if source.max_age_s is None:
         return value, PERMITTED
-    stale_at = reading.at + of.max_age_s
+    stale_at = reading.at + source.max_age_s
     if now >= stale_at:
-        return None, stale(of.topic, of.field, of.max_age_s)
+        return None, stale(source.topic, source.field, source.max_age_s)
     return value, Verdict(True, until=stale_at)
 
 
@@ -187,9 +187,9 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
 
 # What may lock a command, beside the link and its interlocks: a check for each family of widgets.
 COMMAND_CHECKS: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
-    PublishCommand: lambda of, robot, _: publish_blocked(of, robot),
+    PublishCommand: lambda command, robot, _: publish_blocked(command, robot),
     Step: step_blocked,
     ServerCommand: call_blocked,
-    Parameter: lambda of, robot, _: set_blocked(of, robot),
+    Parameter: lambda parameter, robot, _: set_blocked(parameter, robot),
 }
 require_rows("check of its command", COMMAND_CHECKS, Command)

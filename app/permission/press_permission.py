@@ -67,22 +67,27 @@ class Check(NamedTuple):
     alike: bool = False
 
 
-def _ending(of: PermissionRequest) -> Verdict | None:
-    return locked("server_shutting_down") if of.grounds.ending else None
+def _ending(request: PermissionRequest) -> Verdict | None:
+    return locked("server_shutting_down") if request.grounds.ending else None
 
 
-def _log(of: PermissionRequest) -> Verdict | None:
-    lock = of.grounds.log_lock
+def _log(request: PermissionRequest) -> Verdict | None:
+    lock = request.grounds.log_lock
     return Verdict(False, "log", lock) if lock else None
 
 
 CHECKS: Final = (
-    Check("link", lambda of: of.link, alike=True),
+    Check("link", lambda request: request.link, alike=True),
     Check("ending", _ending, alike=True),
     Check("log", _log, alike=True),
-    Check("control", lambda of: of.grounds.control, alike=True),
-    Check("command", lambda of: command_blocked(of.widget, of.robot, of.now), alone=False, alike=True),
-    Check("interlocks", lambda of: combined(of.interlocks), alone=False, alike=True),
+    Check("control", lambda request: request.grounds.control, alike=True),
+    Check(
+        "command",
+        lambda request: command_blocked(request.widget, request.robot, request.now),
+        alone=False,
+        alike=True,
+    ),
+    Check("interlocks", lambda request: combined(request.interlocks), alone=False, alike=True),
 )
 
 # Why a receipt says that it was refused, by a verdict's code; "interlock" for all others.
@@ -153,7 +158,7 @@ def judged(
 ) -> Verdict:
     """Whether a widget with these interlocks may be pressed or held now."""
     link = link_verdict(robot, now)
-    permissions = [interlock_verdict(one, robot, now, link) for one in interlocks]
+    permissions = [interlock_verdict(interlock, robot, now, link) for interlock in interlocks]
     return permission(PermissionRequest(widget, robot, now, link, permissions, grounds))
 
 
@@ -163,8 +168,8 @@ def combined(verdicts: Sequence[Verdict]) -> Verdict:
         return PERMITTED
     if len(verdicts) == 1:
         return verdicts[0]
-    locking = [one for verdict in verdicts for one in _each(verdict) if not one.permitted]
-    until = min((one.until for one in verdicts), default=math.inf)
+    locking = [lock for verdict in verdicts for lock in _each(verdict) if not lock.permitted]
+    until = min((verdict.until for verdict in verdicts), default=math.inf)
     if not locking:
         return PERMITTED if until == math.inf else Verdict(True, until=until)
     return replace(locking[0], until=until, others=tuple(locking[1:]))

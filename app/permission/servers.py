@@ -24,11 +24,11 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
     a response is awaited."""
     role, name = call.server_role, call.server_name
     key = robot.key(name)
-    found = robot.graph.server_type(role, key)
-    if found is None:
+    robot_type = robot.graph.server_type(role, key)
+    if robot_type is None:
         return locked("service_unavailable", name=name)
-    if found != call.type:
-        return locked("topic_wrong_type", topic=name, found=found, wanted=call.type)
+    if robot_type != call.type:
+        return locked("topic_wrong_type", topic=name, found=robot_type, wanted=call.type)
     if mismatch := _unfit(role, name, robot):
         return mismatch
     ready_at = robot.graph.since(role, key) + robot.traits.server_settle_s
@@ -65,11 +65,11 @@ def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
 def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
     """Why the parameters of a node can't be read and set, by what the graph shows."""
     for name, wanted in (GET, DESCRIBE, SET):
-        found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
-        if found is None:
+        robot_type = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
+        if robot_type is None:
             return locked("parameter_node_unavailable", node=node)
-        if found != wanted:
-            return locked("topic_wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
+        if robot_type != wanted:
+            return locked("topic_wrong_type", topic=f"{node}/{name}", found=robot_type, wanted=wanted)
         if mismatch := _unfit("SS", f"{node}/{name}", robot):
             return mismatch
     return None

@@ -22,7 +22,7 @@ class Verdict:
     @property
     def reasons(self) -> list[TextLike]:
         """All reasons of a lock, each sentence once."""
-        reasons = (one.reason for one in (self, *self.others))
+        reasons = (verdict.reason for verdict in (self, *self.others))
         return list(dict.fromkeys(reason for reason in reasons if reason))
 
 
