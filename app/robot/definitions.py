@@ -31,8 +31,10 @@ class Difference:
 def difference(graph: LiveGraph, role: Role, key: str, interfaces: Interfaces) -> Difference | None:
     """The first difference of an endpoint of the robot; None if none is known. `role` is the
     robot's."""
-    found = (_difference(one, interfaces) for one in graph.described_endpoints(role, key))
-    return next((one for one in found if one is not None), None)
+    differences = (
+        _difference(endpoint, interfaces) for endpoint in graph.described_endpoints(role, key)
+    )
+    return next((difference for difference in differences if difference is not None), None)
 
 
 def _difference(endpoint: Endpoint, interfaces: Interfaces) -> Difference | None:
@@ -61,12 +63,12 @@ def is_unhashed(graph: LiveGraph, role: Role, key: str) -> bool:
     """Whether an endpoint is there and no hash of it is known: then it can't be compared."""
     known = graph.described_endpoints(role, key)
     present = graph.has_endpoint(role, key)
-    return present and not any(one.hashes for one in known)
+    return present and not any(server.hashes for server in known)
 
 
 @cached_until_change
 def uncallable_dds(graph: LiveGraph, role: Role, key: str) -> str:
     """The DDS of a server that can't be called through its peer; "" if there is none. Of several
     servers one is enough: each of them gets the request."""
-    vendors = (one.dds for one in graph.node_endpoints(role, key))
+    vendors = (endpoint.dds for endpoint in graph.node_endpoints(role, key))
     return next((dds for dds in vendors if dds not in CALLABLE), "")

@@ -180,7 +180,7 @@ class LiveGraph:
         namespace."""
         own = self._namespace
         known = ((zid, self._namespaces[zid]) for zid in self._peers.keys() & self._namespaces.keys())
-        matching = {zid for zid, of in known if own is None or within(own, of)}
+        matching = {zid for zid, namespace in known if own is None or within(own, namespace)}
         return frozenset(matching or self._peers.keys() - self._namespaces.keys())
 
     @property
@@ -191,7 +191,7 @@ class LiveGraph:
     @property
     def namespaces(self) -> set[str]:
         """The namespaces of this robot's peers, as far as they are known."""
-        return {of for zid, of in self._namespaces.items() if zid in self.peers}
+        return {namespace for zid, namespace in self._namespaces.items() if zid in self.peers}
 
     @property
     @cached_until_change

@@ -91,12 +91,12 @@ class Level:
     def put_before(self, buckets: Iterable[Bucket]) -> None:
         """Buckets in order, all older than those here."""
         older = Level(self.width, self.most)
-        for one in list(buckets)[-self.most :]:
-            older.at.append(one.at)
-            older.last.append(one.last)
-            older.low.append(one.low)
-            older.high.append(one.high)
-            older.gaps.append(one.gap)
+        for bucket in list(buckets)[-self.most :]:
+            older.at.append(bucket.at)
+            older.last.append(bucket.last)
+            older.low.append(bucket.low)
+            older.high.append(bucket.high)
+            older.gaps.append(bucket.gap)
         for mine, theirs in zip(self._columns, older._columns, strict=True):
             mine[:0] = theirs
         self.gaps[:0] = older.gaps
@@ -183,14 +183,14 @@ def _reaching(level: Level, begin: float) -> float:
 def _merged(columns: Iterable[Column]) -> Iterator[Column]:
     """Columns in order, each number once: two levels may meet within one."""
     held: Column | None = None
-    for one in columns:
-        if held is not None and one.number <= held.number:
-            low, high = min(held.low, one.low), max(held.high, one.high)
-            held = held._replace(low=low, high=high, last=one.last)
+    for column in columns:
+        if held is not None and column.number <= held.number:
+            low, high = min(held.low, column.low), max(held.high, column.high)
+            held = held._replace(low=low, high=high, last=column.last)
             continue
         if held is not None:
             yield held
-        held = one
+        held = column
     if held is not None:
         yield held
 
@@ -231,12 +231,12 @@ class History:
 
     def columns(self, field: FieldHistory, begin: float, end: float, width: float) -> Sequence[Column]:
         """The columns of a field; `begin` and `end` are by the wall clock."""
-        found: list[Column] = []
+        columns: list[Column] = []
         turn = self.start + self.shift
         if begin < turn and (earlier := min(end, turn, self.start)) > begin:
-            found += field.columns(begin, earlier, width)
+            columns += field.columns(begin, earlier, width)
         if end > turn:
             first, last = max(begin, turn) - self.shift, end - self.shift
             own = field.columns(first, last, width, self.shift, reach=begin > turn)
-            found += [one for one in own if not found or one.number >= found[-1].number]
-        return list(_merged(found))
+            columns += [column for column in own if not columns or column.number >= columns[-1].number]
+        return list(_merged(columns))

@@ -45,7 +45,7 @@ def updated(values: KeyedValues, paths: Iterable[str], fields: Fields, sample: S
 
 def without_source(values: KeyedValues, source: str) -> KeyedValues:
     """The values that did not come from a peer."""
-    return {path: one for path, one in values.items() if one.source not in (source, None)}
+    return {path: value for path, value in values.items() if value.source not in (source, None)}
 
 
 def kept_s(max_age_s: float | None, *, single_publisher: bool = False) -> float:

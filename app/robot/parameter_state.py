@@ -62,9 +62,9 @@ def read_parameter_state(
     described_as = NOT_SET if descriptor is None or descriptor.dynamic_typing else descriptor.type
     if kind == described_as == NOT_SET and not (descriptor is not None and descriptor.dynamic_typing):
         return ParameterState("undeclared", wall=wall)
-    for one in (kind, described_as):
-        if one != NOT_SET and one != PARAMETER_TYPES.index(parameter.type):
-            return ParameterState("mistyped", robot_type=type_name(one), wall=wall)
+    for robot_type in (kind, described_as):
+        if robot_type != NOT_SET and robot_type != PARAMETER_TYPES.index(parameter.type):
+            return ParameterState("mistyped", robot_type=type_name(robot_type), wall=wall)
     if descriptor is None:
         return ParameterState("unreadable", wall=wall)
     return ParameterState(
@@ -85,8 +85,8 @@ def type_name(kind: int) -> str:
 
 def decode_value(parameter: Parameter, value: Any) -> Value:
     """The value in a ParameterValue of the parameter's type."""
-    found: Any = getattr(value, _value_field(parameter))
-    return tuple(found[: MAX_LIST_LENGTH + 1]) if parameter.is_list else found
+    reported: Any = getattr(value, _value_field(parameter))
+    return tuple(reported[: MAX_LIST_LENGTH + 1]) if parameter.is_list else reported
 
 
 def encode_value(parameter: Parameter, value: Value) -> dict[str, Any]:
@@ -115,8 +115,8 @@ def described_range(parameter: Parameter, descriptor: Any) -> Range:
     )
     if not parameter.has_numbers or not ranges:
         return UNLIMITED
-    one = ranges[0]
-    return Range(_finite(one.from_value), _finite(one.to_value), _finite(one.step) or None)
+    limits = ranges[0]
+    return Range(_finite(limits.from_value), _finite(limits.to_value), _finite(limits.step) or None)
 
 
 def _finite(number: float) -> float | None:
@@ -127,7 +127,7 @@ def panel_range(parameter: Parameter) -> Range:
     """The range that the panel file allows."""
     limits = (parameter.min, parameter.max, parameter.step)
     if parameter.element_type == "integer":
-        return Range(*(None if one is None else int(one) for one in limits))
+        return Range(*(None if limit is None else int(limit) for limit in limits))
     return Range(*limits)
 
 
@@ -140,8 +140,8 @@ def has_allowed_value(parameter: Parameter, known: ParameterState) -> bool:
     """Whether both the node and the panel file allow at least one value."""
     if not (parameter.options and parameter.has_numbers):
         return not allowed_range(parameter, known).is_empty
-    values = (one.value if parameter.is_list else [one.value] for one in parameter.options)
-    return any(all(known.range.contains(one) for one in several) for several in values)
+    values = (option.value if parameter.is_list else [option.value] for option in parameter.options)
+    return any(all(known.range.contains(value) for value in several) for several in values)
 
 
 def panel_limits_text(parameter: Parameter) -> TextLike:

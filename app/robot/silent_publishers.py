@@ -86,7 +86,7 @@ class SilentPublishers:
 
     def remove_peer(self, peer: str) -> None:
         """A peer was lost. Its silent publishers count until any newer message arrives."""
-        self._late = {one for one in self._late if one[1] != peer}
+        self._late = {late for late in self._late if late[1] != peer}
         for silent in self._silent.values():
             if peer in silent:
                 silent[None] = max(silent.pop(peer), silent.get(None, 0))

@@ -44,10 +44,10 @@ class Slices:
 
     def read_until(self, walk: Walk[Result], until: float) -> Result | None:
         """The same until a time (monotonic seconds)."""
-        while (found := walk.advance()) is None:
+        while (result := walk.advance()) is None:
             if self._now() >= until:
                 return None
-        return found
+        return result
 
     def schedule(self, go_on: Resume) -> None:
         """Calls it once a turn, from the next turn on, until it returns true."""

@@ -125,9 +125,9 @@ class RobotState:
         """(key, topic) of each topic that the panel subscribes to."""
         fields = panel.subscribed_fields()
         lossless = {condition.topic for condition in panel.conditions}
-        lossless |= {one.topic for one in panel.confirmations()}
+        lossless |= {confirm.topic for confirm in panel.confirmations()}
         subscribed = panel.subscriptions()
-        for topic, key in ((one, key) for one in subscribed for key in self.possible_keys(one)):
+        for topic, key in ((name, key) for name in subscribed for key in self.possible_keys(name)):
             type_name, paths = subscribed[topic], fields.get(topic, ())
             made = Topic(
                 self._interfaces.field_reader(type_name, paths),
@@ -222,7 +222,7 @@ class RobotState:
     def publishers(self, key: str) -> Publishers:
         """The publishers of a condition's topic, as they are known now."""
         known = self.topic_publishers.of_topic(key, self.graph)
-        nodes = {one.node for one in self.graph.node_endpoints("MP", key)}
+        nodes = {endpoint.node for endpoint in self.graph.node_endpoints("MP", key)}
         return Publishers(max(known.number, len(nodes)), tuple(sorted({*known.nodes, *nodes})))
 
     def drop_misread(self) -> None:
@@ -254,10 +254,10 @@ class RobotState:
     def reading_by_key(self, key: str) -> Reading:
         """The same by the topic's key."""
         known = self._topics[key]
-        found, sample = known.reading(), known.sample
+        reading, sample = known.reading(), known.sample
         if sample is None or self.is_from_peer(key, sample.source):
-            return found
-        return replace(found, status="cut")
+            return reading
+        return replace(reading, status="cut")
 
     def is_from_peer(self, key: str, source: str | None) -> bool:
         """Whether a sample's source is a peer that is there: one of this robot, or any for a topic

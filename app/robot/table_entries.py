@@ -112,14 +112,14 @@ class TableEntries:
             if isinstance(w, Table)
         }
         self._by_key: dict[str, list[_Entries]] = {}
-        for one in self._tables.values():
-            self._by_key.setdefault(key_of(one.table.topic), []).append(one)
+        for table_state in self._tables.values():
+            self._by_key.setdefault(key_of(table_state.table.topic), []).append(table_state)
         self.keys = frozenset(self._by_key)
 
     def record_sample(self, key: str, sample: Sample) -> None:
         """A sample was received: it is decoded in the next turns."""
-        for one in self._by_key[key]:
-            one.add(sample)
+        for table_state in self._by_key[key]:
+            table_state.add(sample)
         if not self._scheduled:
             self._scheduled = True
             self._slices.schedule(self._decode)
@@ -131,11 +131,11 @@ class TableEntries:
     def _decode(self, until: float) -> bool:
         """Decodes until a time (monotonic seconds); returns whether nothing is left."""
         for key, tables in self._by_key.items():
-            pending = [one for one in tables if one.is_pending]
-            before = [one.shown for one in pending]
-            for one in pending:
-                one.decode_one(self._slices, until)
-            if before != [one.shown for one in pending]:
+            pending = [table_state for table_state in tables if table_state.is_pending]
+            before = [table_state.shown for table_state in pending]
+            for table_state in pending:
+                table_state.decode_one(self._slices, until)
+            if before != [table_state.shown for table_state in pending]:
                 self._on_decoded(key)
-        self._scheduled = any(one.is_pending for one in self._tables.values())
+        self._scheduled = any(table_state.is_pending for table_state in self._tables.values())
         return not self._scheduled

@@ -51,7 +51,9 @@ def _first(table: Table, entries: Sequence[TableEntry]) -> Sequence[TableEntry]:
     if sort is None:
         return entries[:most]
     if sort.by is None:
-        newest = heapq.nlargest(most, enumerate(entries), key=lambda one: (one[1].at, one[0]))
+        newest = heapq.nlargest(
+            most, enumerate(entries), key=lambda numbered: (numbered[1].at, numbered[0])
+        )
         return [entry for _, entry in newest]
     at = table.own_fields.index(sort.by)
     known = [entry for entry in entries if not _is_unknown(entry.values[at])]

@@ -52,8 +52,8 @@ class TopicPublishers:
     def of_topic(self, key: str, graph: LiveGraph) -> Publishers:
         """The publishers behind the present peers. Two bridges of one domain know the same ones; a
         peer that does not know them has those that it announces."""
-        known = [one for one in self._known.get(key, ()) if one.peer in graph.peers]
-        nodes = {one.guid: one.nodes for one in sorted(known)}
-        others = graph.peers_with("MP", key) - {one.peer for one in known}
+        known = [publisher for publisher in self._known.get(key, ()) if publisher.peer in graph.peers]
+        nodes = {publisher.guid: publisher.nodes for publisher in sorted(known)}
+        others = graph.peers_with("MP", key) - {publisher.peer for publisher in known}
         names = sorted(name for several in nodes.values() for name in several)
         return Publishers(len(nodes) + len(others), tuple(names))
