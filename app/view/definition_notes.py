@@ -25,8 +25,8 @@ def _notes(graph: LiveGraph, robot: RobotState) -> TextLike:
     unhashed: list[str] = []
     for role, name in robot.presence.required:
         key = robot.key(name)
-        if (found := robot.difference(role, key)) is not None:
-            differing[name] = found
+        if (difference := robot.difference(role, key)) is not None:
+            differing[name] = difference
         elif not graph.is_simulated and _can_not_be_compared(graph, role, key):
             unhashed.append(name)
     return joined([*_differences(differing, robot), *_unhashed(unhashed)], "between_lines")
@@ -37,19 +37,19 @@ def _can_not_be_compared(graph: LiveGraph, role: Role, key: str) -> bool:
     return is_read and is_unhashed(graph, role, key) and not uncallable_dds(graph, role, key)
 
 
-def _differences(found: dict[str, Difference], robot: RobotState) -> Iterator[TextLike]:
-    for name, of in [*found.items()][:NAMED_MOST]:
+def _differences(differing: dict[str, Difference], robot: RobotState) -> Iterator[TextLike]:
+    for name, difference in [*differing.items()][:NAMED_MOST]:
         yield say(
             "link_definition_hashes",
             name=name,
-            type=of.type,
-            node=of.node or say("link_definition_node_unknown"),
-            theirs=of.theirs,
-            ours=of.ours,
-            source=robot.definition_source(of.type),
+            type=difference.type,
+            node=difference.node or say("link_definition_node_unknown"),
+            theirs=difference.theirs,
+            ours=difference.ours,
+            source=robot.definition_source(difference.type),
         )
-    if len(found) > NAMED_MOST:
-        yield say("link_definitions_more", number=len(found) - NAMED_MOST)
+    if len(differing) > NAMED_MOST:
+        yield say("link_definitions_more", number=len(differing) - NAMED_MOST)
 
 
 def _unhashed(names: list[str]) -> Iterator[TextLike]:

@@ -210,8 +210,8 @@ def written_number(value: float, style: str | None = None, unit: str | PanelText
     return number(text, unit)
 
 
-def _formatted(value: float, given: str) -> str:
-    text = format(value, given)  # "inf%" where a percentage is larger than any float
+def _formatted(value: float, style: str) -> str:
+    text = format(value, style)  # "inf%" where a percentage is larger than any float
     return text if len(text) <= LONGEST_NUMBER and "inf" not in text else f"{value:.6g}"
 
 

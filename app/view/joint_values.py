@@ -34,13 +34,13 @@ def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any
         "joint_bars": list(bars),
         "joint_levels": list(levels),
     }
-    return attributes, min(one.until for one in fields)
+    return attributes, min(field.until for field in fields)
 
 
 def _whole(fields: list[FieldState]) -> FieldState:
     """The state of the widget: live while a joint is, as several nodes may publish parts of an arm."""
-    known = [one for one in fields if one.state != "missing" and not is_nan(one.value)]
-    return next((one for one in known if one.state == "live"), known[0] if known else fields[0])
+    known = [field for field in fields if field.state != "missing" and not is_nan(field.value)]
+    return next((field for field in known if field.state == "live"), known[0] if known else fields[0])
 
 
 def _field(widget: Joints, joint: Joint) -> FieldOf:
@@ -88,10 +88,10 @@ def _level(joint: Joint, value: float) -> tuple[str, float]:
 
 
 def _hardest(levels: tuple[str, ...], words: tuple[TextLike, ...]) -> TextLike:
-    found = sorted(
+    states = sorted(
         (LEVELS.index(level), number) for number, level in enumerate(levels) if level in LEVELS
     )
-    if not found:
+    if not states:
         return ""
-    first = words[found[0][1]]
-    return first if len(found) == 1 else say("joint_more", first=first, number=len(found) - 1)
+    first = words[states[0][1]]
+    return first if len(states) == 1 else say("joint_more", first=first, number=len(states) - 1)

@@ -84,29 +84,29 @@ def all_reasons(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
     return {"reasons": joined(reasons, "between_lines"), "more": more}
 
 
-def progress(of: CommandStatus) -> Attributes:
+def progress(status: CommandStatus) -> Attributes:
     """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
     is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
     both "" where there is none. `doing` says how far a goal is that is under way."""
     return {
-        "busy": of.busy,
-        "outcome": of.outcome,
-        "result": of.text,
-        "progress": of.fraction,
-        "stoppable": of.can_cancel,
-        "goal": of.goal,
-        "doing": _doing(of),
-        "press": of.press,
+        "busy": status.busy,
+        "outcome": status.outcome,
+        "result": status.text,
+        "progress": status.fraction,
+        "stoppable": status.can_cancel,
+        "goal": status.goal,
+        "doing": _doing(status),
+        "press": status.press,
     }
 
 
-def _doing(of: CommandStatus) -> TextLike:
-    if not of.busy or of.goal not in UNDER_WAY:
+def _doing(status: CommandStatus) -> TextLike:
+    if not status.busy or status.goal not in UNDER_WAY:
         return ""
-    state = say(UNDER_WAY[of.goal])
-    if of.fraction is None:
+    state = say(UNDER_WAY[status.goal])
+    if status.fraction is None:
         return state
-    return say("goal_state_percent", state=state, percent=int(100 * of.fraction))
+    return say("goal_state_percent", state=state, percent=int(100 * status.fraction))
 
 
 def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> AttributesUntil:
@@ -140,23 +140,23 @@ def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> A
 
 
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
-    Static: lambda of, robot, verdict, now: ({}, math.inf),
-    Input: lambda of, robot, verdict, now: ({}, math.inf),
-    Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),
+    Static: lambda widget, robot, verdict, now: ({}, math.inf),
+    Input: lambda widget, robot, verdict, now: ({}, math.inf),
+    Numeric: lambda widget, robot, verdict, now: ({"limits": widget.limits_text}, math.inf),
     PressCommand: _pressed,
     PublishPress: _published,
     Step: _stepped,
     HoldCommand: _held,
     Parameter: _parameter,
-    Display: lambda of, robot, verdict, now: value(of, robot, now),
-    Readout: lambda of, robot, verdict, now: readout(of, robot, now),
-    Camera: lambda of, robot, verdict, now: camera(of, robot, now),
-    LogView: lambda of, robot, verdict, now: log(of, robot),
-    Indicator: lambda of, robot, verdict, now: indicator(of, robot, now),
-    MachineState: lambda of, robot, verdict, now: machine_state(of, robot, now),
-    Gauge: lambda of, robot, verdict, now: gauge(of, robot, now),
-    Joints: lambda of, robot, verdict, now: joints(of, robot, now),
-    Table: lambda of, robot, verdict, now: table(of, robot, now),
-    Trend: lambda of, robot, verdict, now: trend(of, robot, now),
+    Display: lambda widget, robot, verdict, now: value(widget, robot, now),
+    Readout: lambda widget, robot, verdict, now: readout(widget, robot, now),
+    Camera: lambda widget, robot, verdict, now: camera(widget, robot, now),
+    LogView: lambda widget, robot, verdict, now: log(widget, robot),
+    Indicator: lambda widget, robot, verdict, now: indicator(widget, robot, now),
+    MachineState: lambda widget, robot, verdict, now: machine_state(widget, robot, now),
+    Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
+    Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
+    Table: lambda widget, robot, verdict, now: table(widget, robot, now),
+    Trend: lambda widget, robot, verdict, now: trend(widget, robot, now),
 }
 require_rows("attributes", ATTRIBUTES, BaseWidget)

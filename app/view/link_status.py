@@ -142,22 +142,25 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
     the last message of an interlock is older than the panel allows. "" if no node is silent. A topic
     that is only displayed may be published on events; its display shows its age."""
     until = math.inf
-    for of in panel.interlocks:
-        if of.max_age_s is None:
+    for interlock in panel.interlocks:
+        if interlock.max_age_s is None:
             continue
-        key, reading = robot.key(of.topic), robot.reading(of.topic).of_field(of.field, math.inf)
+        key, reading = (
+            robot.key(interlock.topic),
+            robot.reading(interlock.topic).of_field(interlock.field, math.inf),
+        )
         if reading.status not in ("message", "unreadable") or not robot.graph.has_endpoint("MP", key):
             continue
-        if topic_mismatch("MS", of, robot):
+        if topic_mismatch("MS", interlock, robot):
             continue
-        stale_at = reading.at + of.max_age_s
+        stale_at = reading.at + interlock.max_age_s
         if now >= stale_at:
-            limit = number(f"{of.max_age_s:g}")
-            if has_key(of.field):
+            limit = number(f"{interlock.max_age_s:g}")
+            if has_key(interlock.field):
                 return say(
-                    "link_node_stale_field", field=of.field, topic=of.topic, limit=limit
+                    "link_node_stale_field", field=interlock.field, topic=interlock.topic, limit=limit
                 ), math.inf
-            return say("link_node_stale", topic=of.topic, limit=limit), math.inf
+            return say("link_node_stale", topic=interlock.topic, limit=limit), math.inf
         until = min(until, stale_at)
     return "", until
 
@@ -167,7 +170,7 @@ def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str])
     by_verdict: dict[int, bool] = {}  # many commands have one verdict
     for verdict in verdicts.values():
         if id(verdict) not in by_verdict:
-            by_verdict[id(verdict)] = any(one.code in codes for one in _all(verdict))
+            by_verdict[id(verdict)] = any(part.code in codes for part in _all(verdict))
     if not any(by_verdict.values()):
         return []
     return [w.label for w in panel.commands if w.id in verdicts and by_verdict[id(verdicts[w.id])]]
@@ -188,8 +191,8 @@ def locks(names: Sequence[TextLike]) -> Text:
 
 
 def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:
-    every = (one for verdict in verdicts.values() for one in _all(verdict))
-    return next((one for one in every if one.code in codes), PERMITTED)
+    every = (part for verdict in verdicts.values() for part in _all(verdict))
+    return next((part for part in every if part.code in codes), PERMITTED)
 
 
 def _all(verdict: Verdict) -> tuple[Verdict, ...]:

@@ -88,14 +88,14 @@ def _beginning(value: Value) -> Value:
         return value[: MAX_TEXT + 1]
     if not isinstance(value, tuple):
         return value
-    found: list[Scalar] = []
+    elements: list[Scalar] = []
     size = 0
-    for one in value:
-        found.append(one[: MAX_TEXT + 1] if isinstance(one, str) else one)
-        size += len(one) if isinstance(one, str) else 1
+    for element in value:
+        elements.append(element[: MAX_TEXT + 1] if isinstance(element, str) else element)
+        size += len(element) if isinstance(element, str) else 1
         if size > MAX_TEXT:
             break
-    return tuple(found)
+    return tuple(elements)
 
 
 def never_received(known: ParameterState) -> bool:
@@ -123,9 +123,13 @@ def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Tex
         case "undeclared":
             return say("parameter_not_declared", node=parameter.node)
         case "mistyped":
-            name, found = parameter.parameter, known.robot_type
+            name, robot_type = parameter.parameter, known.robot_type
             return say(
-                "parameter_mistyped", name=name, node=parameter.node, found=found, wanted=parameter.type
+                "parameter_mistyped",
+                name=name,
+                node=parameter.node,
+                found=robot_type,
+                wanted=parameter.type,
             )
         case "unreadable":
             return say("parameter_unreadable", node=parameter.node, name=parameter.parameter)
@@ -147,7 +151,7 @@ def _entry(parameter: Parameter, value: Value | None) -> bool | TextLike:
     if parameter.options and value is not None:
         return "" if (option := parameter.find_option(value)) is None else option.key
     several = value if isinstance(value, tuple) else (value,)
-    unusual = any(isinstance(one, float) and not math.isfinite(one) for one in several)
+    unusual = any(isinstance(element, float) and not math.isfinite(element) for element in several)
     if value is None or unusual or len(several) > MAX_LIST_LENGTH:
         return ""
     if isinstance(value, bool):

@@ -172,7 +172,7 @@ class ViewPublisher:
         if not page:
             return widgets
         shown = self._pages[page]
-        return {name: one for name, one in widgets.items() if name in shown}
+        return {name: attributes for name, attributes in widgets.items() if name in shown}
 
     def _shared_event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
         """An event that does not depend on what a stream sent before; encoded once. `data` is a part of

@@ -61,7 +61,9 @@ SECTIONS: Final = (
     Section("notice", whole, "sections/notice.html"),
     Section("robots", whole, "sections/robots.html"),
     Section("state", whole),
-    Section("control", whole, "sections/control.html", lambda of: of["required"], place="header"),
+    Section(
+        "control", whole, "sections/control.html", lambda control: control["required"], place="header"
+    ),
 )
 
 

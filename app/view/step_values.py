@@ -25,5 +25,5 @@ def step(widget: Step, robot: RobotState, now: float) -> tuple[dict[str, Any], f
 
 
 def _target(widget: Step, base: float | None, steps: int) -> str:
-    found = None if base is None else widget.target(base, steps)
-    return "" if found is None else number_text(float(found))
+    target = None if base is None else widget.target(base, steps)
+    return "" if target is None else number_text(float(target))

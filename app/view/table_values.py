@@ -72,7 +72,10 @@ def _age(widget: Table, entry: TableEntry, now: float) -> tuple[TextLike, float]
 def _constants(widget: Table, robot: RobotState) -> list[tuple[Column, ColumnField, Mapping[str, Any]]]:
     """The columns with their fields and the constants of these."""
     fields = ((column, widget.column_field(column)) for column in widget.columns)
-    return [(column, of, {} if of.constants is None else robot.constants(of)) for column, of in fields]
+    return [
+        (column, field, {} if field.constants is None else robot.constants(field))
+        for column, field in fields
+    ]
 
 
 def _cells(
@@ -84,15 +87,15 @@ def _cells(
     """The cells of a row, and when they change."""
     cells: list[dict[str, TextLike]] = []
     until = math.inf
-    for column, of, constants in columns:
+    for column, field, constants in columns:
         value = entry.values[widget.own_fields.index(column.field)]
         cell: tuple[TextLike, str, str] = (NOTHING, "", "")
-        if value is not None and of.states:
-            cell = lamp_of(of.states, value)
-        elif style := time_style(of.format, value):
-            text, changes_in = shown_time(of, style, value, entry.wall + now - entry.at)
+        if value is not None and field.states:
+            cell = lamp_of(field.states, value)
+        elif style := time_style(field.format, value):
+            text, changes_in = shown_time(field, style, value, entry.wall + now - entry.at)
             cell, until = (text, "", ""), min(until, now + changes_in)
         elif value is not None:
-            cell = (cell_text(of, value, constants), "", "")
+            cell = (cell_text(field, value, constants), "", "")
         cells.append(dict(zip(("text", "shape", "colour"), cell, strict=True)))
     return cells, until

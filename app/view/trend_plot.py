@@ -104,10 +104,10 @@ def pen_columns(
     """The columns of a pen, in its unit."""
     history: History = robot.history
     field = history.fields[robot.key(pen.topic), pen.field]
-    found = history.columns(field, begin, end, width)
+    columns = history.columns(field, begin, end, width)
     if (pen.scale, pen.offset) == (1.0, 0.0):
-        return found
-    return [_scaled(column, pen) for column in found]
+        return columns
+    return [_scaled(column, pen) for column in columns]
 
 
 def _scaled(column: Column, pen: Pen) -> Column:
@@ -140,7 +140,7 @@ def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: 
         for value, letter in ((pen.high, "H"), (pen.low, "L"))
         if value is not None
     ]
-    lines = [_line(one, begin, end, width, place) for one in columns]
+    lines = [_line(column, begin, end, width, place) for column in columns]
     ticks = [Tick(place(value), number(text)) for value, text in value_ticks(low, high)]
     return Plot(lines, ticks, list(time_ticks(begin, end)), limits, bands)
 
@@ -226,18 +226,20 @@ def _line(columns: Sequence[Column], begin: float, end: float, width: float, pla
     parts: list[str] = []
     last = 0.0
     x = y = None
-    for one in columns:
-        at = ((one.number + 0.5) * width - begin) / (end - begin)
+    for column in columns:
+        at = ((column.number + 0.5) * width - begin) / (end - begin)
         x = round(min(at, 1.0) * SIZE, 1)
         values = (
-            [one.low, one.high] if abs(last - one.low) <= abs(last - one.high) else [one.high, one.low]
+            [column.low, column.high]
+            if abs(last - column.low) <= abs(last - column.high)
+            else [column.high, column.low]
         )
-        if one.low == one.high:
-            values = [one.low]
-        elif values[-1] != one.last:
-            values.append(one.last)
+        if column.low == column.high:
+            values = [column.low]
+        elif values[-1] != column.last:
+            values.append(column.last)
         points = [f"{x:g} {place(value) * SIZE / 100:g}" for value in values]
-        parts.append(f"M{points[0]}h0" if one.gap or not parts else f"L{points[0]}")
+        parts.append(f"M{points[0]}h0" if column.gap or not parts else f"L{points[0]}")
         parts += [f"L{point}" for point in points[1:]]
-        last = y = one.last
+        last = y = column.last
     return Line("".join(parts), None if x is None else x / SIZE * 100, 0.0 if y is None else place(y))

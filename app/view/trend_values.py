@@ -16,15 +16,15 @@ def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any],
     shown: dict[str, Any] = {}
     state, until = "live", math.inf
     notes: list[TextLike] = []
-    for number, (pen, one) in enumerate(zip(widget.pens, widget.readouts, strict=True)):
-        field = field_state(one, robot, now)
+    for number, (pen, readout_widget) in enumerate(zip(widget.pens, widget.readouts, strict=True)):
+        field = field_state(readout_widget, robot, now)
         until = min(until, field.until)
         if is_nan(field.value) and field.state == "live":
             notes.append(say("trend_pen", label=pen.label, note=field.note))
         elif field.state != "live":
             state = field.state if state == "live" else state
             notes.append(say("trend_pen", label=pen.label, note=field.note))
-        shown[f"text{number}"] = readout(one, robot, now)[0]["text"]
+        shown[f"text{number}"] = readout(readout_widget, robot, now)[0]["text"]
         shown[f"state{number}"] = _state(pen, field)
     note = joined(dict.fromkeys(notes))
     fault = robot.history.fault if widget.disk else ""

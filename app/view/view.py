@@ -174,10 +174,10 @@ def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
         return {name: overlay.get(name, value) for name, value in attributes.items()}
 
     view = current.view.copy()
-    view["interlocks"] = {name: locked(one) for name, one in view["interlocks"].items()}
-    view["widgets"] = {name: locked(one) for name, one in view["widgets"].items()}
+    view["interlocks"] = {name: locked(state) for name, state in view["interlocks"].items()}
+    view["widgets"] = {name: locked(attributes) for name, attributes in view["widgets"].items()}
     view["state"] = UNKNOWN
-    without = {name: locked(one) for name, one in current.without_control.items()}
+    without = {name: locked(attributes) for name, attributes in current.without_control.items()}
     return current._replace(view=view, without_control=without)
 
 
