@@ -46,6 +46,7 @@ COMMON = {
     "app.bounded",
     "app.clock",
     "app.concurrency",
+    "app.disk_writer",
     "app.errors",
     "app.i18n",
     "app.i18n.__main__",

@@ -18,18 +18,17 @@ from typing import Final
 from app.audit.data_dir import DataDir
 from app.audit.database import Head
 from app.audit.entry import Entry, Origin
+from app.audit.log_writer import LogWriter
 from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
 from app.audit.readers import Readers
 from app.audit.refusal_quota import SUMMARY_INTERVAL_S, RefusalQuota
 from app.audit.ticket import Limits, Results, Ticket
-from app.audit.writer_thread import WriterThread
 from app.errors import LogError
 from app.i18n import ENGLISH, TextLike, number, say
 
 log = logging.getLogger("kiosk.log")
 
-MOST_WAITING: Final = 1000
 PRESSED_WITHIN_S: Final = 2.0  # if the entry takes longer, the press is not sent
 CLOSED_WITHIN_S: Final = 3.0  # then the receipt is sent with a note that it is not on the disk
 ENDED_WITHIN_S: Final = 10.0
@@ -48,9 +47,7 @@ class OperatorLog:
         self._loop = asyncio.get_running_loop()
         self._refusals = RefusalQuota()
         self._summary_timer: asyncio.TimerHandle | None = None
-        self._writer = WriterThread(
-            self._folder, limits, secrets.token_hex(4), mode, self._post_results
-        )
+        self._writer = LogWriter(self._folder, limits, secrets.token_hex(4), mode, self._post_results)
 
     async def start(self) -> None:
         """Opens the log; FolderInUse if another server has the folder. Any other error becomes `fault`,
@@ -58,7 +55,7 @@ class OperatorLog:
         with suppress(OSError):  # the writer thread meets the same error and reports it
             await self._folder.hold_soon()
         self._writer.start()
-        await self._wait_on_thread(self._writer.tried.wait)
+        await self._wait_on_thread(self._writer.wait_until_tried)
 
     async def stop(self) -> None:
         """Writes the waiting entries and releases the folder."""
@@ -174,7 +171,7 @@ class OperatorLog:
 
     def _write_summary(self) -> None:
         for entry in self._refusals.summary_due():
-            self._writer.add(Ticket(entry, self._loop.create_future()), None)
+            self._writer.add(Ticket(entry, self._loop.create_future()), bounded=False)
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
         """The newest `count` entries that match, before the entry number `before`; LogError,
@@ -233,7 +230,7 @@ class OperatorLog:
         """Queues an entry for the writer thread. If the queue is full, only new presses are rejected:
         the number of their results is limited by the number of presses."""
         ticket = Ticket(entry, self._loop.create_future())
-        if not self._writer.add(ticket, MOST_WAITING if entry.of is None else None):
+        if not self._writer.add(ticket, bounded=entry.of is None):
             raise LogError(say("log_queue_full"))
         return ticket
 

@@ -31,13 +31,14 @@ class Ticket:
     """An entry to be written; `result` is the entry as written, or the reason why it was not.
 
     A press has its result when it is committed, any other entry when it is on the disk. `waiter` is
-    done then, or at a timeout.
+    done then, or at a timeout. `answered`: the writer has reported its result.
     """
 
     entry: Entry
     waiter: "asyncio.Future[None]"
     result: Entry | LogError | Repeated | None = None
     abandoned: bool = False
+    answered: bool = False
 
     def wake(self) -> None:
         """Ends the waiting for this entry."""

@@ -2,14 +2,14 @@
 
 import asyncio
 import logging
-import queue
-import threading
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from app.errors import os_error_text
+from app.disk_writer import DiskWriter
+from app.errors import LogError, os_error_text
 from app.i18n import TextLike, say
 from app.recording.directory import RecordingDirectory
 from app.recording.mcap_file import Channel, McapFile
@@ -38,25 +38,22 @@ class Recordings:
         self.ring_bytes = min(
             MAX_RING_BYTES // robots, self.file_bytes // 2
         )  # half is for samples after the press
-        self._queue: queue.SimpleQueue[tuple[int, Work | None]] = queue.SimpleQueue()
-        self._count_lock = threading.Lock()
-        self._queued_bytes = 0
+        # One at a time: each holds its samples until it is done.
+        self._writer: DiskWriter[Work] = DiskWriter(
+            "recordings", self, most=MAX_QUEUED_BYTES, batch_most=1
+        )
         self._open = 0
         self.fault: TextLike = ""
         self._listeners: list[Callable[[], None]] = []
         self._loop = asyncio.get_running_loop()
-        self._thread = threading.Thread(target=self._run, name="recordings", daemon=True)
 
     def start(self) -> None:
         """Starts the thread, which first prepares the folder."""
-        self.enqueue(0, self._prepare)
-        self._thread.start()
+        self._writer.start()
 
     def stop(self) -> None:
         """Writes what is queued; blocks for `STOP_TIMEOUT_S` at most."""
-        self._queue.put((0, None))
-        self._thread.join(STOP_TIMEOUT_S)
-        if self._thread.is_alive():
+        if not self._writer.close(STOP_TIMEOUT_S):
             log.error("the disk is too slow: a recording is left unfinished")
 
     def add_listener(self, listener: Callable[[], None]) -> None:
@@ -65,12 +62,7 @@ class Recordings:
 
     def enqueue(self, size: int, work: Work) -> bool:
         """Queues `work`, which holds `size` bytes, for the thread; False if the queue is full."""
-        with self._count_lock:
-            if size and self._queued_bytes + size > MAX_QUEUED_BYTES:
-                return False
-            self._queued_bytes += size
-        self._queue.put((size, work))
-        return True
+        return self._writer.put(work, size, bounded=size > 0)
 
     def begin(
         self, name: str, channels: Mapping[str, Channel], about: Mapping[str, str]
@@ -78,7 +70,35 @@ class Recordings:
         """A new recording; `channels` are by key."""
         return Recording(self, name, channels, about)
 
-    # Below: on the thread.
+    # On the thread: `DiskFile`. A fault ends one recording, and never closes the folder.
+
+    def open(self) -> None:
+        """Prepares the folder."""
+        try:
+            self._folder.open()
+        except Exception as error:
+            self.report_failure(error)
+
+    def write(self, items: Sequence[Work]) -> None:
+        for work in items:
+            try:
+                work()
+            except Exception:  # an error in one recording must not end the others
+                log.exception("recording failed")
+
+    def refuse(self, items: Sequence[Work], error: LogError) -> None:
+        """`write` never fails."""
+
+    def tidy(self, quiet: bool) -> None:
+        """Each new file makes room for itself."""
+
+    def idle_s(self) -> float:
+        return math.inf
+
+    def close(self, error: LogError | None) -> None:
+        """Each recording closes its file."""
+
+    # Below: on the thread, by recordings.
 
     def open_file(self, name: str, about: Mapping[str, str]) -> McapFile:
         self._folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -102,25 +122,6 @@ class Recordings:
         why = os_error_text(error) if isinstance(error, OSError) else str(error)
         log.error("recording stopped, in %s: %s", self._folder.path, why)
         self._set_fault(say("recording_failed", why=why))
-
-    def _prepare(self) -> None:
-        try:
-            self._folder.open()
-        except Exception as error:
-            self.report_failure(error)
-
-    def _run(self) -> None:
-        while True:
-            size, work = self._queue.get()
-            if work is None:
-                return
-            try:
-                work()
-            except Exception:  # an error in one recording must not end the thread
-                log.exception("recording failed")
-            del work  # releases its samples
-            with self._count_lock:
-                self._queued_bytes -= size
 
     def _set_fault(self, fault: TextLike) -> None:
         if fault != self.fault:

@@ -1,22 +1,21 @@
-"""The thread that writes histories to disk, and reads them at the start.
+"""Histories on disk: read at the start, and written by a thread (`DiskWriter`).
 
-The event loop never waits for the disk. What could not be written stays due: histories go on in memory,
-and are written as soon as the disk takes them again.
+What could not be written stays due: histories go on in memory, and are written as soon as the disk
+takes them again.
 """
 
 import asyncio
 import logging
 import math
-import queue
-import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from app.audit.database import as_log_error
+from app.disk_writer import DiskWriter
 from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, say
 from app.panel.model import Panel
@@ -31,9 +30,10 @@ WRITE_EVERY_S: Final = 5.0
 LOAD_TIMEOUT_S: Final = 5.0  # the panel starts without earlier values if the disk takes longer
 STOP_TIMEOUT_S: Final = 5.0
 MOST_ROWS: Final = 500  # of a level, in one transaction
+MOST_TRANSACTIONS: Final = 2  # that wait: the last one, and all that is due at the end
 REMOVE_EVERY: Final = 120  # transactions
 
-Given = TypeVar("Given")
+Argument = TypeVar("Argument")
 Loaded = dict[tuple[FieldName, int], list[Bucket]]
 
 
@@ -46,6 +46,15 @@ class StoredField(NamedTuple):
 
     def keep_s(self, level: Level) -> float:
         return min(self.field.keep_s, level.width * level.most)
+
+
+class Transaction(NamedTuple):
+    """Buckets to be written at once. `newest` is the time of the last one of each level, by the level's
+    identity; `now` is the wall clock's time."""
+
+    rows: Rows
+    newest: dict[int, float]
+    now: float
 
 
 def _by_wall_clock(buckets: Iterable[Bucket], history: History) -> list[Bucket]:
@@ -66,14 +75,16 @@ class TrendDisk:
         self._listeners: list[tuple[History, Callable[[], None]]] = []
         self._saved: dict[int, float] = {}  # by the level's identity: the time of the last bucket
         self._loop = asyncio.get_running_loop()
-        self._queue: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._writer: DiskWriter[Transaction] = DiskWriter("trends", self, most=MOST_TRANSACTIONS)
         self._file: TrendFile | None = None
+        self._loaded: Loaded = {}
+        self._is_delivered = False  # `_loaded`, or what could be read of it
+        self._has_loaded: asyncio.Future[None] = self._loop.create_future()
         self._fault: TextLike = ""
         self._busy = False
         self._more = False  # whether one transaction does not take all that is due
         self._transactions = 0
         self._timer: asyncio.TimerHandle | None = None
-        self._thread = threading.Thread(target=self._run, name="trends", daemon=True)
 
     def add(self, robot_id: str, robot: RobotState, show: Callable[[], None]) -> None:
         """Keeps a robot's fields; `show` is called when the history's `fault` has changed."""
@@ -86,19 +97,10 @@ class TrendDisk:
 
     async def start(self) -> None:
         """Starts the thread and loads what was kept."""
-        self._thread.start()
-        done: asyncio.Future[None] = self._loop.create_future()
-
-        def loaded(found: Loaded) -> None:
-            self._take(found)
-            if not done.done():
-                done.set_result(None)
-
-        now = time.time()
-        self._queue.put(lambda: self._call(loaded, self._load(now)))
+        self._writer.start()
         try:
             async with asyncio.timeout(LOAD_TIMEOUT_S):
-                await done
+                await self._has_loaded
         except TimeoutError:
             log.error("%s takes too long: trends begin without earlier values", self._folder)
         self._timer = self._loop.call_later(WRITE_EVERY_S, self._tick)
@@ -108,9 +110,7 @@ class TrendDisk:
         if self._timer is not None:
             self._timer.cancel()
         self._submit(everything=True)
-        self._queue.put(None)
-        await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
-        if self._thread.is_alive():
+        if not await asyncio.to_thread(self._writer.close, STOP_TIMEOUT_S):
             log.error("the disk is too slow: the last values of trends were not written")
 
     def _tick(self) -> None:
@@ -136,20 +136,20 @@ class TrendDisk:
                     more = more or len(due) == most
         if rows:
             self._busy, self._more = True, more
-            self._queue.put(lambda: self._write(rows, newest, wall))
+            self._writer.put(Transaction(rows, newest, wall), bounded=False)
 
-    def _take(self, found: Loaded) -> None:
+    def _put_loaded(self, loaded: Loaded) -> None:
         """Puts loaded buckets before those of this run."""
         last = {id(one.history): one.history for one in self._kept}
         for history in last.values():
             own = [one for one in self._kept if one.history is history]
             recorded = any(level.at for one in own for level in one.field.levels)
-            ends = [b[-1].at for one in own for key, b in found.items() if key[0] == one.name and b]
+            ends = [b[-1].at for one in own for key, b in loaded.items() if key[0] == one.name and b]
             if ends and not recorded:
                 history.begin_after(max(ends))
             for one in own:
                 for level in one.field.levels:
-                    buckets = found.get((one.name, int(level.width)), [])
+                    buckets = loaded.get((one.name, int(level.width)), [])
                     level.put_before(b for b in buckets if b.at < history.start)
 
     def _show_fault(self, fault: TextLike) -> None:
@@ -158,65 +158,8 @@ class TrendDisk:
             history.fault = fault
             show()
 
-    def _begin_again(self, _: None) -> None:
-        self._saved = {
-            id(level): -math.inf for field_on_disk in self._kept for level in field_on_disk.field.levels
-        }
-
-    # Below: on the thread.
-
-    def _run(self) -> None:
-        while (work := self._queue.get()) is not None:
-            try:
-                work()
-            except Exception:  # the thread must go on
-                log.exception("writing trends failed")
-        if self._file is not None:
-            self._file.close()
-
-    def _open(self) -> TrendFile:
-        if self._file is None:
-            self._file = TrendFile(self._folder)
-        return self._file
-
-    def _load(self, now: float) -> Loaded:
-        found: Loaded = {}
-        dropped = 0
-        try:
-            with as_log_error():
-                file = self._open()
-                for one in self._kept:
-                    for level in one.field.levels:
-                        since = now - one.keep_s(level)
-                        width = int(level.width)
-                        dropped += file.remove_future(one.name, width, now)
-                        found[one.name, width] = list(file.buckets(one.name, width, since))
-                file.remove_unused([one.name for one in self._kept], now)
-        except LogError as error:
-            self._failed(error)
-        if dropped:
-            log.error("%s: %d stored values are in the future and are dropped", self._folder, dropped)
-        return found
-
-    def _write(self, rows: Rows, newest: dict[int, float], now: float) -> None:
-        self._transactions += 1
-        removed = self._transactions % REMOVE_EVERY == 1
-        keep_s = {
-            (one.name, int(level.width)): one.keep_s(level)
-            for one in (self._kept if removed else ())
-            for level in one.field.levels
-        }
-        try:
-            with as_log_error():
-                self._open().write(rows, keep_s, now)
-        except LogError as error:
-            self._failed(error)
-            self._call(self._written, {})
-        else:
-            self._call(self._written, newest)
-
     def _written(self, newest: dict[int, float]) -> None:
-        """On the event loop: what was written is due no more; the newest buckets still grow."""
+        """What was written is due no more; the newest buckets still grow."""
         self._busy = False
         self._saved |= newest
         if newest and self._more:
@@ -225,12 +168,81 @@ class TrendDisk:
             log.info("trends are written to %s again", self._folder)
             self._show_fault("")
 
-    def _failed(self, error: LogError) -> None:
-        """Sets the fault, logged once; the file is opened again for the next transaction. In place of
-        one that is damaged or gone a new one is begun, with all that is in memory."""
+    def _end_loading(self, loaded: Loaded) -> None:
+        self._put_loaded(loaded)
+        if not self._has_loaded.done():
+            self._has_loaded.set_result(None)
+
+    def _begin_again(self, _: None) -> None:
+        self._saved = {
+            id(level): -math.inf for field_on_disk in self._kept for level in field_on_disk.field.levels
+        }
+
+    # On the thread: `DiskFile`.
+
+    def open(self) -> None:
+        with as_log_error():
+            self._file = TrendFile(self._folder)
+            if not self._is_delivered:
+                self._load(self._file, time.time())
+        self._deliver()
+
+    def write(self, items: Sequence[Transaction]) -> None:
+        assert self._file is not None  # it is open
+        for transaction in items:
+            with as_log_error():
+                self._file.write(transaction.rows, self._removal(), transaction.now)
+            self._call(self._written, transaction.newest)
+
+    def refuse(self, items: Sequence[Transaction], error: LogError) -> None:
+        self._call(self._written, {})
+
+    def tidy(self, quiet: bool) -> None:
+        """`write` removes what is old."""
+
+    def idle_s(self) -> float:
+        return math.inf
+
+    def close(self, error: LogError | None) -> None:
         if self._file is not None:
             self._file.close()
             self._file = None
+        if error is not None:
+            self._report(error)
+            self._deliver()
+
+    def _deliver(self) -> None:
+        """Gives the event loop what was loaded; once."""
+        if not self._is_delivered:
+            self._is_delivered = True
+            self._call(self._end_loading, self._loaded)
+
+    def _load(self, file: TrendFile, now: float) -> None:
+        dropped = 0
+        for stored in self._kept:
+            for level in stored.field.levels:
+                since = now - stored.keep_s(level)
+                width = int(level.width)
+                dropped += file.remove_future(stored.name, width, now)
+                self._loaded[stored.name, width] = list(file.buckets(stored.name, width, since))
+        file.remove_unused([stored.name for stored in self._kept], now)
+        if dropped:
+            log.error("%s: %d stored values are in the future and are dropped", self._folder, dropped)
+
+    def _removal(self) -> dict[tuple[FieldName, int], float]:
+        """How long each level is kept, for a transaction that removes what is old; empty for others."""
+        self._transactions += 1
+        if self._transactions % REMOVE_EVERY != 1:
+            return {}
+        return {
+            (stored.name, int(level.width)): stored.keep_s(level)
+            for stored in self._kept
+            for level in stored.field.levels
+        }
+
+    def _report(self, error: LogError) -> None:
+        """Shows the fault, logged once. In place of a file that is damaged or gone a new one is begun,
+        with all that is in memory."""
         if isinstance(error, LogCorrupt | LogGone):
             with suppress(OSError):
                 if isinstance(error, LogCorrupt):
@@ -242,6 +254,6 @@ class TrendDisk:
             log.error("trends are not written to %s: %s", self._folder, error)
         self._call(self._show_fault, say("trend_not_kept", why=error.text))
 
-    def _call(self, function: Callable[[Given], None], given: Given) -> None:
+    def _call(self, function: Callable[[Argument], None], argument: Argument) -> None:
         with suppress(RuntimeError):  # the loop is closed
-            self._loop.call_soon_threadsafe(function, given)
+            self._loop.call_soon_threadsafe(function, argument)

@@ -9,6 +9,7 @@ from typing import Final
 
 import pytest
 
+from app import disk_writer
 from app.audit import (
     Entry,
     Filter,
@@ -16,7 +17,7 @@ from app.audit import (
     OperatorLog,
     audit_log,
     data_dir,
-    writer_thread,
+    log_writer,
 )
 from app.audit.queries import rows
 from app.audit.store import Store
@@ -231,7 +232,7 @@ def test_a_press_that_is_called_away_as_it_was_written_is_closed(
 def test_too_many_at_once_are_refused_in_words(
     tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(audit_log, "MOST_WAITING", 10)
+    monkeypatch.setattr(log_writer, "MOST_WAITING", 10)
 
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
@@ -300,7 +301,7 @@ def test_it_is_tried_again_ever_more_rarely(tmp_path: Path, disk: Disk) -> None:
         assert time.monotonic() - began >= 1.4
 
     run(tmp_path, work)
-    assert writer_thread.RETRY_DELAYS_S[-1] <= 10
+    assert disk_writer.RETRY_DELAYS_S[-1] <= 10
 
 
 def test_where_the_log_is_not_required_presses_go_on(tmp_path: Path, disk: Disk) -> None:

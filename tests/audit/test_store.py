@@ -15,11 +15,11 @@ import pytest
 from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME, Head, set_aside
 from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, clean_text, new_entry
+from app.audit.log_writer import HOUR_S, ClockSteadiness
 from app.audit.opening import Opening
 from app.audit.queries import Filter, rows
 from app.audit.store import COLUMNS, DAY_MS, REMOVED_AT_ONCE, Store
 from app.audit.verify import verify
-from app.audit.writer_thread import HOUR_S, ClockSteadiness
 from app.cli.log import main
 from app.errors import FolderInUse, LogCorrupt, LogError
 from app.i18n import TextLike, say

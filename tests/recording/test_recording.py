@@ -409,7 +409,7 @@ def test_a_disk_that_stands_still_costs_no_memory_and_no_time(run: Callable[...,
         for _ in range(200):
             cell.recorder.record_sample("heard", flood)
         assert time.monotonic() - began < 5  # the disk would never let go
-        assert cell.recordings._queued_bytes <= 128 * 1024 * 1024
+        assert cell.recordings._writer.waiting <= 128 * 1024 * 1024
         os.write(gate[1], b"1")
         cell.recorder.stop()
         await cell.finished()

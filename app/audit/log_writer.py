@@ -1,9 +1,12 @@
-"""The thread that owns the file of the operator's log: writing, retention, reopening after errors."""
+"""The file of the operator's log as its thread uses it: writing, retention, and what it says of
+faults.
+
+`DiskWriter` is the thread. It commits what is queued together, and opens the file again after errors. A
+second thread, `Syncer`, waits for the disk.
+"""
 
 import logging
 import math
-import queue
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -18,12 +21,12 @@ from app.audit.store import Store
 from app.audit.syncer import Syncer
 from app.audit.ticket import Limits, Repeated, Results, Ticket
 from app.clock import format_time
+from app.disk_writer import DiskWriter
 from app.errors import FolderInUse, LogError, LogGone
 from app.i18n import TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
-RETRY_DELAYS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one is repeated
 HOUR_S: Final = 3600.0
 CLOCK_SET_BY_S: Final = 60.0  # a larger change of the wall clock is no drift
 IDLE_S: Final = 1.0  # after this time without a press, the file is tidied
@@ -35,6 +38,7 @@ TIDY_INTERVAL_S: Final = (
 CHECKPOINT_S: Final = 5.0  # at least between two forced checkpoints: a reader may block them
 TIDY_AFTER: Final = 1000  # entries
 MAX_UNWRITTEN: Final = 1000
+MOST_WAITING: Final = 1000  # entries; then new presses are refused
 
 
 class ClockSteadiness:
@@ -51,8 +55,8 @@ class ClockSteadiness:
         return now - self._since >= HOUR_S
 
 
-class WriterThread:
-    """Owns the file: writes queued entries, limits the file's size, and reopens it after errors."""
+class LogWriter:
+    """The `DiskFile` of the operator's log. `start`, `add` and `stop` are for the event loop."""
 
     def __init__(
         self,
@@ -71,160 +75,128 @@ class WriterThread:
         self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
-        self.tried = threading.Event()
-        self._queue: queue.SimpleQueue[Ticket | None] = queue.SimpleQueue()  # None only wakes
+        self._writer: DiskWriter[Ticket] = DiskWriter("operators-log", self, most=MOST_WAITING)
         self._unwritten: deque[Entry] = deque(maxlen=MAX_UNWRITTEN)
         self._opening = Opening(folder.path, boot)
         self._store: Store | None = None
         self._start_logged = False
-        self._sync_error: LogError | None = None
-        self._failures = 0
         self._fault_since: TextLike = ""
-        self._try_at = 0.0
         self._hourly_at = 0.0
         self._checkpoint_at = 0.0
         self._tidy_at = 0.0
         self._since_tidy = 0
         self._fresh_wal = True
         self._clock = ClockSteadiness()
-        self._ended = False
         self._syncer = Syncer(lambda results: self._report(results, False), self._sync_failed)
-        self._thread = threading.Thread(target=self._run, name="operators-log", daemon=True)
 
     # On the event loop.
 
     def start(self) -> None:
         self._syncer.start()
-        self._thread.start()
+        self._writer.start()
+
+    def wait_until_tried(self, timeout_s: float) -> None:
+        """Waits for the first attempt to open the file. Blocks."""
+        self._writer.tried.wait(timeout_s)
 
     def stop(self, timeout_s: float) -> None:
-        """Writes the queued entries and closes the file; waits at most `timeout_s`."""
-        self._ended = True
-        self._queue.put(None)
-        self._thread.join(timeout_s)
+        """Writes the queued entries and closes the file; waits at most `timeout_s`. Blocks."""
+        self._writer.close(timeout_s)
 
-    def add(self, ticket: Ticket, most: int | None) -> bool:
-        """Queues a ticket; False if `most` are waiting already."""
-        if most is not None and self._queue.qsize() >= most:
-            return False
-        self._queue.put(ticket)
-        return True
+    def add(self, ticket: Ticket, *, bounded: bool) -> bool:
+        """Queues a ticket; False if it is bounded and too many are waiting already."""
+        return self._writer.put(ticket, bounded=bounded)
 
-    # On the writer thread.
+    # On the writer thread: `DiskFile`.
 
-    def _run(self) -> None:
-        ended = False
-        while not ended:
-            if self._store is None and time.monotonic() >= self._try_at:
-                self._open()
-                self.tried.set()
-            batch = self._next()
-            ended = self._ended and not self._queue.qsize()
-            if self._sync_error is not None:
-                self._handle_failure(self._sync_error)
-            if batch:
-                self._write(batch)
-            if self._store is not None and (not batch or time.monotonic() >= self._tidy_at):
-                self._tidy(self._store, quiet=not batch)
-                self._tidy_at = time.monotonic() + TIDY_INTERVAL_S
-        self._syncer.end(IDLE_S * 5)
-        self._close()
+    def open(self) -> None:
+        with as_log_error():
+            self._folder.claim()
+        self._store = store = self._opening.store(self.head)
+        self._syncer.set_store(store)
+        store.probe()
+        self._write_first_entries(store)
+        self._check(store)
+        self._fresh_wal, self._hourly_at = False, 0.0
+        self.displaced = False
+        if self.fault:
+            log.info("the operator's log can be written again")
+            self.fault, self._fault_since = "", ""
+            self._report([], True)
 
-    def _next(self) -> list[Ticket]:
-        """The waiting tickets, as soon as there is something to do; empty if that is not writing."""
-        try:
-            waiting = [self._queue.get(timeout=self._idle_s())]
-        except queue.Empty:
-            return []
-        waiting += [self._queue.get() for _ in range(self._queue.qsize())]
-        return [ticket for ticket in waiting if ticket is not None]
-
-    def _idle_s(self) -> float:
-        if self._store is None:
-            return max(0.0, self._try_at - time.monotonic())
-        return min(max(0.0, self._hourly_at - time.monotonic()), FILE_CHECK_S, IDLE_S)
-
-    def _write(self, batch: list[Ticket]) -> None:
-        wanted = [ticket for ticket in batch if not ticket.abandoned]
-        if len(wanted) < len(batch):
-            abandoned = LogError(say("log_entry_too_late"))
-            self._report([(ticket, abandoned) for ticket in batch if ticket.abandoned], False)
-        if self._store is None:
-            self._fail(wanted, LogError(self.fault))
-            return
-        try:
-            wanted = self._without_repeated(self._store, wanted)
-            sealed = self._store.append([ticket.entry for ticket in wanted])
-            self._check(self._store)
-        except LogError as error:
-            self._handle_failure(error)
-            self._fail(wanted, error)
-            return
+    def write(self, items: Sequence[Ticket]) -> None:
+        assert self._store is not None  # it is open
+        tickets = [ticket for ticket in items if not ticket.abandoned]
+        if abandoned := [ticket for ticket in items if ticket.abandoned]:
+            error = LogError(say("log_entry_too_late"))
+            self._answer([(ticket, error) for ticket in abandoned])
+        tickets = self._without_repeated(self._store, tickets)
+        sealed = self._store.append([ticket.entry for ticket in tickets])
+        self._check(self._store)
         self.head = self._store.head
         self._fresh_wal = False
         self._since_tidy += len(sealed)
-        results: Results = list(zip(wanted, sealed, strict=True))
-        self._report([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
+        results: Results = list(zip(tickets, sealed, strict=True))
+        self._answer([(ticket, entry) for ticket, entry in results if not ticket.durable])
         if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
             self._syncer.add(durable)
 
-    def _without_repeated(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
-        """The tickets without repeated presses; these are answered with `Repeated`."""
-        new: list[Ticket] = []
-        known: Results = []
-        for ticket in tickets:
-            found = store.entries_of_press(ticket.entry) if ticket.entry.is_press else []
-            if found and found[0].is_press:
-                results = [one for one in found if one.of == found[0].seq]
-                known.append((ticket, Repeated(found[0], results[-1] if results else None)))
-            else:
-                new.append(ticket)
-        self._report(known, False)
-        return new
-
-    def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
+    def refuse(self, items: Sequence[Ticket], error: LogError) -> None:
+        tickets = [ticket for ticket in items if not ticket.answered]
         self._unwritten += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
-        self._report([(ticket, error) for ticket in tickets], False)
+        self._answer([(ticket, error) for ticket in tickets])
 
-    def _check(self, store: Store) -> None:
-        """LogError if the files were replaced, or another server may have the folder."""
-        store.check()
-        with as_log_error():
-            self._folder.check()
+    def tidy(self, quiet: bool) -> None:
+        """Removes old entries and empties the write-ahead log, a little at a time; logs the head once
+        an hour."""
+        if self._store is None or not (quiet or time.monotonic() >= self._tidy_at):
+            return
+        self._check(self._store)
+        self._remove_old(self._store)
+        self._empty_wal(self._store, quiet)
+        self._tidy_at = time.monotonic() + TIDY_INTERVAL_S
 
-    def _handle_failure(self, error: LogError) -> None:
-        """Closes the file. Nothing is written until it is open again."""
-        self._sync_error = None
-        self._close(complete=isinstance(error, LogGone))
+    def idle_s(self) -> float:
+        return min(max(0.0, self._hourly_at - time.monotonic()), FILE_CHECK_S, IDLE_S)
+
+    def close(self, error: LogError | None) -> None:
+        if error is None:
+            self._syncer.end(IDLE_S * 5)
+        self._close_store(complete=isinstance(error, LogGone))
+        if error is None:
+            return
         self.displaced = isinstance(error, FolderInUse)
         self._opening.mark_lost(error)
-        wait = RETRY_DELAYS_S[min(self._failures, len(RETRY_DELAYS_S) - 1)]
-        self._failures += 1
-        self._try_at = time.monotonic() + wait
         if self.fault != error.text:
             log.error("the operator's log can't be written: %s", error)
             self._fault_since = self._fault_since or format_time(time.time())
             self.fault = error.text
             self._report([], True)
 
-    def _open(self) -> None:
-        try:
-            with as_log_error():
-                self._folder.claim()
-            self._store = store = self._opening.store(self.head)
-            self._syncer.set_store(store)
-            store.probe()
-            self._write_first_entries(store)
-            self._check(store)
-        except LogError as error:
-            self._handle_failure(error)
-            return
-        self._failures, self._fresh_wal, self._hourly_at = 0, False, 0.0
-        self.displaced = False
-        if self.fault:
-            log.info("the operator's log can be written again")
-            self.fault, self._fault_since = "", ""
-            self._report([], True)
+    def _answer(self, results: Results) -> None:
+        for ticket, _ in results:
+            ticket.answered = True
+        self._report(results, False)
+
+    def _without_repeated(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
+        """The tickets without repeated presses; these are answered with `Repeated`."""
+        new: list[Ticket] = []
+        known: Results = []
+        for ticket in tickets:
+            entries = store.entries_of_press(ticket.entry) if ticket.entry.is_press else []
+            if entries and entries[0].is_press:
+                results = [entry for entry in entries if entry.of == entries[0].seq]
+                known.append((ticket, Repeated(entries[0], results[-1] if results else None)))
+            else:
+                new.append(ticket)
+        self._answer(known)
+        return new
+
+    def _check(self, store: Store) -> None:
+        """LogError if the files were replaced, or another server may have the folder."""
+        store.check()
+        with as_log_error():
+            self._folder.check()
 
     def _write_first_entries(self, store: Store) -> None:
         """Writes the entries that come before any new ones."""
@@ -242,16 +214,6 @@ class WriterThread:
         self._start_logged = True
         self.head = store.head
         store.sync()
-
-    def _tidy(self, store: Store, quiet: bool) -> None:
-        """Removes old entries and empties the write-ahead log, a little at a time; logs the head once
-        an hour."""
-        try:
-            self._check(store)
-            self._remove_old(store)
-            self._empty_wal(store, quiet)
-        except LogError as error:
-            self._handle_failure(error)
 
     def _remove_old(self, store: Store) -> None:
         now = time.monotonic()
@@ -274,7 +236,7 @@ class WriterThread:
             store.checkpoint()
             self._fresh_wal, self._checkpoint_at = True, now + CHECKPOINT_S
 
-    def _close(self, complete: bool = False) -> None:
+    def _close_store(self, complete: bool) -> None:
         self._syncer.set_store(None)
         if self._store is not None:
             store, self._store = self._store, None
@@ -291,5 +253,4 @@ class WriterThread:
     def _sync_failed(self, results: Results) -> None:
         """Reports the failure; the writer thread then closes the file."""
         self._report(results, False)
-        self._sync_error = next(error for _, error in results if isinstance(error, LogError))
-        self._queue.put(None)
+        self._writer.report(next(error for _, error in results if isinstance(error, LogError)))
