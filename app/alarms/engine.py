@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from app.alarms.delays import DelayedCondition
 from app.alarms.entries import Entry
 from app.alarms.instance import AlarmInstance, Definition, define
+from app.alarms.records import entry_in, status_in
 from app.alarms.sources import UNKNOWN, SourceReading, read_source
 from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level
 from app.panel.model import Panel
@@ -172,7 +173,7 @@ class AlarmEngine:
         definition, robot = alarm.definition, self._robots[alarm.definition.robot]
         if alarm.entry is None:
             return read_source(definition.alarm, robot, now, self._began_at)
-        if not robot.link_up or not robot.graph.peers:
+        if not robot.link_up or not robot.graph.peers or alarm.heard_at == -math.inf:
             return UNKNOWN
         max_age_s = definition.alarm.max_age_s
         stale_at = math.inf if max_age_s is None else alarm.heard_at + max_age_s
@@ -208,6 +209,30 @@ class AlarmEngine:
         if result.status != before:
             self._emit([self._transition(alarm, before, self._clock(), act, actor)])
         return result
+
+    def restore(self, records: Mapping[str, str]) -> list[str]:
+        """Restores the alarms of an earlier run from their records: their sources are unknown until
+        they are heard. Returns the ids of those that the panel no longer has."""
+        now, missing = self._clock(), []
+        for alarm_id, record in records.items():
+            alarm = self.alarms.get(alarm_id) or self._restored_entry(alarm_id, record)
+            if alarm is None:
+                missing.append(alarm_id)
+            else:
+                alarm.restore(status_in(record, now))
+                self._waiting[alarm_id] = None
+        return missing
+
+    def _restored_entry(self, alarm_id: str, record: str) -> AlarmInstance | None:
+        entry = entry_in(record)
+        sources = (one for one in self._sources.values() if alarm_id.startswith(f"{one.id}:"))
+        source = next(sources, None)
+        if entry is None or source is None:
+            return None
+        alarm = self._new_entry(source.of_entry(entry))
+        if alarm is not None:
+            alarm.entry = entry
+        return alarm
 
     def standing(self) -> list[AlarmInstance]:
         """The alarms that are not normal, or that are shelved, suppressed or out of service: the most

@@ -72,6 +72,15 @@ class AlarmInstance:
     def __post_init__(self) -> None:
         self.conditions = (DelayedCondition(),) * len(self.definition.thresholds)
 
+    def restore(self, status: AlarmStatus) -> None:
+        """Takes over the status of an earlier run, with what counted as met then."""
+        self.status = status
+        self.conditions = tuple(
+            DelayedCondition(met, met)
+            for limit in self.definition.thresholds
+            for met in [status.level > 0 and self.level_of(limit) <= status.level]
+        )
+
     def level_of(self, limit: Limit | None) -> int:
         """The level that is reached where a limit is exceeded; the robot says its own."""
         if limit is not None:

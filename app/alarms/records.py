@@ -1,0 +1,101 @@
+"""The status of an alarm as JSON, and back after a restart of the server."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.alarms.entries import Entry
+from app.alarms.instance import AlarmInstance
+from app.alarms.states import State
+from app.alarms.status import AlarmStatus, Moment, TakenOut
+from app.i18n import Text, TextLike, text_in
+
+
+def record_of(alarm: AlarmInstance, now: Moment) -> str:
+    """The JSON of an alarm: its status with times of the wall clock, and what the robot published."""
+    status, entry = alarm.status, alarm.entry
+    record: dict[str, Any] = {
+        "state": status.state,
+        "level": status.level,
+        "raised_level": status.raised_level,
+        "occurrence": status.occurrence,
+        "raised_at": _wall(status.raised_at),
+        "unknown_since": _wall(status.unknown_since),
+        "shelf": _taken_out(status.shelf, now),
+        "out_of_service": _taken_out(status.out_of_service, now),
+        "suppressed_since": _wall(status.suppressed_since),
+        "value": alarm.value if alarm.value is not None and abs(alarm.value) < 1e300 else None,
+    }
+    if entry is not None:
+        record["entry"] = {
+            "name": entry.name,
+            "level": entry.level,
+            "text": json.dumps(entry.text.as_json()) if isinstance(entry.text, Text) else entry.text,
+            "is_sentence": isinstance(entry.text, Text),
+            "priorities": entry.priorities,
+        }
+    return json.dumps(record, ensure_ascii=False)
+
+
+def status_in(record: str, now: Moment) -> AlarmStatus:
+    """The status in a record of an earlier run, whose source is unknown now. A clock that was set back
+    or forward makes no shelf longer. ValueError if it is not a record."""
+    values = json.loads(record)
+    unknown_since = _moment(values["unknown_since"], now)
+    return AlarmStatus(
+        State(values["state"]),
+        int(values["level"]),
+        int(values["raised_level"]),
+        int(values["occurrence"]),
+        _moment(values["raised_at"], now),
+        unknown_since or now,
+        _restored(values["shelf"], now),
+        _restored(values["out_of_service"], now),
+    )
+
+
+def entry_in(record: str) -> Entry | None:
+    """What the robot had published; None for an alarm of the panel file."""
+    values = json.loads(record).get("entry")
+    if values is None:
+        return None
+    text: TextLike = text_in(values["text"]) if values["is_sentence"] else values["text"]
+    return Entry(values["name"], int(values["level"]), text, tuple(values["priorities"]))
+
+
+def _wall(moment: Moment | None) -> float | None:
+    return None if moment is None else moment.wall
+
+
+def _moment(wall: float | None, now: Moment) -> Moment | None:
+    """A moment of an earlier run: never after now."""
+    return None if wall is None else Moment(now.monotonic - max(0.0, now.wall - wall), wall)
+
+
+def _taken_out(taken: TakenOut | None, now: Moment) -> Mapping[str, Any] | None:
+    if taken is None:
+        return None
+    whole_s = taken.until - taken.since.monotonic
+    limits = {"for_s": whole_s, "left_s": taken.until - now.monotonic} if whole_s < 1e9 else {}
+    return {
+        "since": taken.since.wall,
+        "reason": taken.reason,
+        "actor": taken.actor,
+        "recorded_at": now.wall,
+        **limits,
+    }
+
+
+def _restored(values: Mapping[str, Any] | None, now: Moment) -> TakenOut | None:
+    if values is None:
+        return None
+    since = _moment(values["since"], now) or now
+    taken = TakenOut(since, values["reason"], values["actor"])
+    if "for_s" not in values:
+        return taken
+    passed_s = max(0.0, now.wall - values["recorded_at"])
+    left_s = max(0.0, values["left_s"] - passed_s)
+    # Its length stays what was asked for, also if the clock was set back.
+    since = Moment(now.monotonic + left_s - values["for_s"], since.wall)
+    return replace(taken, since=since, until=now.monotonic + left_s)
