@@ -30,8 +30,8 @@ def declared_by(
     """Node → name → parameter. Of several widgets for one parameter the limits are those that they
     all have."""
     found: dict[str, dict[str, list[widgets.Parameter]]] = {}
-    for one in panels:
-        found.setdefault(one.node, {}).setdefault(one.parameter, []).append(one)
+    for panel in panels:
+        found.setdefault(panel.node, {}).setdefault(panel.parameter, []).append(panel)
     return {
         node: {
             name: _declared(several, demo.get(node, NO_ENTRY).parameters.get(name))
@@ -57,7 +57,7 @@ def _limits(widget: widgets.Parameter) -> Range | None:
         return None
     limits = (widget.min, widget.max, widget.step)
     if widget.element_type == "integer":
-        return Range(*(None if one is None else int(one) for one in limits))
+        return Range(*(None if limit is None else int(limit) for limit in limits))
     return Range(*limits)
 
 

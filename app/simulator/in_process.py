@@ -32,5 +32,5 @@ def robots_of(panel: Panel) -> "dict[str, SimulatedRobot]":
     """Namespace → robot of each robot of a panel. Of several with the same namespace there is one."""
     from app.simulator.panel_robot import PanelRobot
 
-    namespaces = dict.fromkeys(one.namespace for one in panel.robots) or {panel.namespace: None}
+    namespaces = dict.fromkeys(robot.namespace for robot in panel.robots) or {panel.namespace: None}
     return {name: PanelRobot(panel, number) for number, name in enumerate(namespaces)}

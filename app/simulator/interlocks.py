@@ -37,9 +37,9 @@ def permitting(
 ) -> Signal:
     """A field of the base type `kind` that satisfies its interlocks, and then does not; `others` are
     further values that the field may have. Where no value satisfies all, each has its turn."""
-    found = (_as_kind(one, kind) for one in _candidates(interlocks, kind, others))
+    found = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others))
     candidates = [one for one in found if _fits(one, kind)]
-    met = [sum(satisfies(interlock, one) for interlock in interlocks) for one in candidates]
+    met = [sum(satisfies(interlock, candidate) for interlock in interlocks) for candidate in candidates]
     best, least = max(met), min(met)
     good = [one for one, count in zip(candidates, met, strict=True) if count == best]
     bad = [one for one, count in zip(candidates, met, strict=True) if count == least] or good
@@ -88,8 +88,8 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
             yield from ((low + high) / 2, low - span / 4, high + span / 4, low, high)
     yield from others
     for interlock in interlocks if numeric else ():
-        for one in interlock.comparisons.values():
-            near = one if isinstance(one, tuple) else (one,)
+        for comparison in interlock.comparisons.values():
+            near = comparison if isinstance(comparison, tuple) else (comparison,)
             for value in near:
                 yield from (value + 1, value - 1)
     for interlock in interlocks:
@@ -110,13 +110,15 @@ def _limits(interlock: Interlock) -> tuple[float, float]:
 
 def _moving(interlocks: Sequence[Interlock], kind: str) -> Signal | None:
     """A number that moves inside the limits, if there are any."""
-    limits = [_limits(one) for one in interlocks if {"min", "max"} & one.comparisons.keys()]
+    limits = [
+        _limits(interlock) for interlock in interlocks if {"min", "max"} & interlock.comparisons.keys()
+    ]
     if not limits:
         return None
-    low, high = max(one[0] for one in limits), min(one[1] for one in limits)
+    low, high = max(limit[0] for limit in limits), min(limit[1] for limit in limits)
     middle, part = (low + high) / 2, (high - low) * INSIDE
     ends = as_type(swing(middle - part, middle + part, 1), kind)
-    if not all(satisfies(one, ends(t)) for one in interlocks for t in (0, 0.25, 0.5)):
+    if not all(satisfies(interlock, ends(t)) for interlock in interlocks for t in (0, 0.25, 0.5)):
         return None
     return as_type(swing(middle - part, middle + part), kind)
 

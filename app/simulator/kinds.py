@@ -182,8 +182,8 @@ def _camera(camera: Camera, _: Interfaces) -> Iterator[Need]:
 
 
 def _trend(trend: Trend, _: Interfaces) -> Iterator[Need]:
-    for one in trend.readouts:
-        yield from _shown(one)
+    for readout in trend.readouts:
+        yield from _shown(readout)
 
 
 def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:

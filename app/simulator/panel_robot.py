@@ -76,7 +76,7 @@ class PanelRobot:
 
     @cached_property
     def step_s(self) -> float:
-        return min([STEP_S, *(one.period_s for one in self._topics.values())])
+        return min([STEP_S, *(topic.period_s for topic in self._topics.values())])
 
     @cached_property
     def publishes(self) -> Mapping[str, SimulatedTopic]:
@@ -249,7 +249,9 @@ class PanelRobot:
             if (own and not {"result", "duration_s"} & entry.model_fields_set) or entry.silent:
                 continue
             types = self._interfaces.action_types(widgets[0].type)
-            progress = {one.progress: one.most for one in widgets if one.progress is not None}
+            progress = {
+                widget.progress: widget.most for widget in widgets if widget.progress is not None
+            }
             found[name] = SimulatedAction(
                 widgets[0].type,
                 feedback_at(types.feedback, self._interfaces, progress),

@@ -74,7 +74,7 @@ class NodeParameters:
     def serve(self, service: str, request: Any) -> Fields:
         """The response of one of `SERVICES`; as rclcpp's, nothing where one name is not declared."""
         if service.endswith("/set_parameters"):
-            return {"results": [self._set(one) for one in request.parameters]}
+            return {"results": [self._set(parameter) for parameter in request.parameters]}
         known = all(name in self._declared for name in request.names)
         found = [(name, self._declared[name]) for name in request.names] if known else []
         if service.endswith("/get_parameters"):
@@ -111,7 +111,7 @@ class NodeParameters:
         value = _plain(getattr(given.value, FIELDS[declared.type]))
         if declared.empty and not value.strip():
             return declared.empty
-        if declared.options and not any(same_value(value, one) for one in declared.options):
+        if declared.options and not any(same_value(value, option) for option in declared.options):
             return f"parameter '{given.name}' has no such option"
         several = value if declared.type >= FIRST_ARRAY else [value]
         if declared.limits is None or all(declared.limits.contains(one) for one in several):

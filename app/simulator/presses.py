@@ -26,14 +26,18 @@ class Effect(NamedTuple):
 def effects(message: Any, publications: Iterable[Published]) -> list[Effect]:
     """The effects of a decoded message, by the widgets that may have sent it."""
     found = []
-    for one in publications:
+    for publication in publications:
         inputs: dict[str, Any] = {}
-        if one.confirm is None or one.template is None or not _fits(one.template, message, inputs):
+        if (
+            publication.confirm is None
+            or publication.template is None
+            or not _fits(publication.template, message, inputs)
+        ):
             continue
-        needed = {name for _, name in placeholders(one.confirm.equals)}
+        needed = {name for _, name in placeholders(publication.confirm.equals)}
         if needed <= inputs.keys():
-            value = fill(one.confirm.equals, inputs)
-            found.append(Effect(one.confirm.topic, one.confirm.field, value))
+            value = fill(publication.confirm.equals, inputs)
+            found.append(Effect(publication.confirm.topic, publication.confirm.field, value))
     return found
 
 

@@ -50,7 +50,7 @@ class SimulatedTopic:
 
     def step(self, moment: Moment) -> bytes | None:
         """The message that is due, if one is."""
-        prompt = tuple(self._value(one, moment) for one in self._fields if one.prompt)
+        prompt = tuple(self._value(field, moment) for field in self._fields if field.prompt)
         due = self._last is None or moment.t - self._last[0] >= self.period_s * EARLY
         if not due and not self._changed and self._last is not None and self._last[1] == prompt:
             return None
@@ -61,13 +61,13 @@ class SimulatedTopic:
 
     def show(self, path: str, value: Any, t: float) -> None:
         """A press sets a field: for a while where it is an interlock's, else until the next one."""
-        limited = any(one.prompt and one.path == path for one in self._fields)
+        limited = any(field.prompt and field.path == path for field in self._fields)
         self._effects[path] = value, t + PRESS_SHOWN_S if limited else None
         self._copied, self._changed = None, True
 
     def copy(self, payload: bytes, t: float) -> None:
         """The topic has what a press published on it, for as long as a field of it would."""
-        limited = any(one.prompt for one in self._fields)
+        limited = any(field.prompt for field in self._fields)
         self._copied = payload, t + PRESS_SHOWN_S if limited else math.inf
         self._changed = True
 
@@ -78,9 +78,9 @@ class SimulatedTopic:
     def _encoded(self, moment: Moment) -> bytes:
         fields = self._message(moment)
         structures = self._interfaces.structures
-        for one in self._fields:
-            put(fields, self.type, one.path, self._value(one, moment), structures)
-        own = {one.path for one in self._fields}
+        for field in self._fields:
+            put(fields, self.type, field.path, self._value(field, moment), structures)
+        own = {field.path for field in self._fields}
         for path, (value, _) in self._effects.items():
             if path not in own:
                 put(fields, self.type, path, value, structures)
@@ -137,6 +137,6 @@ def _hz(
         return given
     still = made and not any(one.moving for one in made)
     hz = OTHERS_HZ if still or type_name in SLOW else MOVING_HZ
-    locks = (one.max_age_s for one in fields.panel.interlocks if one.topic == topic)
+    locks = (interlock.max_age_s for interlock in fields.panel.interlocks if interlock.topic == topic)
     ages = [age for age in (*locks, *(one.max_age_s for one in shown)) if age is not None]
     return max([hz, *(TIMES_WITHIN_AGE / age for age in ages)])

@@ -45,7 +45,7 @@ class SimulatedZenohRobot:
         ]
         self._declared = [
             *(self._subscriber(topic) for topic in robot.subscribes),
-            *(served(session, self._key(one), self._server(one)) for one in self._services),
+            *(served(session, self._key(service), self._server(service)) for service in self._services),
         ]
 
     def tokens(self, zid: str) -> Iterator[str]:

@@ -38,9 +38,11 @@ def demo_of(path: Path, app: str = "app.main:app") -> Server:
 def not_live(panel: Panel, robot: Server) -> list[str]:
     """The displays and parameters that show no value of now."""
     shown = robot.snapshot()["widgets"]
-    ids = [one.id for one in panel.widgets() if isinstance(one, Display) and one.topic != HEARD]
-    ids += [one.id for one in panel.parameters()]
-    return [one for one in ids if shown[one]["state"] != "live"]
+    ids = [
+        widget.id for widget in panel.widgets() if isinstance(widget, Display) and widget.topic != HEARD
+    ]
+    ids += [parameter.id for parameter in panel.parameters()]
+    return [name for name in ids if shown[name]["state"] != "live"]
 
 
 def is_alive(panel: Panel, robot: Server) -> None:

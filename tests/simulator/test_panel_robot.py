@@ -661,4 +661,4 @@ def test_everything_is_simulated_in_each_distribution(tmp_path: Path, distro: st
     path.write_text(text.replace('distro = "jazzy"', f'distro = "{distro}"'))
     robot = Stepped(load_panel(path)).run(2)
     assert set(robot.panel.subscriptions()) - {EVENTS} <= set(robot.said)
-    assert all(one.type_hash for one in robot.robot.publishes.values())
+    assert all(publish.type_hash for publish in robot.robot.publishes.values())

@@ -180,7 +180,9 @@ def test_a_folder_whose_metadata_has_other_qos_than_its_file_is_replayed_whole(
     tmp_path: Path, opened: Opened, qos: str, mcap: bool
 ) -> None:
     recording = opened(folder_of_rosbag2(tmp_path, qos=qos, mcap=mcap))
-    assert [one.payload for one in recording.messages()] == [payload for *_, payload in MESSAGES]
+    assert [message.payload for message in recording.messages()] == [
+        payload for *_, payload in MESSAGES
+    ]
     assert recording.topics["/joint_states"].qos == (Qos(True, True, 1) if qos else Qos())
 
 
@@ -188,7 +190,9 @@ def test_messages_that_are_compressed_are_replayed_as_cdr(tmp_path: Path, opened
     """From the folder, whose metadata.yaml says so, and from its file alone, which does not."""
     folder = folder_of_rosbag2(tmp_path, mode="MESSAGE")
     for path in (folder, folder / "cell_0.db3"):
-        assert [one.payload for one in opened(path).messages()] == [payload for *_, payload in MESSAGES]
+        assert [message.payload for message in opened(path).messages()] == [
+            payload for *_, payload in MESSAGES
+        ]
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def test_its_parameters_are_set_or_refused_with_words(
     (result,) = robot.parameters.serve(f"{NODE}/set_parameters", request)["results"]
     assert result == {"successful": not reason, "reason": reason}
     events = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
-    assert [one["changed_parameters"][0]["name"] for one in events] == ([] if reason else [name])
+    assert [event["changed_parameters"][0]["name"] for event in events] == ([] if reason else [name])
 
 
 PANEL = """

@@ -112,7 +112,7 @@ class _Mcap:
             statistics = summary.statistics
             self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
             self.topics: Sequence[RecordedTopic] = [
-                _of_channel(one, summary) for one in summary.channels.values()
+                _of_channel(channel, summary) for channel in summary.channels.values()
             ]
         except BaseException:
             self.close()
@@ -149,7 +149,9 @@ class _Sqlite:
         self._reader = Sqlite3Reader(path)
         self._reader.open()
         self.start_ns, self.end_ns = _ends(self._reader.metadata)
-        self.topics: Sequence[RecordedTopic] = [_of_connection(one) for one in self._reader.connections]
+        self.topics: Sequence[RecordedTopic] = [
+            _of_connection(connection) for connection in self._reader.connections
+        ]
 
     def messages(self, topics: Collection[str]) -> Iterator[Recorded]:
         yield from _stored(self._reader, topics)
@@ -168,9 +170,15 @@ class _Folder:
         self._reader = DirectoryReader(path)
         self._reader.open()
         self.start_ns, self.end_ns = _ends(self._reader.metadata)
-        stored = [_of_connection(one) for file in self._reader.storages for one in file.connections]
+        stored = [
+            _of_connection(connection)
+            for file in self._reader.storages
+            for connection in file.connections
+        ]
         # QoS and type as the folder has them, where it has the topic.
-        named = [replace(_of_connection(one), count=0) for one in self._reader.connections]
+        named = [
+            replace(_of_connection(connection), count=0) for connection in self._reader.connections
+        ]
         self.topics: Sequence[RecordedTopic] = [*named, *stored]
         there, said = sum(one.count for one in stored), self._reader.metadata.message_count
         missing = f"{path}: its files have {there} messages, its metadata.yaml names {said}"

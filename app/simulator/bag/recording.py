@@ -40,11 +40,13 @@ class Recording:
             raise RecordingError(f"{path} can't be read: {error}{rescue(path)}") from error
         self.notes: list[str] = list(self._file.notes)
         self.topics: dict[str, SimulatedTopic] = {}
-        for one in self._file.topics:
-            self._add(one)
+        for topic in self._file.topics:
+            self._add(topic)
         self.notes = list(dict.fromkeys(self.notes))  # a folder's files each have its topics
         self._count = sum(
-            one.count for one in self._file.topics if one.topic in self.topics and one.format == FORMAT
+            topic.count
+            for topic in self._file.topics
+            if topic.topic in self.topics and topic.format == FORMAT
         )
         if not self._count:
             self.close()

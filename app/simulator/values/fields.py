@@ -42,8 +42,10 @@ class PanelFields:
         self.paths = {
             topic: list(dict.fromkeys(paths)) for topic, paths in panel.subscribed_fields().items()
         }
-        self.confirmed = {(one.topic, one.field) for one in panel.confirmations()}
-        locked = dict.fromkeys((one.topic, one.field) for one in panel.interlocks)
+        self.confirmed = {
+            (confirmation.topic, confirmation.field) for confirmation in panel.confirmations()
+        }
+        locked = dict.fromkeys((interlock.topic, interlock.field) for interlock in panel.interlocks)
         self.offsets: Mapping[tuple[str, str], float] = {
             field: offset_of(number, len(locked)) for number, field in enumerate(locked)
         }
@@ -93,9 +95,9 @@ class _Field:
         if self._kind.is_nested or self._kind.container != "one":
             return None
         interlocks = [
-            one
-            for one in self._of.panel.interlocks
-            if (one.topic, one.field) == (self._topic, self._path)
+            interlock
+            for interlock in self._of.panel.interlocks
+            if (interlock.topic, interlock.field) == (self._topic, self._path)
         ]
         if interlocks:
             return FieldSignal(self._path, self._permitting(interlocks), prompt=True)

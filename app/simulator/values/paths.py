@@ -54,7 +54,7 @@ def _index(
     if not isinstance(step, Key):
         return int(step)
     first = step.path.partition(".")[0]
-    if kind.is_nested and any(one.name == first for one in of[kind.name].fields):
+    if kind.is_nested and any(field.name == first for field in of[kind.name].fields):
         for number, item in enumerate(items):
             if get(item, path_steps(step.path)) == step.value:
                 return number
@@ -62,7 +62,7 @@ def _index(
         items[index : index + 1] = [{}]
         _put(items[index], of[kind.name], path_steps(step.path), step.value, of)
         return index
-    if not any(one.name == first for one in structure.fields):
+    if not any(field.name == first for field in structure.fields):
         return 0
     beside = fields[first] = list(fields.get(first, ()))
     if step.value not in beside:
