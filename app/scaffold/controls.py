@@ -28,7 +28,7 @@ ROLES: Final = {"start": "start", "stop": "stop", "reset": "reset"}
 
 def publishers(topic: SurveyedTopic, interfaces: Interfaces) -> Iterator[DraftWidget | Omission]:
     """Keys that publish on a topic that the robot listens to."""
-    nodes = {node for one in topic.subscribers for node in one.nodes}
+    nodes = {node for subscriber in topic.subscribers for node in subscriber.nodes}
     about = {"label": label_of(topic.name), "topic": topic.name, "type": topic.type}
     if topic.type in TWISTS:
         keys = {**about, "span": 6}
@@ -66,7 +66,7 @@ def calls(service: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     if not fields:
         keys = {"label": label, **about, **_role(service.name)}
         yield _control("call", service.name, service.nodes, keys)
-    elif [str(one.type) for one in fields] == ["bool"]:
+    elif [str(field.type) for field in fields] == ["bool"]:
         for value, word in ((True, "on"), (False, "off")):
             labelled: dict[str, Any] = {
                 "label": f"{label} {word}",
@@ -80,7 +80,7 @@ def goals(action: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     """A key that sends a goal with default values."""
     goal = interfaces.action_types(action.type).goal
     fields = interfaces.structures[goal].fields
-    plain = {one.name: one.default_value for one in fields if not one.type.is_nested}
+    plain = {field.name: field.default_value for field in fields if not field.type.is_nested}
     keys = {"label": label_of(action.name), "action": action.name, "type": action.type, "goal": plain}
     comment = "Fill in the goal." if fields else ""
     yield _control("action", action.name, action.nodes, keys, comment)

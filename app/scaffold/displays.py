@@ -30,7 +30,7 @@ def displays(
 ) -> Iterator[DraftWidget | Omission]:
     """The widgets of a topic that the robot publishes, or why it has none. `sample` is one of its
     messages, or None; `period_s` are the seconds between two, None if it is not published regularly."""
-    nodes = {node for one in topic.publishers for node in one.nodes}
+    nodes = {node for publisher in topic.publishers for node in publisher.nodes}
     about = {"topic": topic.name, "type": topic.type, **_qos(topic), **_max_age(topic, period_s)}
     place = place_of(topic.name, nodes)
     label = label_of(topic.name)
@@ -122,9 +122,11 @@ def _lamp(name: str, place: Place, keys: dict[str, Any], label: str) -> DraftWid
 
 def _lamps(name: str, place: Place, keys: dict[str, Any], constants: Sequence[str]) -> DraftWidget:
     """A lamp with a state for each constant; that of a fault is red."""
-    begins = zip(*(one.split("_")[:-1] for one in constants), strict=False)
+    begins = zip(*(constant.split("_")[:-1] for constant in constants), strict=False)
     begin = "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
-    texts = own_labels([(label_of(one.removeprefix(begin).lower()), one) for one in constants])
+    texts = own_labels(
+        [(label_of(constant.removeprefix(begin).lower()), constant) for constant in constants]
+    )
     states = [
         {"value": value, "text": text, "shape": "circle"}
         | ({"shape": "cross", "colour": "red"} if NEGATIVE.search(value) else {})
@@ -141,7 +143,7 @@ def _joints(
     names = [] if sample is None else list(sample.name)[:MAX_JOINTS]
     positions = [] if sample is None else list(sample.position)
     joints = [_joint(name, at) for name, at in zip(names, positions, strict=False) if name]
-    if not joints or len({one["name"] for one in joints}) < len(joints):
+    if not joints or len({joint["name"] for joint in joints}) < len(joints):
         yield Omission(topic.name, NO_JOINTS)
     else:
         keys = {"label": label, **about, "joint": joints, "span": 6}

@@ -83,7 +83,9 @@ def make_draft(
     """`base` with pages, interlock candidates and remarks, without the parts `left_out`: see
     `checked_draft`. `live`: controls are no comments."""
     candidates = interlock_candidates(shown(known.topics))
-    interlocks = [one for one in candidates if ("interlock", one.topic) not in left_out]
+    interlocks = [
+        candidate for candidate in candidates if ("interlock", candidate.topic) not in left_out
+    ]
     entries: list[DraftWidget] = []
     remarks: list[str] = []
     for topic in (topic for topic in known.topics if topic.announced):
@@ -96,16 +98,16 @@ def make_draft(
     remarks += [f"{name}: {LOST}" for name in lost_names(known)]
     for server in (*known.services, *known.actions):
         entries += _of_server(server, interfaces, remarks)
-    for one in known.parameters:
-        entries += controls.parameter(one)
+    for parameter in known.parameters:
+        entries += controls.parameter(parameter)
     remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unreadable]
     remarks += [f"{name} ({kind}): {why}" for (kind, name), why in left_out.items()]
-    entries = [one for one in entries if (one.kind, one.name) not in left_out]
+    entries = [entry for entry in entries if (entry.kind, entry.name) not in left_out]
     acting = [
-        replace(one, interlock=interlock_for(one, interlocks))
-        for one in with_own_labels([one for one in entries if one.control])
+        replace(label, interlock=interlock_for(label, interlocks))
+        for label in with_own_labels([one for one in entries if one.control])
     ]
-    pages, rest = make_pages([*(one for one in entries if not one.control), *acting], live)
+    pages, rest = make_pages([*(entry for entry in entries if not entry.control), *acting], live)
     remarks += [f"{name}: {NO_ROOM}" for name in dict.fromkeys(one.name for one in rest)]
     return replace(base, interlocks=interlocks, pages=pages, remarks=remarks)
 

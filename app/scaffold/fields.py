@@ -128,11 +128,11 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
     if type_name.partition("/")[0] in FOR_PROGRAMS or is_colour(type_name, interfaces):
         return
     plain = [
-        one
-        for one in interfaces.structures[type_name].fields
-        if (not one.type.is_nested or one.type.name in DEFAULT_FORMATS)
-        and one.type.container == "one"
-        and one.type.name != "wstring"
+        field
+        for field in interfaces.structures[type_name].fields
+        if (not field.type.is_nested or field.type.name in DEFAULT_FORMATS)
+        and field.type.container == "one"
+        and field.type.name != "wstring"
     ]
     for one in plain[:MOST_FIELDS]:
         word = "" if one.name == "data" and len(plain) == 1 else one.name.replace("_", " ")

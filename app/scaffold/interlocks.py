@@ -34,7 +34,7 @@ def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandi
                 topic=topic.name,
                 type=topic.type,
                 kept=topic.latched,
-                owners=tuple(node for one in topic.publishers for node in one.nodes),
+                owners=tuple(node for publisher in topic.publishers for node in publisher.nodes),
                 nodes=_several(topic),
             )
         )
@@ -43,9 +43,11 @@ def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandi
 
 def _several(topic: SurveyedTopic) -> str:
     """The names of the nodes if a topic has several publishers; "" if it has one."""
-    if max(Counter(one.bridge for one in topic.publishers).values()) == 1:
+    if max(Counter(publisher.bridge for publisher in topic.publishers).values()) == 1:
         return ""
-    return ", ".join(sorted({node for one in topic.publishers for node in one.nodes})) or "?"
+    return (
+        ", ".join(sorted({node for publisher in topic.publishers for node in publisher.nodes})) or "?"
+    )
 
 
 def _may_permit(topic: SurveyedTopic) -> bool:
@@ -57,13 +59,13 @@ def interlock_for(control: DraftWidget, candidates: Sequence[InterlockCandidate]
     """The id of the candidate for a control; "" for none. It is that of the nearest namespace around
     the control, there of the control's own node if there is one: the permission of another arm says
     nothing of this one. A control without a namespace may depend on those of a single namespace."""
-    around = [one for one in candidates if within(control.scope, _namespace(one))]
+    around = [candidate for candidate in candidates if within(control.scope, _namespace(candidate))]
     if around:
         depth = max(len(_namespace(one)) for one in around)
         nearest = [one for one in around if len(_namespace(one)) == depth]
         own = [one for one in nearest if {*one.owners} & {*control.nodes}]
         return (own or nearest)[0].id
-    if not control.scope and len({_namespace(one) for one in candidates}) == 1:
+    if not control.scope and len({_namespace(candidate) for candidate in candidates}) == 1:
         return candidates[0].id
     return ""
 

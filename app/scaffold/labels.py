@@ -13,7 +13,7 @@ MAX_LABEL: Final = 100
 
 def with_own_labels(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     """The entries, no two with the same label."""
-    labels = own_labels([(str(one.keys["label"]), one.name) for one in entries])
+    labels = own_labels([(str(entry.keys["label"]), entry.name) for entry in entries])
     return [
         one if label == one.keys["label"] else replace(one, keys={**one.keys, "label": label})
         for one, label in zip(entries, labels, strict=True)

@@ -53,12 +53,12 @@ def _arranged(entries: Sequence[DraftWidget], own: int, live: bool) -> dict[str,
 
 def _by_place(entries: Sequence[DraftWidget], own: int) -> dict[Place, list[DraftWidget]]:
     """The entries by the first part of their places. Small places are put together."""
-    sizes = Counter(one.place[:1] for one in entries)
+    sizes = Counter(entry.place[:1] for entry in entries)
     kept = {place for place, size in sizes.most_common(own) if size > 1} | {(NODES_PAGE,)}
     found: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
-    for one in entries:
-        place = one.place[:1]
-        found[place if place in kept else (GENERAL,)].append(one)
+    for entry in entries:
+        place = entry.place[:1]
+        found[place if place in kept else (GENERAL,)].append(entry)
     return found
 
 
@@ -66,11 +66,11 @@ def _parts(entries: Sequence[DraftWidget], depth: int, live: bool) -> list[list[
     """The entries in parts with at most `MOST_WIDGETS`, those of one place together where they fit."""
     if _room(entries, live) <= MOST_WIDGETS:
         return [_in_order(entries)]
-    if all(len(one.place) <= depth for one in entries):
+    if all(len(entry.place) <= depth for entry in entries):
         return _cut(entries, live)
     by_place: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
-    for one in entries:
-        by_place[one.place[: depth + 1]].append(one)
+    for entry in entries:
+        by_place[entry.place[: depth + 1]].append(entry)
     parts: list[list[DraftWidget]] = []
     for place in sorted(by_place):
         for part in _parts(by_place[place], depth + 1, live):
@@ -82,7 +82,7 @@ def _parts(entries: Sequence[DraftWidget], depth: int, live: bool) -> list[list[
 
 
 def _room(entries: Sequence[DraftWidget], live: bool) -> int:
-    return sum(live or not one.control for one in entries)
+    return sum(live or not entry.control for entry in entries)
 
 
 def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
@@ -93,31 +93,33 @@ def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
 
 
 def _in_order(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
-    shown = [one for one in entries if not one.control]
+    shown = [entry for entry in entries if not entry.control]
     shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
-    acting = sorted((one for one in entries if one.control), key=lambda one: (one.kind, one.name))
+    acting = sorted((entry for entry in entries if entry.control), key=lambda one: (one.kind, one.name))
     return [*shown, *acting]
 
 
 def _common(entries: Sequence[DraftWidget]) -> Place:
     """The first parts of the places that all have."""
-    places = zip(*(one.place for one in entries), strict=False)
+    places = zip(*(entry.place for entry in entries), strict=False)
     return tuple(parts[0] for parts in takewhile(lambda parts: len({*parts}) == 1, places))
 
 
 def _whole(page: str, entries: Sequence[DraftWidget]) -> list[DraftWidget]:
-    shown = with_own_labels([one for one in entries if not one.control])
+    shown = with_own_labels([entry for entry in entries if not entry.control])
     if not shown:
         keys = {"label": CONTROLS_ONLY, "size": "small", "span": 12}
         shown = [DraftWidget(kind="label", name=f"{page}/note", keys=keys)]
-    return [*shown, *_trend(shown, page), *(one for one in entries if one.control)]
+    return [*shown, *_trend(shown, page), *(entry for entry in entries if entry.control)]
 
 
 def _trend(entries: Sequence[DraftWidget], page: str) -> Iterator[DraftWidget]:
     """A trend of the gauges of the unit that most of them have."""
-    gauges = [one for one in entries if one.kind == "gauge"]
-    units = Counter(one.keys.get("unit", "") for one in gauges)
-    same = [one for one in gauges if one.keys.get("unit", "") == max(units, key=units.__getitem__)]
+    gauges = [entry for entry in entries if entry.kind == "gauge"]
+    units = Counter(gauge.keys.get("unit", "") for gauge in gauges)
+    same = [
+        gauge for gauge in gauges if gauge.keys.get("unit", "") == max(units, key=units.__getitem__)
+    ]
     pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
     if pens:
         keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}

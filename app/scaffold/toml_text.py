@@ -27,7 +27,7 @@ def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
             live = trial or not entry.control or (controls and bool(entry.interlock))
             lines += _widget(entry, id_of(entry.name, taken), live, taken)
     if draft.remarks:
-        remarks = (f"# - {' '.join(one.split())}" for one in draft.remarks)
+        remarks = (f"# - {' '.join(remark.split())}" for remark in draft.remarks)
         lines += ["", *_comment("Not on the panel:"), *remarks]
     return "\n".join(printable(line) for line in lines) + "\n"
 
@@ -76,17 +76,19 @@ def _interlocks(draft: Draft) -> Iterator[str]:
         " before a control depends on it. A control is locked while its interlock is not true, is"
         " unknown, or the robot is cut off."
     )
-    for one in draft.interlocks:
+    for interlock in draft.interlocks:
         yield "[[interlock]]"
-        yield f"id = {_value(one.id)}"
-        yield f"label = {_value(one.label)}"
-        yield f"topic = {_value(one.topic)}"
-        yield f"type = {_value(one.type)}"
-        if one.nodes:
-            yield from _comment(f"It has several publishers, of which the last counts: {one.nodes}")
+        yield f"id = {_value(interlock.id)}"
+        yield f"label = {_value(interlock.label)}"
+        yield f"topic = {_value(interlock.topic)}"
+        yield f"type = {_value(interlock.type)}"
+        if interlock.nodes:
+            yield from _comment(
+                f"It has several publishers, of which the last counts: {interlock.nodes}"
+            )
         else:
             yield 'publishers = "one"  # locks while another node publishes it too'
-        if one.kept:
+        if interlock.kept:
             yield "require_publisher = true  # locks when its publisher is gone"
         else:
             yield "max_age_s = 2.0  # locks when no message arrives for so long"

@@ -95,7 +95,7 @@ def test_a_control_depends_on_the_permission_of_its_own_namespace() -> None:
         "right_home": "right_enabled",
     }
     assert {found[name]["label"] for name in ("left_home", "right_home")} == {"Left home", "Right home"}
-    labels = {one["id"]: one["label"] for one in tomllib.loads(text)["interlock"]}
+    labels = {load["id"]: load["label"] for load in tomllib.loads(text)["interlock"]}
     assert labels == {"left_enabled": "left enabled", "right_enabled": "right enabled"}
     # Neither arm's permission says anything of the light and the table.
     assert not {"light", "table_turn"} & found.keys()
@@ -137,7 +137,7 @@ def test_an_enumeration_is_a_lamp_with_its_constants(cell_msgs: Path) -> None:
     topics = [published(f"/{name.lower()}", f"cell_msgs/msg/{name}") for name in MESSAGES]
     found = widgets(of_cell_msgs(cell_msgs, *topics))
     modes = found["drivemode_drive_mode"]["states"]
-    assert [(one["value"], one["text"], one["shape"]) for one in modes] == [
+    assert [(mode["value"], mode["text"], mode["shape"]) for mode in modes] == [
         ("MODE_IDLE", "Idle", "circle"),
         ("MODE_AUTO", "Auto", "circle"),
         ("MODE_FAULT", "Fault", "cross"),

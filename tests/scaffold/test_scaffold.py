@@ -114,7 +114,7 @@ def test_a_robot_with_nothing_is_a_good_panel_too(tmp_path: Path) -> None:
 
 def test_no_control_is_live_until_it_is_asked_for() -> None:
     text = text_of(**CELL)
-    assert {one["kind"] for one in widgets(text).values()} <= {
+    assert {widget["kind"] for widget in widgets(text).values()} <= {
         "indicator",
         "readout",
         "gauge",
@@ -363,7 +363,7 @@ def test_several_robots_have_their_entries(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(text_of(base=Draft(title="Cells", robots=robots), topics=[ENABLED]))
     panel = check_panel(path).panel
-    assert [(one.namespace, one.connect) for one in panel.robots] == [
+    assert [(robot.namespace, robot.connect) for robot in panel.robots] == [
         ("/r1", ("tcp/r1:7447",)),
         ("/r2", ()),
     ]
@@ -422,7 +422,7 @@ def test_times_and_durations_are_shown_as_such(tmp_path: Path) -> None:
     job.parent.mkdir(parents=True)
     job.write_text("builtin_interfaces/Time began\nbuiltin_interfaces/Duration took\n")
     fields = shown_fields("cell_msgs/msg/Job", load_interfaces("jazzy", [tmp_path]))
-    assert [(one.field, one.kind) for one in fields] == [
+    assert [(field.field, field.kind) for field in fields] == [
         ("began", "builtin_interfaces/msg/Time"),
         ("took", "builtin_interfaces/msg/Duration"),
     ]
