@@ -34,7 +34,7 @@ def harmless_report(found: Diagnosis, version: str) -> dict[str, Any]:
         "version": version,
         "well": report.is_well,
         "passed": len(report.facts) + report.more_facts,
-        "findings": [_finding(one) for one in report.findings],
+        "findings": [_finding(finding) for finding in report.findings],
         "more": dict(report.more),
     }
 

@@ -155,7 +155,7 @@ def _logged(tree: ast.AST) -> Iterator[Sentence]:
             continue
         arguments = call.args[1:] if call.func.attr == "log" else call.args
         if arguments and isinstance(text := arguments[0], ast.Constant) and isinstance(text.value, str):
-            yield sentence(text.value, [ast.unparse(one) for one in arguments[1:]])
+            yield sentence(text.value, [ast.unparse(argument) for argument in arguments[1:]])
 
 
 def harmless_line(line: str, unit: str = "") -> str:

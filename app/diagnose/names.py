@@ -88,10 +88,10 @@ class PanelNames:
         return [topic for graph, own in self.places(name) if (topic := graph.topic(own)) is not None]
 
     def publishers(self, name: str) -> list[TopicEndpoint]:
-        return [one for topic in self.topics(name) for one in topic.publishers]
+        return [publisher for topic in self.topics(name) for publisher in topic.publishers]
 
     def subscribers(self, name: str) -> list[TopicEndpoint]:
-        return [one for topic in self.topics(name) for one in topic.subscribers]
+        return [subscriber for topic in self.topics(name) for subscriber in topic.subscribers]
 
     def topic_forwarding(self, name: str, of: TopicList) -> Forwarding | None:
         """Of the publishers or subscribers of a topic; None without any."""
@@ -107,10 +107,17 @@ class PanelNames:
         return _best(server_forwarding(graph, kind, own) for graph, own in self.places(name))
 
     def services(self, name: str) -> list[Server]:
-        return [one for graph, own in self.places(name) for one in graph.services if one.name == own]
+        return [
+            service
+            for graph, own in self.places(name)
+            for service in graph.services
+            if service.name == own
+        ]
 
     def actions(self, name: str) -> list[Server]:
-        return [one for graph, own in self.places(name) for one in graph.actions if one.name == own]
+        return [
+            action for graph, own in self.places(name) for action in graph.actions if action.name == own
+        ]
 
     def nodes(self) -> list[Node]:
         return [node for graph in self.graphs for node in graph.nodes]
@@ -128,7 +135,7 @@ class PanelNames:
 
     def routes(self, name: str) -> list[BridgeRoute]:
         keys = self.robot.possible_keys(name)
-        return [one for graph in self.graphs for one in graph.routes if one.key in keys]
+        return [route for graph in self.graphs for route in graph.routes if route.key in keys]
 
     def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
         """A sentence with similar names in the graph; "" if there are none."""

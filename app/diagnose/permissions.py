@@ -29,7 +29,7 @@ def check_permissions(
 
 def _check_topic(report: Report, behind: PanelNames, observed: ReceivedSamples, topic: str) -> None:
     """Whether its publisher stays, and a panel that starts later would get a permission."""
-    using = [one for one in behind.robot.panel.interlocks if one.topic == topic]
+    using = [interlock for interlock in behind.robot.panel.interlocks if interlock.topic == topic]
     key, ids = behind.robot.key(topic), ", ".join(one.id for one in using)
     count, window = len(observed.live(key)), f"{observed.window_s:.1f}"
     publishers = behind.publishers(topic)
@@ -55,7 +55,7 @@ def _check_topic(report: Report, behind: PanelNames, observed: ReceivedSamples, 
             window=window,
             limit=f"{min(limits):g}",
         )
-    elif count < REGULAR and not any(one.qos.transient_local for one in publishers):
+    elif count < REGULAR and not any(publisher.qos.transient_local for publisher in publishers):
         report.find("permission_not_latched", topic, robot=robot, ids=ids, count=count, window=window)
     else:
         report.fact(f"permission {topic} came {len(observed.samples[key])} times in {window} s")
@@ -66,10 +66,10 @@ def _check_publishers(
 ) -> None:
     """Whether several nodes publish a value of which the last one counts. Two bridges of one domain
     know the same publishers."""
-    number = max(Counter(one.bridge for one in publishers).values())
+    number = max(Counter(publisher.bridge for publisher in publishers).values())
     whole = [one.id for one in using if not has_key(one.field)]
     if number > 1 and whole:
-        nodes = ", ".join(sorted({node for one in publishers for node in one.nodes})) or "?"
+        nodes = ", ".join(sorted({node for publisher in publishers for node in publisher.nodes})) or "?"
         ids, topic = ", ".join(whole), using[0].topic
         report.find("permission_publishers", topic, robot=robot, ids=ids, count=number, nodes=nodes)
 

@@ -130,9 +130,9 @@ async def _receive(
         for key in robot.possible_keys(name)
     }
     waited_for = {
-        robot.key(one.topic)
-        for one in panel.interlocks
-        if one.max_age_s is not None
-        or not any(end.qos.transient_local for end in behind.publishers(one.topic))
+        robot.key(interlock.topic)
+        for interlock in panel.interlocks
+        if interlock.max_age_s is not None
+        or not any(end.qos.transient_local for end in behind.publishers(interlock.topic))
     }
     return await receive(link.session, dialect, expressions, waited_for, longest_s)

@@ -37,7 +37,7 @@ class TopicChecks:
         self._interfaces = interfaces
         self._panel = behind.robot.panel
         self._robot = behind.robot.id
-        self._permissions = {one.topic for one in self._panel.interlocks}
+        self._permissions = {interlock.topic for interlock in self._panel.interlocks}
 
     def check(self) -> None:
         for topic, wanted in self._panel.listened().items():
@@ -68,9 +68,13 @@ class TopicChecks:
         self._check_types(topic, wanted, publishers)
         qos = self._panel.qos(topic).wire_qos
         adapts = topic in self._panel.adaptive_topics
-        if qos.reliable and not adapts and any(one.qos.reliable is False for one in publishers):
+        if (
+            qos.reliable
+            and not adapts
+            and any(publisher.qos.reliable is False for publisher in publishers)
+        ):
             self._find("topic_qos", topic, detail=BEST_EFFORT)
-        if qos.transient_local and not all(one.qos.transient_local for one in publishers):
+        if qos.transient_local and not all(publisher.qos.transient_local for publisher in publishers):
             self._find("topic_qos", topic, detail=VOLATILE)
         routes = self._behind.routes(topic)
         if any(r.direction == "pub" and r.remote and not r.endpoint for r in routes):
@@ -85,7 +89,7 @@ class TopicChecks:
         if not self._is_let_through("subscribers", topic):
             return
         self._check_types(topic, wanted, subscribers)
-        misfits = [_misfit(one, self._panel.qos(topic).wire_qos) for one in subscribers]
+        misfits = [_misfit(subscriber, self._panel.qos(topic).wire_qos) for subscriber in subscribers]
         if all(misfits):  # one that gets it is enough
             self._find("topic_qos", topic, detail=misfits[0])
 

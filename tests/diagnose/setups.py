@@ -97,4 +97,4 @@ class Setup:
 
 def named(findings: list[Finding]) -> list[tuple[str, str]]:
     """(code, name) of each."""
-    return [(one.code, one.about) for one in findings]
+    return [(finding.code, finding.about) for finding in findings]

@@ -279,7 +279,9 @@ def test_of_several_robots_each_is_looked_at(shared: Bridge, robot: RosNode, set
     )
     text = panel_of(readout("/wrods"), more=f"robot = [{entries}]\n")
     found = setup.diagnose(text, shared.endpoint, listen_s=0.2)
-    said = [(one.robot, one.code) for one in found.report.findings if one.severity != "note"]
+    said = [
+        (finding.robot, finding.code) for finding in found.report.findings if finding.severity != "note"
+    ]
     assert said == [("left", "topic_no_publisher"), ("right", "no_router")]
     assert set(found.graphs) == {"left"}
 
@@ -362,7 +364,7 @@ def test_two_bridges_for_one_robot(shared: Bridge, robot: RosNode, setup: Setup)
     other = Bridge(shared.domain, options=[f'connect/endpoints=["{shared.endpoint}"]'])
     with started(other), closing(Client(other.endpoint)) as client:
         until(lambda: both(client), "both bridges forward it")
-        codes = [one.code for one in setup.findings(WELL, shared.endpoint)]
+        codes = [finding.code for finding in setup.findings(WELL, shared.endpoint)]
         assert codes[0] == "bridges_two"
 
 

@@ -150,7 +150,7 @@ def test_a_bridges_line_is_shown_by_its_module() -> None:
 
 
 def test_every_sentence_of_the_program_is_known() -> None:
-    told = {one.fixed for one in sentences()}
+    told = {sentence.fixed for sentence in sentences()}
     assert ("Zenoh link up",) in told
     assert ("press ", " of ", " by ", " with ", ": ", ": ", "") in told
     assert all(sum(map(str.isalpha, "".join(fixed))) >= LEAST_LETTERS for fixed in told)

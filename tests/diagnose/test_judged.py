@@ -154,7 +154,7 @@ def test_a_permission_that_the_bridge_has_lost_is_not_called_stale(tmp_path: Pat
 )
 def test_a_name_that_is_nearly_there_is_named(there: str, words: str, tmp_path: Path) -> None:
     report = judged(robot(tmp_path, panel_of(readout("/words"))), topics=(topic(there),))
-    assert [one.what for one in report.findings] == [f"No node publishes /words.{words}"]
+    assert [finding.what for finding in report.findings] == [f"No node publishes /words.{words}"]
 
 
 def test_advice_for_several_is_given_once(tmp_path: Path) -> None:
@@ -215,7 +215,7 @@ def test_a_bridge_that_reaches_no_node(config: dict[str, Any], code: str, tmp_pa
     report = Report()
     behind = PanelNames.of(robot(tmp_path, panel_of(readout("/words"))), graph)
     check_graph(report, graph, behind)
-    assert [one.code for one in report.findings] == [code]
+    assert [finding.code for finding in report.findings] == [code]
     assert ("CYCLONEDDS_URI" in as_text(report)) is (code == "bridge_localhost")
 
 
@@ -252,8 +252,8 @@ def test_the_clock_of_the_bridges_machine(ahead_s: float, expected: list[str], t
     came = observed(*((at, at + ahead_s) for at in (0.1, 1.1, 2.1)))
     check_clocks(report, robot(tmp_path, panel_of(readout("/words"))), came, INTERFACES)
     assert report.codes() == expected
-    for one in report.findings:
-        assert f"{abs(ahead_s):.1f} s {'ahead of' if ahead_s > 0 else 'behind'}" in one.what
+    for finding in report.findings:
+        assert f"{abs(ahead_s):.1f} s {'ahead of' if ahead_s > 0 else 'behind'}" in finding.what
 
 
 def test_a_clock_that_nothing_is_known_of(tmp_path: Path) -> None:
@@ -283,7 +283,7 @@ def test_another_version_of_zenoh(theirs: str, expected: list[str]) -> None:
             far = {"sessions": [{"peer": "them"}], "version": "v0.5.0"}
             near = {"sessions": [{"peer": "us"}], "version": theirs}
             answers = [b"no JSON", json.dumps(far).encode(), json.dumps(near).encode()]
-            return [(selector, one) for one in answers] if "router" in selector else []
+            return [(selector, answer) for answer in answers] if "router" in selector else []
 
     report = Report()
     asyncio.run(link.check_version(report, Session(), "tcp/robot:7447", ""))
@@ -340,5 +340,9 @@ def test_the_publishers_of_a_permission_are_named_if_there_are_several(
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
     report = Report()
     check_permissions(report, PanelNames.of(here, graph), ReceivedSamples(), INTERFACES)
-    found = [one.details["nodes"] for one in report.findings if one.code == "permission_publishers"]
+    found = [
+        finding.details["nodes"]
+        for finding in report.findings
+        if finding.code == "permission_publishers"
+    ]
     assert found == ([] if nodes is None else [nodes])

@@ -132,7 +132,7 @@ def test_japanese_needs_its_fonts(
     report = Report()
     check_fonts(report, ("en", "ja"), has_font, lambda: True)
     assert named(report.findings) == [("fonts_missing", tag) for tag in missing]
-    assert all("fonts-noto-cjk" in one.do for one in report.findings)
+    assert all("fonts-noto-cjk" in finding.do for finding in report.findings)
 
 
 def test_a_machine_without_a_browser_needs_no_fonts(

@@ -87,7 +87,7 @@ def journal_of(folder: Path, lines: Sequence[str], unit: str = "operator-panel.s
         {"__REALTIME_TIMESTAMP": f"{1795631090000000 + n}", "_SYSTEMD_UNIT": unit, "MESSAGE": line}
         for n, line in enumerate(lines)
     ]
-    (folder / "journal").write_text("".join(f"{json.dumps(one)}\n" for one in reversed(fields)))
+    (folder / "journal").write_text("".join(f"{json.dumps(field)}\n" for field in reversed(fields)))
     program = folder / "journalctl"
     program.write_text(f'#!/bin/sh\ncat "{folder}/journal"\n')
     program.chmod(0o755)
@@ -135,11 +135,11 @@ def test_no_secret_is_in_it_in_any_form_from_anywhere(
     assert doctor["findings"][0]["code"] == "server_running"
     assert doctor["findings"][0]["about"] == f"127.0.0.1 port {demo.port}"
     entries = [json.loads(line) for line in files["logs/operators-log.jsonl"].splitlines()]
-    outcomes = {(one.get("widget"), one.get("outcome")) for one in entries}
+    outcomes = {(entry.get("widget"), entry.get("outcome")) for entry in entries}
     assert {("say", "published"), ("count", "refused")} <= outcomes
-    sent = next(one for one in entries if one.get("outcome") == "published")
+    sent = next(entry for entry in entries if entry.get("outcome") == "published")
     assert (sent["codes"], sent["parameters"]["topic"]) == (["published"], "/say")
-    refused = next(one for one in entries if one.get("outcome") == "refused")
+    refused = next(entry for entry in entries if entry.get("outcome") == "refused")
     assert "input_not_a_number" in refused["codes"]
     assert json.loads(files["state/snapshot.json"])["widgets"]["say"]["enabled"] is True
     assert json.loads(files["state/readyz.json"]) == {"ready": True, "robots": {}}
