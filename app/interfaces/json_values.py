@@ -90,5 +90,5 @@ def _plain_numbers(values: "memoryview[Any]") -> list[Any]:
 @lru_cache(4096)
 def _field_names(of: type[Any]) -> tuple[tuple[str, str], ...]:
     """(attribute, field name) of a message class. No ROS field name ends with "_"."""
-    own = [one.name for one in fields(of) if one.name != PLACEHOLDER]
+    own = [field.name for field in fields(of) if field.name != PLACEHOLDER]
     return tuple((name, name.removesuffix("_")) for name in own)

@@ -27,10 +27,10 @@ def _structure_text(structure: Structure) -> str:
 def _lines(structure: Structure) -> Iterator[str]:
     for name, value in structure.constants.items():
         yield f"{_base_name(structure.constant_types[name])} {name}={_literal(value)}"
-    for one in structure.fields:
-        kind, name = str(one.type), one.type.name
-        short = _short_name(name) if one.type.is_nested else _base_name(name)
-        yield f"{short}{kind.removeprefix(name)} {one.name}"
+    for field in structure.fields:
+        kind, name = str(field.type), field.type.name
+        short = _short_name(name) if field.type.is_nested else _base_name(name)
+        yield f"{short}{kind.removeprefix(name)} {field.name}"
 
 
 def _short_name(name: str) -> str:

@@ -166,7 +166,7 @@ def _parse_list(kind: Type, text: str) -> list[Any]:
     match = _LIST.fullmatch(text)
     if match is None:
         raise ValueError(f"{text} is not a list: the default of {kind} must be like [1, 2]")
-    values = [_parse_value(kind.element, one) for one in _split_elements(match[1])]
+    values = [_parse_value(kind.element, element) for element in _split_elements(match[1])]
     if kind.container == "array" and len(values) != kind.size:
         raise ValueError(f"{kind} needs {kind.size} elements, not {len(values)}")
     if kind.size and len(values) > kind.size:

@@ -200,7 +200,7 @@ class Interfaces:
         if type_name not in self._checks:
             self.require(type_name)
             structure = self._structures[type_name]
-            checks = [field_check(one.type, structure, self._check) for one in structure.fields]
+            checks = [field_check(field.type, structure, self._check) for field in structure.fields]
             make = self._codec.message_class(type_name)
             self._checks[type_name] = message_check(structure, make, checks)
         return self._checks[type_name]
@@ -252,7 +252,9 @@ def _suggestions(name: str, known: Sequence[str]) -> list[str]:
 def _similar(rest: str, known: Sequence[str]) -> list[str]:
     """The names whose last part is similar."""
     last = {one.rpartition("/")[2]: one for one in known}
-    return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MAX_SUGGESTIONS)]
+    return [
+        last[match] for match in get_close_matches(rest.rpartition("/")[2], last, n=MAX_SUGGESTIONS)
+    ]
 
 
 def load_interfaces(distro: str, folders: Sequence[Path] = ()) -> Interfaces:

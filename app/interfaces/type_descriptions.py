@@ -45,8 +45,8 @@ def definitions_of(described: Any, wanted_hash: str = "") -> Definitions:
             raise InterfaceError(f"the description of {main.name} lacks {name}")
         return structures[name]
 
-    for one in structures.values():
-        for _, name in one.nested_fields():
+    for structure in structures.values():
+        for _, name in structure.nested_fields():
             find(name)
     _check_acyclic(structures)
     if wanted_hash and (found := type_hash(main, find)) != wanted_hash:
@@ -73,8 +73,8 @@ def _structure(described: Any) -> Structure:
     name = described.type_name
     if not _is_type_name(name):
         raise InterfaceError(f'"{name}" is not a type name, in a type description')
-    fields = tuple(_field(name, one) for one in described.fields if one.name != PLACEHOLDER)
-    if len({one.name for one in fields}) < len(fields):
+    fields = tuple(_field(name, field) for field in described.fields if field.name != PLACEHOLDER)
+    if len({field.name for field in fields}) < len(fields):
         raise InterfaceError(f"{name} has two fields of one name, in a type description")
     return Structure(name, fields)
 

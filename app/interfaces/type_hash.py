@@ -63,7 +63,7 @@ def _collect(
 
 def _describe_structure(structure: Structure) -> dict[str, Any]:
     fields = structure.fields or (Field(PLACEHOLDER, Type("uint8")),)
-    return {"type_name": structure.name, "fields": [_describe_field(one) for one in fields]}
+    return {"type_name": structure.name, "fields": [_describe_field(field) for field in fields]}
 
 
 def _describe_field(one: Field) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def plain(fields: Any) -> Any:
     """Fields as they were given, in the form of `to_plain`."""
     if isinstance(fields, Mapping):
         return {name: plain(value) for name, value in fields.items()}
-    return [plain(one) for one in fields] if isinstance(fields, list) else to_plain(fields)
+    return [plain(field) for field in fields] if isinstance(fields, list) else to_plain(fields)
 
 
 def cut(data: bytes, like: bytes) -> bytes:

@@ -115,9 +115,9 @@ class Walker:
         inner = self._structures[kind.name].fields if kind.is_nested else ()
         own = [one.name for one in inner if _is_key(one.type)]
         lists = [
-            one.name
-            for one in around.fields
-            if one.type.container != "one" and _is_key(one.type.element)
+            field.name
+            for field in around.fields
+            if field.type.container != "one" and _is_key(field.type.element)
         ]
         lists = [name for name in lists if name not in {one.name for one in inner}]
         if own and self._chance.random() < 0.5:
@@ -132,7 +132,7 @@ class Walker:
         return "index", self._chance.randint(0, most)
 
     def _any(self, fields: Any, key: str) -> Any:
-        kind = next(one.type.element for one in fields if one.name == key)
+        kind = next(field.type.element for field in fields if field.name == key)
         return {"bool": True, "string": "x", "wstring": "x"}.get(kind.name, 1)
 
 
@@ -202,7 +202,7 @@ def test_damage_raises_nothing_but_a_decode_error(cell: Interfaces) -> None:
         at, byte = chance.randrange(len(whole)), chance.choice((0, 1, 0x7F, 0xFF))
         readable(reader, whole[:at] + bytes((byte,)) + whole[at + 1 :])
     for seed, name in list(enumerate(cell.structures))[:: several(4, 1)]:
-        own = cell.field_reader(name, [one.name for one in cell.structures[name].fields])
+        own = cell.field_reader(name, [field.name for field in cell.structures[name].fields])
         for data in garbage(seed):
             readable(own, data)
 

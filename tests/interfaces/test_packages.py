@@ -55,7 +55,7 @@ def make(tmp_path: Path) -> Make:
 
 def test_a_package_brings_messages_services_and_actions(make: Make) -> None:
     cell = Interfaces("jazzy", [make(CELL)])
-    assert [str(one.type) for one in cell.structures["cell_msgs/msg/Tool"].fields] == [
+    assert [str(field.type) for field in cell.structures["cell_msgs/msg/Tool"].fields] == [
         "string<=8",
         "uint8",
         "float32[3]",

@@ -81,9 +81,9 @@ def test_a_values_text_is_that_of_its_plain_value(cell: Interfaces) -> None:
         whole = str(to_plain(message))
         assert plain_text(message, len(whole)) == whole, seed
         assert plain_text(message, 100) == whole[:99] + "…", seed
-        for one in cell.structures[EVERYTHING].fields:
-            value = getattr(message, one.attribute)
-            assert plain_text(value, 10**9) == str(to_plain(value)), (seed, one.name)
+        for field in cell.structures[EVERYTHING].fields:
+            value = getattr(message, field.attribute)
+            assert plain_text(value, 10**9) == str(to_plain(value)), (seed, field.name)
 
 
 class Endless(list[int]):
@@ -269,7 +269,7 @@ def test_a_browser_gets_what_json_can_say(value: Any, plain: Any) -> None:
 
 def test_a_message_becomes_a_table_of_its_fields(cell: Interfaces, good: dict[str, Any]) -> None:
     plain = to_plain(cell.decode(EVERYTHING, cell.encode(EVERYTHING, good)))
-    assert list(plain) == [one.name for one in cell.structures[EVERYTHING].fields]
+    assert list(plain) == [field.name for field in cell.structures[EVERYTHING].fields]
     assert plain["nothing"] == {}
     assert plain["high"] == str(2**64 - 1)
     assert plain["times"][0] == {"sec": 2**31 - 1, "nanosec": 2**32 - 1}

@@ -51,8 +51,8 @@ class TruncatedReader:
     def _read_structure(self, name: str, at: int) -> tuple[Any, int]:
         fields, make = self._factory(name)
         values = []
-        for one in fields:
-            value, at = self._read_value(one.type, at)
+        for field in fields:
+            value, at = self._read_value(field.type, at)
             values.append(value)
         return make(*values), at
 
