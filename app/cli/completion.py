@@ -47,7 +47,7 @@ def _choices(parser: argparse.ArgumentParser) -> Iterator[tuple[list[str], list[
     """(options, values) of the options whose value is one of several."""
     for action in parser._actions:
         if action.option_strings and action.choices is not None:
-            yield list(action.option_strings), [str(one) for one in action.choices]
+            yield list(action.option_strings), [str(choice) for choice in action.choices]
 
 
 def _has_topic(parser: argparse.ArgumentParser) -> bool:

@@ -55,7 +55,7 @@ def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
         "version": installed_version(),
         "panel": str(settings.panel),
         "well": found.report.is_well,
-        "findings": [one.as_json() for one in found.report.findings],
+        "findings": [finding.as_json() for finding in found.report.findings],
         "more": dict(found.report.more),
         "facts": found.report.facts,
     }
@@ -64,7 +64,12 @@ def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
 def as_text(report: Report, verbose: bool = False) -> str:
     """A line for each finding, errors first; after those of one kind what to do about them."""
     lines = [f"ok       {fact}" for fact in report.facts] if verbose else []
-    ordered = [one for severity in SEVERITIES for one in report.findings if one.severity == severity]
+    ordered = [
+        finding
+        for severity in SEVERITIES
+        for finding in report.findings
+        if finding.severity == severity
+    ]
     last = {one.code: one for one in ordered}
     for advice, found in groupby(ordered, lambda one: one.do):
         for one in found:

@@ -88,7 +88,7 @@ def _checked(make: Callable[[LeftOut], Draft], target: Path | None) -> Draft:
     """The draft without what a panel file can't have; ScaffoldError if it has other faults."""
     draft, faults = checked_draft(make, partial(faults_of_text, folder=_folder(target)))
     if faults:
-        raise ScaffoldError(f"no panel can be made of this: {few([str(one) for one in faults])}")
+        raise ScaffoldError(f"no panel can be made of this: {few([str(fault) for fault in faults])}")
     return draft
 
 
@@ -98,7 +98,7 @@ def _folder(target: Path | None) -> Path:
 
 def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | None) -> Draft:
     """All but the pages. Several robots, and a place that is not that of zenoh.json5, are entries."""
-    others = [one.namespace for one in graph.robots if one.topics] if not place.namespace else []
+    others = [robot.namespace for robot in graph.robots if robot.topics] if not place.namespace else []
     names = others if len(others) > 1 else [namespace]
     robots = []
     ids = [f"robot{number}" for number in range(1, len(names) + 1)] if len(names) > 1 else ["robot"]
@@ -115,7 +115,7 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
         namespace=namespace,
         robots=robots if len(names) > 1 or place.connect else (),
         distro=place.distro,
-        interfaces=[os.path.relpath(one, folder) for one in place.interfaces],
+        interfaces=[os.path.relpath(interface, folder) for interface in place.interfaces],
     )
 
 
@@ -127,12 +127,12 @@ def _write(target: Path, text: str, force: bool) -> None:
 def _summary(target: Path, draft: Draft, live: bool) -> Iterator[str]:
     """What was written, and what to do next. `live`: the controls are not commented out."""
     widgets = [one for page in draft.pages.values() for one in page]
-    acting = sum(one.control for one in widgets)
+    acting = sum(widget.control for widget in widgets)
     yield (
         f"{target}: {len(draft.pages)} page(s), {len(widgets) - acting} display(s),"
         f" {acting} control(s), {len(draft.interlocks)} interlock candidate(s)"
     )
-    if live and (alone := sum(one.control and not one.interlock for one in widgets)):
+    if live and (alone := sum(widget.control and not widget.interlock for widget in widgets)):
         yield f"{alone} of the controls are commented out: no candidate is of their namespace."
     if acting and not live:
         yield "The controls are commented out: uncomment those that you want, each with its interlock."

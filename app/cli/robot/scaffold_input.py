@@ -37,10 +37,10 @@ def robot_at(graph: GraphSnapshot, namespace: str) -> tuple[RobotGraph, str]:
 def usable(graph: GraphSnapshot) -> GraphSnapshot:
     """The graph without the robots that a panel can't have: those with a namespace that is none of
     ROS 2, and those beyond the `MOST_ROBOTS` with the most topics."""
-    robots = [one for one in graph.robots if NAMESPACE.fullmatch(one.namespace)]
-    robots = [one for one in robots if "__" not in one.namespace]
+    robots = [robot for robot in graph.robots if NAMESPACE.fullmatch(robot.namespace)]
+    robots = [robot for robot in robots if "__" not in robot.namespace]
     fullest = sorted(robots, key=lambda one: -len(one.topics))[:MOST_ROBOTS]
-    return replace(graph, robots=tuple(one for one in graph.robots if one in fullest))
+    return replace(graph, robots=tuple(robot for robot in graph.robots if robot in fullest))
 
 
 async def read_scaffold_input(
@@ -48,20 +48,22 @@ async def read_scaffold_input(
 ) -> Known:
     """What is on the robot, with names below the panel's namespace."""
     parameters, unreadable = await _parameters(NodeServices(robot, interfaces, observer), robot, below)
-    topics = [_topic(one, below) for one in robot.topics if _is_of(one, below)]
+    topics = [_topic(topic, below) for topic in robot.topics if _is_of(topic, below)]
     heard = await _listen(observer, topics, interfaces, listen_s)
     return Known(
         topics=topics,
-        services=[_server(one, below) for one in robot.services if _is_below(one.name, below)],
-        actions=[_server(one, below) for one in robot.actions if _is_below(one.name, below)],
+        services=[
+            _server(service, below) for service in robot.services if _is_below(service.name, below)
+        ],
+        actions=[_server(action, below) for action in robot.actions if _is_below(action.name, below)],
         parameters=parameters,
         samples={name: one.message for name, one in heard.items() if one.message is not None},
         periods={name: period for name, one in heard.items() if (period := one.period_s) is not None},
         unreadable=unreadable,
         denied=_names(
-            (one.name for one in robot.topics if topic_forwarding(robot, one) == "denied"), below
+            (topic.name for topic in robot.topics if topic_forwarding(robot, topic) == "denied"), below
         ),
-        lost=_names((*(one.name for one in lost_topics(robot)), *lost_servers(robot)), below),
+        lost=_names((*(topic.name for topic in lost_topics(robot)), *lost_servers(robot)), below),
     )
 
 

@@ -25,7 +25,7 @@ HOW: Final = "give the folder of its package with --interfaces (a workspace's in
 
 def endpoint_for(topic: SurveyedTopic, type_name: str) -> OwnEndpoint:
     """A subscription with the QoS of the topic's publishers."""
-    hashes = [one.type_hash for one in topic.publishers if one.type_hash]
+    hashes = [publisher.type_hash for publisher in topic.publishers if publisher.type_hash]
     qos = Qos(topic.reliable, topic.latched, DEPTH)
     return OwnEndpoint("MS", topic.key, type_name, qos, next(iter(hashes), ""))
 
@@ -76,7 +76,9 @@ class TopicReader:
     async def interfaces(self, place: Place) -> Interfaces:
         """With the topic's type as the robot has it. InterfaceError says how to give its definition."""
         known = load_interfaces(place.distro, place.interfaces)
-        hashes = {one.type_hash for one in self.topic.publishers if one.type == self.type} - {""}
+        hashes = {
+            publisher.type_hash for publisher in self.topic.publishers if publisher.type == self.type
+        } - {""}
         try:
             known.require(self.type)
             if not hashes or known.type_hash(self.type) in hashes:

@@ -74,7 +74,7 @@ def _lines(found: Found, types: bool, verbose: bool) -> Iterator[str]:
         yield f"{name} [{', '.join(topic.types)}]" if types or verbose else name
         if verbose:
             for word, endpoints in (("publisher", topic.publishers), ("subscriber", topic.subscribers)):
-                yield from (f"  {word}: {_described(robot, one)}" for one in endpoints)
+                yield from (f"  {word}: {_described(robot, endpoint)}" for endpoint in endpoints)
             if words := NOT_FORWARDED.get(topic_forwarding(robot, topic)):
                 yield f"  not forwarded: {words}"
 
@@ -91,8 +91,8 @@ def _plain(name: str, robot: RobotGraph, topic: SurveyedTopic) -> dict[str, Any]
         "types": topic.types,
         "passed_on": topic.announced,
         "forwarding": topic_forwarding(robot, topic),
-        "publishers": [asdict(one) for one in topic.publishers],
-        "subscribers": [asdict(one) for one in topic.subscribers],
+        "publishers": [asdict(publisher) for publisher in topic.publishers],
+        "subscribers": [asdict(subscriber) for subscriber in topic.subscribers],
     }
 
 

@@ -26,7 +26,9 @@ BOOL = "std_msgs/msg/Bool"
 
 
 def topic(name: str, *types: str, **more: Any) -> SurveyedTopic:
-    publishers = [TopicEndpoint(type=one, qos=EndpointQos(), bridge="a") for one in types or (BOOL,)]
+    publishers = [
+        TopicEndpoint(type=type_name, qos=EndpointQos(), bridge="a") for type_name in types or (BOOL,)
+    ]
     return SurveyedTopic(name=name, key=name[1:], publishers=tuple(publishers), **more)
 
 

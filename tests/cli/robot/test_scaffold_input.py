@@ -64,19 +64,21 @@ def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
 def graph_of(*namespaces: str) -> GraphSnapshot:
     end = TopicEndpoint(type="std_msgs/msg/Bool", qos=EndpointQos(), bridge="a")
     topic = SurveyedTopic(name="/enabled", key="enabled", publishers=(end,))
-    return GraphSnapshot(robots=tuple(RobotGraph(namespace=one, topics=(topic,)) for one in namespaces))
+    return GraphSnapshot(
+        robots=tuple(RobotGraph(namespace=namespace, topics=(topic,)) for namespace in namespaces)
+    )
 
 
 def test_robots_that_a_panel_can_not_have_do_not_keep_it_from_being_made() -> None:
     graph = usable(graph_of("", "/r1", "/r1\\u000a[[page]]", "/a__b", "no namespace", "/r2"))
-    assert [one.namespace for one in graph.robots] == ["", "/r1", "/r2"]
+    assert [robot.namespace for robot in graph.robots] == ["", "/r1", "/r2"]
     many = usable(graph_of(*(f"/r{number}" for number in range(1000))))
     assert len(many.robots) == MOST_ROBOTS
 
 
 def test_robots_of_alike_namespaces_have_names_of_their_own() -> None:
     draft = _base(place_below(""), graph_of("/cell1/arm", "/cell2/arm"), "/cell1/arm", None)
-    assert [(one["id"], one["name"]) for one in draft.robots] == [
+    assert [(robot["id"], robot["name"]) for robot in draft.robots] == [
         ("robot1", "Cell1 arm"),
         ("robot2", "Cell2 arm"),
     ]
