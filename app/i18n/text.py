@@ -136,7 +136,7 @@ def _written(value: Param, language: str) -> Any:
 
 def _in_a_row(parts: Iterable[Param], pattern: str, language: str) -> str:
     between = pattern.format(first="", last="")
-    return between.join(str(_written(one, language)) for one in parts)
+    return between.join(str(_written(part, language)) for part in parts)
 
 
 def _panel_text(params: Mapping[str, Any], language: str) -> str:
@@ -157,7 +157,7 @@ def _number(params: Mapping[str, Any], language: str) -> str:
 
 def _numbers(params: Mapping[str, Any], language: str) -> str:
     between = "; " if symbols(language).decimal == "," else ", "
-    text = between.join(number_in(one, language) for one in params["texts"])
+    text = between.join(number_in(value, language) for value in params["texts"])
     return f"{text} {_written(unit, language)}" if (unit := params["unit"]) else text
 
 
