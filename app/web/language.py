@@ -65,6 +65,6 @@ def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
 
 def _preferred(accepted: str) -> list[str]:
     """The tags of the header, by falling weight."""
-    found = [match for one in accepted.split(",") if (match := _accepted.fullmatch(one))]
+    found = [match for part in accepted.split(",") if (match := _accepted.fullmatch(part))]
     weighted = [(float(match["weight"] or 1), match["tag"]) for match in found]
     return [tag for weight, tag in sorted(weighted, key=lambda one: -one[0]) if weight > 0]

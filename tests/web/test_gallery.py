@@ -32,7 +32,7 @@ def test_roles_states_shapes_and_colours_are_in_it() -> None:
     """What a role, a lamp or a display may be has an example."""
     assert {one.table.get("role", "neutral") for one in EXAMPLES} | {"hold"} == {*get_args(KeyRole)}
     lamp = Indicator.model_fields["states"].annotation
-    (state,) = {one for one in get_args(lamp) if one is not Ellipsis}
+    (state,) = {argument for argument in get_args(lamp) if argument is not Ellipsis}
     lamps = [one.shown for one in EXAMPLES if one.kind == "indicator"]
     for key in ("shape", "colour"):
         assert {*get_args(state.model_fields[key].annotation)} <= {one[key] for one in lamps}

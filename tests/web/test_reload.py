@@ -157,9 +157,9 @@ def test_in_production_nothing_is_watched(tmp_path: Path) -> None:
     mine = Server(ROOT, KIOSK_PANEL=str(panel))
     try:
         opened = []
-        for one in Path(f"/proc/{mine.process.pid}/fd").iterdir():
+        for path in Path(f"/proc/{mine.process.pid}/fd").iterdir():
             with suppress(FileNotFoundError):  # closed by now
-                opened.append(str(one.readlink()))
+                opened.append(str(path.readlink()))
         assert opened
         assert not [name for name in opened if "inotify" in name]
     finally:

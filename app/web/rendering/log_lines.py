@@ -23,7 +23,7 @@ def newest_lines(session: RobotSession, language: str, widget: LogView) -> list[
     """The newest lines of a log, as many as a rendered page has."""
     kept = session.robot.log_lines[session.robot.key(widget.topic)]
     wanted = wanted_lines(widget, widget.level, widget.node, "")
-    return [line_values(*one, language) for one in kept.newest(wanted, RENDERED).lines]
+    return [line_values(*line, language) for line in kept.newest(wanted, RENDERED).lines]
 
 
 def wanted_lines(widget: LogView, level: Level, node: str, search: str) -> Wanted:
