@@ -141,7 +141,7 @@ class Watched:
         session.send("Performance.enable", {"timeDomain": "timeTicks"})
         metrics = session.send("Performance.getMetrics")["metrics"]
         session.detach()
-        began = next(one["value"] for one in metrics if one["name"] == "NavigationStart") * 1e9
+        began = next(metric["value"] for metric in metrics if metric["name"] == "NavigationStart") * 1e9
         least, most = float("-inf"), float("inf")
         for _ in range(ROUND_TRIPS):
             before = time.monotonic_ns()
@@ -176,7 +176,7 @@ class Chromium:
         session = self._browser.new_browser_cdp_session()
         processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
         session.detach()
-        self._root = next(int(one["id"]) for one in processes if one["type"] == "browser")
+        self._root = next(int(process["id"]) for process in processes if process["type"] == "browser")
         self.version = self._browser.version
 
     def pids(self) -> set[int]:

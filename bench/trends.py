@@ -102,7 +102,7 @@ def day() -> dict[str, str]:
             rows = {int(level.width): list(level.since(0.0)) for level in field.levels}
             file.write({("", f"/pen{number}", FLOAT, "data"): rows}, {}, end)
         file.close()
-        size = sum(one.stat().st_size for one in Path(folder).iterdir())
+        size = sum(path.stat().st_size for path in Path(folder).iterdir())
     return {
         f"memory after {FED_S * HZ * PENS:,} values": f"{memory / 1e6:.1f} MB",
         "what the check says it takes": f"{PENS * history_bytes(DAY_S) / 1e6:.1f} MB",
@@ -244,7 +244,7 @@ def main() -> int:
     lines += ["", f"| {WINDOW_S:g} s of a real server | {' | '.join(columns)} |"]
     lines += [f"| --- |{' --- |' * len(columns)}"]
     for name in next(iter(columns.values())):
-        lines.append(f"| {name} | {' | '.join(one[name] for one in columns.values())} |")
+        lines.append(f"| {name} | {' | '.join(column[name] for column in columns.values())} |")
     text = "\n".join(lines) + "\n"
     print(text)
     if not QUICK:

@@ -80,7 +80,7 @@ class Growth:
     def robots(self) -> Points:
         def one(count: int) -> Point:
             ids = [f"robot{number}" for number in range(1, count + 1)]
-            ways = [f"/{one}" for one in ids]
+            ways = [f"/{name}" for name in ids]
             locators = self._rig.robot("robots", namespaces=ways)
             for way in ways:
                 self._rig.robot("offer", way=way, topics=[TOPIC])

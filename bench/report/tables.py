@@ -195,7 +195,7 @@ def _linear(one: Grown) -> str:
 
 def targets_table(results: Results) -> str:
     words = {True: "yes", False: "**no**", None: NONE}
-    rows = [[one.text, one.measured, words[one.reached]] for one in targets(results)]
+    rows = [[target.text, target.measured, words[target.reached]] for target in targets(results)]
     return table([["target", "measured", "reached"], *rows])
 
 

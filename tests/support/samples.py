@@ -56,7 +56,7 @@ class Samples:
 
     def fields(self, type_name: str, edge: Edge = "random") -> dict[str, Any]:
         fields = self._structures[type_name].fields
-        return {one.name: self._value(one.type, edge) for one in fields}
+        return {field.name: self._value(field.type, edge) for field in fields}
 
     def _value(self, kind: Type, edge: Edge) -> Any:
         if kind.container != "one":

@@ -60,7 +60,7 @@ class KioskScreen:
     def pages(self) -> list[dict[str, Any]]:
         """The pages that the browser has; none while it does not answer."""
         with suppress(httpx.HTTPError):
-            return [one for one in self._devtools("list") if one["type"] == "page"]
+            return [devtool for devtool in self._devtools("list") if devtool["type"] == "page"]
         return []
 
     def _devtools(self, what: str) -> Any:
