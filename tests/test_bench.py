@@ -149,7 +149,7 @@ def test_memory_of_each_client_counts_in_kilobytes() -> None:
     assert by_text(found, "memory of each").reached is True
 
 
-def test_what_was_not_measured_is_not_reached() -> None:
+def test_target_without_a_measurement_is_not_reached() -> None:
     assert {target.reached for target in targets(results())} == {None}
 
 

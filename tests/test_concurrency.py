@@ -80,11 +80,11 @@ async def _who_is_cancelled_is_not_given_up() -> None:
         await task
 
 
-def test_all_that_waits_is_given_up_and_what_comes_later() -> None:
+def test_pending_and_later_requests_are_canceled() -> None:
     asyncio.run(_both_and_a_later_one())
 
 
-def test_what_was_answered_stays_answered() -> None:
+def test_finished_task_keeps_its_result() -> None:
     asyncio.run(_not_what_was_answered())
 
 

@@ -91,7 +91,7 @@ def test_in_the_long_run_no_more_than_its_rate_is_admitted(pressing: Pressing) -
     assert admitted <= CLIENT_QUOTA.burst + 10 * CLIENT_QUOTA.per_s
 
 
-def test_who_makes_up_cookies_has_the_limit_of_an_address(pressing: Pressing) -> None:
+def test_invented_cookies_share_the_limit_of_their_address(pressing: Pressing) -> None:
     assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == ADDRESS_QUOTA.burst
     assert pressing.admitted(browser(1, "10.0.0.8"), 10) == 10
 

@@ -35,7 +35,7 @@ def system(
     )
 
 
-def test_what_is_installed_is_said_calmly(tmp_path: Path) -> None:
+def test_installing_a_package_prints_no_warnings(tmp_path: Path) -> None:
     done = installed(tmp_path, f'echo "{DEBCONF}" >&2; echo "$@" >>{tmp_path}/called')
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "installing python3-venv (once, by apt-get)\n"

@@ -121,7 +121,7 @@ def test_no_press_waits_for_the_sync_of_another(tmp_path: Path, disk: Disk) -> N
     run(tmp_path, work)
 
 
-def test_what_comes_together_shares_a_commit_and_a_sync(tmp_path: Path, disk: Disk) -> None:
+def test_concurrent_entries_share_a_commit_and_a_sync(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
         disk.commits = disk.syncs = 0
@@ -364,7 +364,7 @@ def test_the_error_of_the_disk_reads_in_the_readers_language(tmp_path: Path) -> 
     run(tmp_path / "file", work)
 
 
-def test_a_folder_that_can_not_be_made_locks_until_it_can(tmp_path: Path) -> None:
+def test_missing_data_folder_locks_until_it_can_be_created(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
 
     async def work(log: OperatorLog) -> None:

@@ -194,7 +194,7 @@ def test_a_lock_that_arrives_while_the_disk_is_busy_wins() -> None:
     slow(work)
 
 
-def test_what_can_not_be_written_is_not_sent() -> None:
+def test_press_that_cannot_be_logged_is_not_sent() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         log.written.set()
         log.fails = True
@@ -317,7 +317,7 @@ def test_a_press_that_is_given_up_while_it_waits_is_closed_as_unknown() -> None:
     slow(work, panel_of(SET, *_message()))
 
 
-def test_an_entry_says_who_what_where_and_by_which_state(tmp_path: Path) -> None:
+def test_log_entry_names_client_command_widget_and_state(tmp_path: Path) -> None:
     async def work(bench: Bench) -> None:
         await bench.press()
 

@@ -211,7 +211,7 @@ def test_they_are_summed_up_while_the_flood_goes_on(
     written(tmp_path, work)
 
 
-def test_what_is_sent_is_never_limited(tmp_path: Path) -> None:
+def test_sent_presses_are_never_limited(tmp_path: Path) -> None:
     """Who has used up what there is for refusals goes on pressing, and each press is in the log."""
 
     async def work(cell: Cell) -> None:

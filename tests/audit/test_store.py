@@ -262,7 +262,7 @@ def test_a_log_begins_later_only_with_an_entry_that_says_so(
     assert (verify(tmp_path, before.hash).fault == "") is good
 
 
-def test_a_log_that_was_emptied_says_so_when_it_goes_on(tmp_path: Path) -> None:
+def test_emptied_log_is_reported_when_writing_continues(tmp_path: Path) -> None:
     Store(tmp_path, "boot1").close()
     store = Store(tmp_path, "boot2")
     (entry,) = Opening(tmp_path, "boot2").first_entries(store, None)
@@ -338,7 +338,7 @@ def test_nothing_young_goes(store: Store) -> None:
     assert store.head.count == 10
 
 
-def test_only_what_is_old_goes(store: Store, tmp_path: Path) -> None:
+def test_only_old_entries_are_removed(store: Store, tmp_path: Path) -> None:
     fill(store, 5)
     threading_gap = time.time_ns() // 1_000_000 + 20
     while time.time_ns() // 1_000_000 < threading_gap:
@@ -493,7 +493,7 @@ def test_a_file_of_a_later_version_is_left_alone(tmp_path: Path) -> None:
 # Reading.
 
 
-def test_a_filter_finds_what_it_says(store: Store, tmp_path: Path) -> None:
+def test_log_filter_finds_the_matching_entries(store: Store, tmp_path: Path) -> None:
     for number, widget in ((1, "drive"), (2, "home")):
         (entry,) = store.append([pressed(number, widget)])
         store.append([entry.follow_up("closed", "published", f"Sent 100%_{number}.")])

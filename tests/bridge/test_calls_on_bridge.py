@@ -296,7 +296,7 @@ def reasons_of(widget: str, stream: Stream) -> Iterator[str]:
             yield reason
 
 
-def test_a_bridge_lost_while_waiting_leaves_it_unknown(
+def test_lost_bridge_while_waiting_leaves_the_result_unknown(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     own_client: Client,

@@ -198,7 +198,7 @@ def test_a_router_without_a_bridge_is_a_finding_of_its_own(peer: tuple[str, Any]
     assert f"Zenoh answers at {endpoint}, but no bridge to ROS 2 is there" in done.stderr
 
 
-def test_ctrl_c_ends_it_without_words(cyclone_bridge: Bridge, io: RosNode) -> None:
+def test_ctrl_c_ends_the_command_silently(cyclone_bridge: Bridge, io: RosNode) -> None:
     echo = command.start(COMMAND, "echo", "/arm/joint_states", "--connect", cyclone_bridge.endpoint)
     assert echo.stdout is not None
     assert echo.stdout.readline() == "header:\n"

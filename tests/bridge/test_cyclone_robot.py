@@ -284,7 +284,7 @@ def test_a_result_after_more_than_five_seconds(robot: CycloneRobot, client: Clie
     assert time.monotonic() - sent_at > 5
 
 
-def test_what_ended_long_ago_is_forgotten(robot: CycloneRobot, client: Client) -> None:
+def test_old_results_are_discarded(robot: CycloneRobot, client: Client) -> None:
     goals = Goals(client)
     goal = goals.sent(order=1)
     assert goals.result(goal) == (SUCCEEDED, [0, 1])
@@ -292,7 +292,7 @@ def test_what_ended_long_ago_is_forgotten(robot: CycloneRobot, client: Client) -
     assert goals.result(goal) == (0, [])
 
 
-def test_who_comes_late_gets_the_last_status(robot: CycloneRobot, client: Client) -> None:
+def test_late_listener_gets_the_last_status(robot: CycloneRobot, client: Client) -> None:
     goal = Goals(client).sent(order=1)
     Goals(client).result(goal)
     heard: list[Any] = []

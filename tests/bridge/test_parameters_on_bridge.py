@@ -223,7 +223,7 @@ def test_a_node_that_does_not_answer_in_time(
     assert robot.parameter_requests(service="set_parameters") == 1
 
 
-def test_a_node_that_comes_back_is_read_anew(kiosk: Server, robot: CycloneRobot) -> None:
+def test_returning_node_is_read_again(kiosk: Server, robot: CycloneRobot) -> None:
     press(kiosk, "speed", 0.8)
     shows(kiosk, "speed", "0.8 m/s")
     robot.end()
@@ -235,7 +235,7 @@ def test_a_node_that_comes_back_is_read_anew(kiosk: Server, robot: CycloneRobot)
     assert (kiosk.widget("speed")["state"], kiosk.widget("speed")["text"]) == ("live", "0.5 m/s")
 
 
-def test_a_bridge_lost_while_setting_leaves_it_unknown(
+def test_lost_bridge_while_setting_leaves_the_result_unknown(
     own_cyclone_bridge: Bridge,
     own_client: Client,
     robots: Callable[..., CycloneRobot],

@@ -183,7 +183,7 @@ def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, page: Page) -
     assert violations(page) == []
 
 
-def test_axe_finds_nothing_in_what_opens(example: Server, page: Page) -> None:
+def test_axe_finds_nothing_in_dialogs(example: Server, page: Page) -> None:
     """Menu, links, and the question before a press."""
     page.goto(example.url)
     for opener in (".menu-key", ".lamps"):
@@ -259,7 +259,7 @@ BOXES: Final = """() => [...document.querySelectorAll(
 MAIN_KEYS: Final = ".cell > .key > button, .action button"
 
 
-def test_what_is_touched_is_large_enough(example: Server, page: Page) -> None:
+def test_touch_targets_are_large_enough(example: Server, page: Page) -> None:
     for path in ("/pages/cell", "/pages/setup"):
         page.goto(example.url + path)
         for width, height in (*SCREENS, (800, 1280)):

@@ -268,7 +268,7 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
             first.title()
 
 
-def test_a_page_that_is_closed_frees_it_for_who_asks(opens: Opens) -> None:
+def test_closed_page_frees_control_for_the_requester(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
     tap(second, "Request control")
@@ -298,7 +298,7 @@ def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
     has_role(first, "holding")
 
 
-def test_after_a_restart_of_the_server_no_client_has_it(
+def test_no_client_has_control_after_a_server_restart(
     kiosk: Server, opens: Opens, tmp_path: Path
 ) -> None:
     first = opens(FIRST)

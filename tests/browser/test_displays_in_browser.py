@@ -315,7 +315,7 @@ def test_a_durability_that_the_robot_does_not_publish_is_reported(
         robot.withdraw("/test_current")
 
 
-def test_a_subscriber_that_would_not_hear_a_best_effort_press_locks_it(
+def test_reliable_subscriber_locks_a_best_effort_button(
     bridge: Bridge, robot: RosNode, tmp_path: Path
 ) -> None:
     message = 'message = { data = "{mode}" }'

@@ -100,7 +100,7 @@ def taps_arrive(page: Page) -> bool:
     return bool(page.evaluate("window.taps ?? 0") > before)
 
 
-def test_it_takes_thirty_seconds(screen: Page) -> None:
+def test_cleaning_lock_takes_thirty_seconds(screen: Page) -> None:
     screen.locator("#cleaning [role=timer]").evaluate(TEXTS)
     screen.get_by_role("button", name="Menu").tap()
     screen.get_by_role("button", name="Clean the screen").tap()
@@ -139,7 +139,7 @@ def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
     assert presses(kiosk) == before
 
 
-def test_it_ends_by_itself_and_then_keys_work(screen: Page) -> None:
+def test_cleaning_lock_ends_by_itself(screen: Page) -> None:
     clean(screen, 1)
     unlocked(screen)
     screen.get_by_role("button", name="Stop").tap()
@@ -191,9 +191,7 @@ def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: S
     assert presses(kiosk) == before + 1
 
 
-def test_it_gets_dark_and_the_touch_that_wakes_it_presses_nothing(
-    sleepy: Page, dimming: Server
-) -> None:
+def test_waking_touch_on_a_dark_screen_presses_nothing(sleepy: Page, dimming: Server) -> None:
     before = presses(dimming)
     for one in ("[data-widget=load] > [type=submit]", "#input-speed", ".hold"):
         wakes(sleepy, partial(sleepy.touchscreen.tap, *middle(sleepy.locator(one))))
@@ -215,7 +213,7 @@ def test_the_touch_after_it_presses(sleepy: Page) -> None:
     until(pressed, "a later touch presses", every_s=0.2)
 
 
-def test_a_state_that_changes_wakes_it(sleepy: Page, dimming: Server) -> None:
+def test_changed_state_wakes_the_screen(sleepy: Page, dimming: Server) -> None:
     wakes(sleepy, lambda: permit(dimming, HALT))
     permit(dimming)
 
@@ -236,7 +234,7 @@ def test_a_page_that_is_held_does_not_get_dark(sleepy: Page) -> None:
     expect(sleepy.locator("#dark")).to_be_visible()
 
 
-def test_without_the_key_it_never_gets_dark(screen: Page) -> None:
+def test_screen_without_dim_after_s_never_dims(screen: Page) -> None:
     expect(screen.locator("#dark")).to_have_count(0)
 
 

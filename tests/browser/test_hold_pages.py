@@ -95,7 +95,7 @@ def test_a_key_that_is_held_is_a_hold_and_its_repeats_are_none(finger: Finger, j
     raise AssertionError(ended(finger.server))
 
 
-def test_another_browser_sees_it_and_is_refused(
+def test_another_browser_sees_the_hold_and_is_refused(
     finger: Finger, chromium: Browser, jogger: RosNode
 ) -> None:
     context = chromium.new_context(has_touch=True)
@@ -118,7 +118,7 @@ def test_another_browser_sees_it_and_is_refused(
     context.close()
 
 
-def test_without_scripts_it_is_locked_and_says_why(without_scripts: Page, kiosk: Server) -> None:
+def test_hold_without_scripts_is_locked_with_a_reason(without_scripts: Page, kiosk: Server) -> None:
     without_scripts.goto(kiosk.url)
     expect(without_scripts.get_by_role("button", name="Jog")).to_be_disabled()
     expect(without_scripts.locator("#why-jog")).to_contain_text("hold-to-run needs JavaScript")

@@ -88,7 +88,7 @@ TOUCHES: Final = {
 
 
 @pytest.mark.parametrize("cause", TOUCHES)
-def test_a_finger_that_goes_ends_it(finger: Finger, jogger: RosNode, cause: str) -> None:
+def test_lifted_finger_ends_the_hold(finger: Finger, jogger: RosNode, cause: str) -> None:
     name, code = TOUCHES[cause]
     soon(cause, measured(finger, jogger, getattr(finger, name), code))
     assert finger.state is None
@@ -97,15 +97,13 @@ def test_a_finger_that_goes_ends_it(finger: Finger, jogger: RosNode, cause: str)
 
 
 @pytest.mark.parametrize("cause", SCRIPTS)
-def test_a_page_that_goes_ends_it(finger: Finger, jogger: RosNode, cause: str) -> None:
+def test_closed_page_ends_the_hold(finger: Finger, jogger: RosNode, cause: str) -> None:
     script, code = SCRIPTS[cause]
     soon(cause, measured(finger, jogger, partial(finger.does, script), code))
     assert finger.state is None
 
 
-def test_lost_permission_ends_it_and_only_a_new_press_begins_again(
-    finger: Finger, jogger: RosNode
-) -> None:
+def test_lost_permission_ends_the_hold_until_a_new_press(finger: Finger, jogger: RosNode) -> None:
     def forbid() -> None:
         jogger.publish("/operation_enabled", {"data": False})
 
@@ -133,7 +131,7 @@ def test_lost_permission_ends_it_and_only_a_new_press_begins_again(
         ("browser killed", signal.SIGKILL, "hold_by_closing"),
     ],
 )
-def test_a_browser_that_goes_ends_it(
+def test_closed_browser_ends_the_hold(
     chromium: Browser,
     kiosk: Server,
     jogger: RosNode,

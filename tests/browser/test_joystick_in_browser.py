@@ -156,7 +156,7 @@ TOUCHES: Final = {
 
 
 @pytest.mark.parametrize("cause", TOUCHES)
-def test_a_finger_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
+def test_lifted_finger_ends_the_hold(thumb: Thumb, robot: RosNode, cause: str) -> None:
     name, code = TOUCHES[cause]
     drive_ended_by(thumb, robot, getattr(thumb, name), code)
     assert thumb.knob == (0.0, 0.0)
@@ -164,13 +164,13 @@ def test_a_finger_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) ->
 
 
 @pytest.mark.parametrize("cause", ["window blurred", "stream lost"])
-def test_a_page_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
+def test_closed_page_ends_the_hold(thumb: Thumb, robot: RosNode, cause: str) -> None:
     """The other causes end any hold: `test_holds_in_browser`."""
     script, code = SCRIPTS[cause]
     drive_ended_by(thumb, robot, partial(thumb.does, script), code)
 
 
-def test_lost_permission_ends_it(thumb: Thumb, robot: RosNode) -> None:
+def test_lost_permission_ends_the_hold(thumb: Thumb, robot: RosNode) -> None:
     def forbid() -> None:
         robot.publish("/stick_enabled", {"data": False})
 
@@ -202,7 +202,7 @@ def test_the_knob_follows_the_finger_and_the_server_says_what_it_sent(
     assert all(abs(drive) <= 0.5 and abs(turn) <= 1.0 for drive, turn in heard(robot, before))
 
 
-def test_arrow_keys_deflect_it(thumb: Thumb, robot: RosNode) -> None:
+def test_arrow_keys_deflect_the_joystick(thumb: Thumb, robot: RosNode) -> None:
     before = len(robot.heard(TOPIC))
     thumb.button.focus()
     thumb.page.keyboard.down("ArrowUp")
@@ -235,7 +235,7 @@ def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) ->
     until(lambda: robot.heard("/stamped")[-1]["twist"]["linear"]["x"] == 0.0, "it stops")
 
 
-def test_a_finger_elsewhere_does_not_move_it(thumb: Thumb, robot: RosNode) -> None:
+def test_finger_outside_the_joystick_does_not_move_it(thumb: Thumb, robot: RosNode) -> None:
     """It ends, as with any hold; and a finger that is first elsewhere begins nothing."""
     before = len(robot.heard(TOPIC))
     thumb.touch.send("touchStart", (5, 5))
@@ -246,13 +246,13 @@ def test_a_finger_elsewhere_does_not_move_it(thumb: Thumb, robot: RosNode) -> No
     thumb.touch.send("touchEnd")
 
 
-def test_without_scripts_it_is_locked_and_says_why(without_scripts: Page, kiosk: Server) -> None:
+def test_hold_without_scripts_is_locked_with_a_reason(without_scripts: Page, kiosk: Server) -> None:
     without_scripts.goto(kiosk.url)
     stick = widget(without_scripts, "stick")
     expect(stick.locator("button")).to_be_disabled()
     expect(stick.locator('[data-text="reason"]')).to_contain_text("needs JavaScript")
 
 
-def test_it_is_large_enough_for_a_glove(thumb: Thumb) -> None:
+def test_joystick_is_large_enough_for_gloves(thumb: Thumb) -> None:
     box = place(thumb.button)
     assert min(box["width"], box["height"]) * 0.22 >= 59.9

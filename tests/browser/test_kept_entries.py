@@ -209,7 +209,7 @@ def test_what_is_outside_the_limits_or_no_number_is_not_restored(kiosk: Server, 
 
 
 @pytest.mark.parametrize("change", [False, True], ids=["a restart", "another panel file"])
-def test_a_restart_forgets_it(page: Page, tmp_path: Path, change: bool) -> None:
+def test_restart_discards_the_entered_value(page: Page, tmp_path: Path, change: bool) -> None:
     first = demo_server(tmp_path, PANEL)
     try:
         opened(page, first)

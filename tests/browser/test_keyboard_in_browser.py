@@ -54,7 +54,7 @@ def test_letters_capitals_and_signs(screen: Page) -> None:
     expect(screen.locator("#input-note")).to_have_value("aBcDEf 7€g")
 
 
-def test_it_edits_where_the_caret_is(screen: Page) -> None:
+def test_keyboard_edits_at_the_caret(screen: Page) -> None:
     keyboard_for(screen, "#input-note")
     press(screen, "a", "c", "left", "b")
     expect(screen.locator("#input-note")).to_have_value("abc")
@@ -95,14 +95,14 @@ def test_done_keeps_and_cancel_gives_back(screen: Page) -> None:
     assert screen.evaluate("changes") == ["a"]
 
 
-def test_hold_keys_are_locked_while_it_is_open(screen: Page) -> None:
+def test_hold_buttons_are_locked_while_the_keyboard_is_open(screen: Page) -> None:
     keyboard_for(screen, "#input-note")
     expect(screen.locator("#why-jog")).to_have_text("The keyboard is open. Close it first.")
     expect(screen.locator(".hold")).to_be_disabled()
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_it_never_covers_its_field_nor_stop_nor_the_header(
+def test_keyboard_never_covers_its_field_stop_or_the_header(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
 ) -> None:
     page = touched(touchscreen, kiosk, size)
@@ -189,7 +189,7 @@ def test_a_code_that_is_too_long_is_not_cut(desk: Page) -> None:
     expect(desk.locator("#scan-order")).to_be_empty()
 
 
-def test_what_a_hand_types_is_no_bar_code(desk: Page) -> None:
+def test_typing_by_hand_is_not_taken_for_a_bar_code(desk: Page) -> None:
     Keys(desk, HUMAN_S).type("999\n")
     Keys(desk, READER_S).type("88\n")  # two keys together
     expect(desk.locator("#input-order")).to_have_value("4711")

@@ -59,7 +59,7 @@ def open_for(page: Page, field: str) -> Locator:
     return page.locator(".sheet")
 
 
-def test_a_touch_opens_it_with_name_value_limits_and_unit(screen: Page) -> None:
+def test_touch_opens_the_keypad_with_name_value_limits_and_unit(screen: Page) -> None:
     sheet = open_for(screen, "#input-speed")
     expect(sheet.get_by_role("heading")).to_have_text("Jog speed (mm/s)")
     expect(sheet).to_have_attribute("aria-label", "Jog speed (mm/s)")
@@ -173,7 +173,7 @@ def test_a_parameter_follows_the_robot_after_cancel(screen: Page, kiosk: Server)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_it_never_covers_its_field_nor_stop_nor_the_header(
+def test_keypad_never_covers_its_field_stop_or_the_header(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
 ) -> None:
     page = touched(touchscreen, kiosk, size)
@@ -198,7 +198,7 @@ def test_it_never_covers_its_field_nor_stop_nor_the_header(
         settled(page)
 
 
-def test_it_follows_its_field_when_the_screen_is_turned(screen: Page) -> None:
+def test_keypad_follows_its_field_when_the_screen_is_rotated(screen: Page) -> None:
     open_for(screen, "#input-offset")
     screen.set_viewport_size({"width": 800, "height": 1280})
     until(lambda: not overlap(screen, ".sheet", "#input-offset"), "it lies beside its field")
@@ -215,7 +215,7 @@ def test_a_page_that_was_lifted_lies_as_before(touchscreen: Page, kiosk: Server)
     until(lambda: page.locator("#input-speed").bounding_box() == before, "it is where it was")
 
 
-def test_hold_keys_are_locked_while_it_is_open(screen: Page) -> None:
+def test_hold_buttons_are_locked_while_the_keypad_is_open(screen: Page) -> None:
     hold = screen.get_by_role("button", name="Left")
     expect(hold).to_be_enabled()
     open_for(screen, "#input-speed")
@@ -263,7 +263,7 @@ def test_a_page_that_was_cut_off_while_it_was_open_is_locked_after_it(
         kiosk.process.send(signal.SIGCONT)
 
 
-def test_stop_is_pressed_while_it_is_open(screen: Page) -> None:
+def test_stop_works_while_the_keypad_is_open(screen: Page) -> None:
     open_for(screen, "#input-speed")
     screen.get_by_role("button", name="Stop").tap()
     expect(screen.locator(HEARD)).to_have_text("stop (/operation)")
@@ -289,7 +289,7 @@ def test_another_field_takes_its_place_and_nothing_was_entered(screen: Page) -> 
     expect(screen.locator("#input-speed")).to_have_value("120")
 
 
-def test_a_real_keyboard_enters_in_it(screen: Page) -> None:
+def test_real_keyboard_types_into_the_keypad(screen: Page) -> None:
     sheet = open_for(screen, "#input-speed")
     Keys(screen, HUMAN_S).type("90")
     expect(sheet.locator("output")).to_have_text("90")

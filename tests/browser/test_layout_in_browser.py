@@ -169,7 +169,7 @@ def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
     dialog.locator(".no").click()
 
 
-def test_without_scripts_it_is_asked_the_same(demo: Server, without_scripts: Page) -> None:
+def test_confirmation_question_is_the_same_without_scripts(demo: Server, without_scripts: Page) -> None:
     page = without_scripts
     page.goto(demo.url)
     take = page.get_by_role("button", name="Take control")

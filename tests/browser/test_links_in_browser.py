@@ -58,7 +58,7 @@ def lamp(page: Page, link: str) -> Locator:
     return page.locator(f'[data-lamp="{link}"]')
 
 
-def test_a_killed_bridge_is_named_with_what_it_locks(
+def test_killed_bridge_is_shown_with_the_controls_that_it_locks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
 ) -> None:
     speaking(own_node)

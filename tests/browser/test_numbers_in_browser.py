@@ -255,7 +255,7 @@ def test_the_keypad_reads_by_the_same_rules(
     assert node.heard_data(TOPIC)[before:] == [-2.5]
 
 
-def test_a_question_shows_what_is_sent(node: RosNode, opens: Opens) -> None:
+def test_confirmation_question_shows_the_values_that_are_sent(node: RosNode, opens: Opens) -> None:
     page = opens("de", "en-US")
     before = len(node.heard(TOPIC))
     typed(page, "-1.234,50")

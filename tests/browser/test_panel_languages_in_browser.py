@@ -47,7 +47,7 @@ def test_a_browser_changes_its_language_and_no_other_ones(
     other.close()
 
 
-def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -> None:
+def test_comma_key_is_shown_for_languages_with_a_decimal_comma(page: Page, kiosk: Server) -> None:
     page.goto(kiosk.url)
     choose(page, "Deutsch")
     expect(page.locator("html[lang=de][data-inputs]")).to_be_attached()

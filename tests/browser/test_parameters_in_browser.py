@@ -156,7 +156,7 @@ def test_whole_numbers_beyond_a_browsers_are_set_exactly(
     assert robot.parameters()["count"] == 2**53 + 3
 
 
-def test_what_is_read_only_has_no_button(kiosk: Server, page: Page) -> None:
+def test_read_only_parameter_has_no_button(kiosk: Server, page: Page) -> None:
     page.goto(kiosk.url)
     serial = widget(page, "serial")
     expect(serial.locator(".value")).to_have_text("CR-0001")

@@ -440,7 +440,7 @@ def test_without_scripts_a_page_that_loaded_itself_takes_a_press_at_once(
     assert pressed(mine) == 2
 
 
-def test_what_a_gateway_says_is_no_refusal(shown: Page) -> None:
+def test_error_of_a_gateway_is_not_shown_as_a_refusal(shown: Page) -> None:
     """The server may have sent it all the same."""
 
     def times_out(route: Route) -> None:

@@ -216,7 +216,7 @@ def test_a_phone_only_shows(cell: Server, page: Page) -> None:
     expect(page.locator("html")).to_have_attribute("data-theme", "dark")
 
 
-def test_a_key_of_the_frame_comes_back_to_the_page_where_it_was_pressed(
+def test_frame_button_returns_to_the_page_where_it_was_pressed(
     cell: Server, page: Page, without_scripts: Page
 ) -> None:
     for shown in (page, without_scripts):

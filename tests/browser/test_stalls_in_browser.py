@@ -66,7 +66,7 @@ def follows(page: Page, node: RosNode) -> None:
     until(shows, "what the robot says is shown", every_s=0.2)
 
 
-def test_a_page_that_stood_still_shows_what_is_so_now_and_nothing_that_waited(
+def test_resumed_page_shows_the_present_state_only(
     kiosk: Server, node: RosNode, chromium: Browser, page: Page
 ) -> None:
     page.goto(kiosk.url)
@@ -89,7 +89,7 @@ def line(kiosk: Server) -> Iterator[Line]:
         yield mine
 
 
-def test_a_page_whose_events_come_ever_later_asks_anew_and_then_follows_again(
+def test_page_with_delayed_events_reconnects(
     kiosk: Server, node: RosNode, page: Page, line: Line
 ) -> None:
     page.goto(line.url)

@@ -259,7 +259,7 @@ def test_the_cursor_goes_by_keys(cell: Server, node: RosNode, page: Page) -> Non
     expect(values).to_be_hidden()
 
 
-def test_a_reload_and_another_browser_show_what_was(
+def test_reload_and_another_browser_show_the_same_history(
     cell: Server, node: RosNode, chromium: Browser
 ) -> None:
     """The history is the server's: two browsers have the same, and a reload loses nothing."""

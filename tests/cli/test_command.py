@@ -85,7 +85,7 @@ def test_a_mistake_is_one_sentence(
 
 
 @pytest.mark.parametrize("installed", [True, False])
-def test_it_tells_its_version(
+def test_command_prints_its_version(
     installed: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def version(name: str) -> str:

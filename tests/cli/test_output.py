@@ -47,7 +47,7 @@ def test_a_file_that_appears_while_another_is_made_is_kept(tmp_path: Path) -> No
     assert file.read_text() == "mine"
 
 
-def test_what_fails_leaves_the_old_file(tmp_path: Path) -> None:
+def test_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
     file.write_text("mine")
     with pytest.raises(ValueError, match="no panel"):

@@ -52,7 +52,7 @@ def test_a_mistake_is_one_sentence_and_status_2(start: Start) -> None:
         ("app.log", ("--help",)),
     ],
 )
-def test_a_closed_output_ends_it_without_words_and_as_sigpipe_does(
+def test_closed_output_ends_the_command_silently_with_the_status_of_sigpipe(
     module: str, words: tuple[str, ...], tmp_path: Path
 ) -> None:
     """As before `| head`, which has read enough."""
@@ -71,7 +71,7 @@ def test_a_closed_output_ends_it_without_words_and_as_sigpipe_does(
     assert (done.returncode, errors.read_text()) == (128 + signal.SIGPIPE, "")
 
 
-def test_ctrl_c_ends_it_without_words(start: Start) -> None:
+def test_ctrl_c_ends_the_command_silently(start: Start) -> None:
     process = start("app.simulator", f"tcp/127.0.0.1:{free_port()}")
     assert process.stderr is not None
     assert "listening at tcp/127.0.0.1:" in process.stderr.readline()

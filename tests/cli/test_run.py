@@ -79,7 +79,7 @@ def test_a_port_in_use_is_one_sentence() -> None:
     assert text.count("\n") == 1
 
 
-def test_a_faulty_panel_file_is_told_with_its_places(tmp_path: Path) -> None:
+def test_faults_of_a_panel_file_are_reported_with_their_places(tmp_path: Path) -> None:
     panel = tmp_path / "bad.toml"
     panel.write_text(SHIPPED.read_text().replace('kind = "text"', 'kind = "txt"'))
     line = panel.read_text().splitlines().index('kind = "txt"') + 1

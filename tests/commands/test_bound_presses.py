@@ -79,7 +79,9 @@ def server_time(kiosk: Server, later_s: float = 0.0) -> str:
     return datetime.fromtimestamp(seconds, UTC).isoformat()
 
 
-def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosNode, way: str) -> None:
+def test_press_is_refused_if_the_state_changed_since_it_was_seen(
+    kiosk: Server, node: RosNode, way: str
+) -> None:
     kiosk = kiosk.by(way)
     event_id = kiosk.snapshot()["id"]
     assert kiosk.press("operation1", "as seen", seen=event_id).status_code == 200

@@ -569,7 +569,7 @@ def test_a_goal_without_any_news_is_queried_only_for_a_while() -> None:
     run(test)
 
 
-def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> None:
+def test_goal_of_a_stopped_server_is_unknown_and_queried_when_the_server_returns() -> None:
     async def test(bench: Bench) -> None:
         await accepted(bench)
         token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)

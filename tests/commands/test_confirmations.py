@@ -66,7 +66,7 @@ class Desk:
         self.confirmations.update(self.robot.key("/heard"), self.robot.reading("/heard"))
 
 
-def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
+def test_only_messages_after_a_command_confirm_it() -> None:
     async def pressed() -> Receipt:
         desk = Desk(panel_of())
         desk.says("on", 99.0)

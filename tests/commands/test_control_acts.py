@@ -93,7 +93,7 @@ def run(work: Coroutine[Any, Any, None]) -> None:
     asyncio.run(work)
 
 
-def test_each_act_is_an_entry_that_says_who_did_what(bench: Bench) -> None:
+def test_each_control_act_is_a_log_entry_with_its_client(bench: Bench) -> None:
     ann, bob = ANN.client.id, BOB.client.id
 
     async def work() -> None:
@@ -213,7 +213,7 @@ def test_what_time_changes_is_logged_too(bench: Bench) -> None:
     assert str(BOB.title) in reason
 
 
-def test_who_keeps_no_cookie_is_refused_with_a_receipt(bench: Bench) -> None:
+def test_client_without_a_cookie_is_refused_with_a_receipt(bench: Bench) -> None:
     async def work() -> None:
         program = Principal(anonymous("192.0.2.9"))
         receipt = await bench.do("take", program)

@@ -219,7 +219,7 @@ def test_each_message_has_the_time_of_its_own_sending() -> None:
     assert stamps[-1] <= after
 
 
-def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
+def test_lost_certainty_ends_the_hold_and_still_sends_the_stop_message(bench: Bench) -> None:
     """Another node takes the topic for another type: who moves by it has to hear the stop."""
     bench.begun()
     endpoint(bench.robot, "MS", "/jog", TEXT)
@@ -278,7 +278,7 @@ def test_a_heartbeat_that_was_there_already_prolongs_nothing(bench: Bench) -> No
     assert bench.points.count(STOPS) == 1
 
 
-def test_lost_permission_ends_it_at_once_and_not_at_the_next_message(bench: Bench) -> None:
+def test_lost_permission_ends_the_hold_at_once(bench: Bench) -> None:
     bench.begun()
     bench.loop.pass_time(0.01)
     permits(bench.robot, False)
@@ -322,7 +322,7 @@ def test_news_without_an_end_end_a_hold(bench: Bench) -> None:
     assert bench.points == [MOVES, STOPS]
 
 
-def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
+def test_stale_permission_ends_the_hold_at_its_expiry() -> None:
     bench = Bench(panel=panel_of(SPEED, JOG, interlock={"max_age_s": 0.5}))
     bench.robot.settled_at = NOW - 10
     endpoint(bench.robot, "MP", ENABLED, BOOL)
@@ -349,7 +349,7 @@ def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -
     assert bench.points == [MOVES]
 
 
-def test_what_zenoh_refuses_ends_it(bench: Bench) -> None:
+def test_refused_put_ends_the_hold(bench: Bench) -> None:
     bench.begun()
     bench.way.fails = "can't send on jog: gone"
     bench.loop.pass_time(0.05)
@@ -360,7 +360,7 @@ def test_what_zenoh_refuses_ends_it(bench: Bench) -> None:
     assert bench.points == [MOVES]
 
 
-def test_after_a_stall_of_the_server_it_is_over_and_nothing_is_made_up_for(bench: Bench) -> None:
+def test_stalled_server_ends_the_hold_and_sends_no_missed_messages(bench: Bench) -> None:
     holding = bench.begun()
     bench.loop.stall(0.4)
     assert bench.holds.beat(holding, 1, bench.loop.now) is False  # heartbeats waited in the socket
@@ -419,7 +419,7 @@ def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:
     assert all(timer.cancelled for timer in bench.loop.timers)
 
 
-def test_every_browser_sees_that_it_is_held(bench: Bench) -> None:
+def test_every_browser_sees_that_the_button_is_held(bench: Bench) -> None:
     def shown() -> Any:
         return build_view(bench.panel, bench.robot, bench.loop.now).view["widgets"]["jog"]
 
@@ -454,7 +454,7 @@ def test_each_message_has_its_deadline_and_the_count(rate_hz: float, deadline_ms
     assert [one.height for one in sent].count(0) == 2
 
 
-def test_a_small_counter_begins_anew() -> None:
+def test_small_counter_wraps_around() -> None:
     empty = {"message": {}, "release": {}, "counter_field": "data"}
     bench = Bench({**JOG, **empty, "type": "std_msgs/msg/UInt8", "rate_hz": 100.0})
     bench.keep(bench.begun(), 3.0)

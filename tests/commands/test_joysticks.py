@@ -64,7 +64,7 @@ def test_it_begins_in_the_middle_and_sends_what_the_newest_beat_has() -> None:
 @pytest.mark.parametrize(
     "code", sorted({*END_REASONS.values(), "hold_by_closing", "hold_by_reconnect"})
 )
-def test_whatever_ends_a_hold_ends_it_with_zeros(code: str) -> None:
+def test_every_end_of_a_joystick_hold_sends_zeros(code: str) -> None:
     bench = bench_of()
     holding = held(bench)
     bench.holds.end(holding, code)
@@ -101,7 +101,7 @@ ENDS: Final[dict[str, Callable[[Bench], None]]] = {
 
 
 @pytest.mark.parametrize("cause", ENDS)
-def test_a_doubt_ends_it_with_zeros(cause: str) -> None:
+def test_lost_certainty_ends_the_joystick_with_zeros(cause: str) -> None:
     bench = bench_of()
     held(bench)
     ENDS[cause](bench)
@@ -145,7 +145,7 @@ def test_no_two_holds_send_on_its_topic() -> None:
 
 
 @given(UNIT, UNIT, st.floats(0, 0.9), st.sampled_from(["circle", "square"]))
-def test_what_is_sent_is_within_the_limits(x: float, y: float, dead: float, shape: str) -> None:
+def test_sent_value_is_within_the_limits(x: float, y: float, dead: float, shape: str) -> None:
     found = shaped(stick(dead_zone=dead, shape=shape), (x, y))
     assert all(abs(sent) <= abs(given) + 1e-12 for sent, given in zip(found, (x, y), strict=True))
     assert all(sent * given >= 0 for sent, given in zip(found, (x, y), strict=True))

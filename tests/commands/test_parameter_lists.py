@@ -66,7 +66,7 @@ def test_a_list_is_written_as_it_is_read(values: list[str], text: str) -> None:
 
 
 @pytest.mark.parametrize("text", [",", "a,", ",a", "a,,b", '"a', 'a"b', '"a"b', '"a" "b"'])
-def test_what_is_no_list_is_refused(text: str) -> None:
+def test_value_that_is_not_a_list_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="of them is none"):
         split_list(text)
     with pytest.raises(InputError) as refused:
@@ -164,7 +164,7 @@ def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, valu
 
 
 @pytest.mark.parametrize("given", ["", "3", 3, True, "Slow", [1]])
-def test_what_is_no_option_is_refused(given: Any) -> None:
+def test_unknown_option_is_refused(given: Any) -> None:
     with pytest.raises(InputError) as refused:
         check_value(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
     assert coded(refused.value.text, "label", "options") == (

@@ -277,7 +277,7 @@ def test_an_answer_of_before_a_cut_does_not_count() -> None:
     run(test)
 
 
-def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
+def test_briefly_replaced_node_is_queried_again() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
@@ -382,7 +382,7 @@ def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back
     run(test)
 
 
-def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
+def test_node_without_the_parameter_is_queried_ever_more_rarely(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(sync, "AGAIN_MOST_S", 0.04)
@@ -447,7 +447,7 @@ def test_what_a_node_says_locks_or_not(
     run(test)
 
 
-def test_what_can_not_be_read_is_said() -> None:
+def test_unreadable_response_locks_the_parameter() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.queried(1)
@@ -458,7 +458,7 @@ def test_what_can_not_be_read_is_said() -> None:
     run(test)
 
 
-def test_after_a_set_the_node_is_asked_how_it_is() -> None:
+def test_parameter_is_read_back_after_setting() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)

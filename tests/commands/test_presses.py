@@ -139,7 +139,7 @@ def test_now_is_the_time_of_sending_and_no_input() -> None:
     assert 'there is no input "now" on this panel' in str(again.reason)
 
 
-def test_a_receipt_has_what_the_contract_says(bench: Bench) -> None:
+def test_receipt_has_the_documented_fields(bench: Bench) -> None:
     answer = bench.press(press_id="p7").as_json()
     assert list(answer) == ["id", "widget", "outcome", "code", "reason", "at"]
     assert (answer["id"], answer["widget"], answer["outcome"]) == ("p7", "free", "published")
@@ -257,7 +257,7 @@ def test_without_a_way_to_the_robot_nothing_is_sent(
     assert (cause, coded(reason)) == ("link", (code,))
 
 
-def test_what_zenoh_refuses_was_not_sent(bench: Bench) -> None:
+def test_refused_put_counts_as_not_sent(bench: Bench) -> None:
     bench.way.fails = "can't send on free: closed"
     cause, reason = refused(bench, bench.press())
     assert (cause, reason) == ("link", "can't send on free: closed")
@@ -349,7 +349,7 @@ def test_a_message_may_need_no_input() -> None:
 
 
 @pytest.mark.parametrize("widget", ["none", "message", "heard", "operation", ""])
-def test_what_can_not_be_pressed_is_not_found(bench: Bench, widget: str) -> None:
+def test_widget_that_is_not_a_command_is_not_found(bench: Bench, widget: str) -> None:
     with pytest.raises(NotFound, match=f'there is no widget "{widget}" that can be pressed'):
         bench.press(widget)
     assert bench.receipt("p1") is None
@@ -416,7 +416,7 @@ def test_the_oldest_receipts_are_forgotten() -> None:
 
 
 @pytest.mark.parametrize(("permitted", "level"), [(True, logging.INFO), (False, logging.WARNING)])
-def test_the_log_says_who_pressed_what_with_which_result(
+def test_log_names_client_widget_and_result_of_each_press(
     bench: Bench, caplog: pytest.LogCaptureFixture, permitted: bool, level: int
 ) -> None:
     permits(bench.robot, permitted)
@@ -439,14 +439,14 @@ class Locked:
         self.bench.may_press = control.verdict
 
 
-def test_a_press_without_control_is_refused_with_who_has_it() -> None:
+def test_press_without_control_is_refused_with_the_holders_name() -> None:
     bench = Locked().bench
     cause, reason = refused(bench, bench.press())
     assert cause == "interlock"
     assert coded(reason, "name", "robot") == ("control_held", "Panel 1 (192.0.2.7)", "the robot")
 
 
-def test_a_press_of_who_has_control_is_sent() -> None:
+def test_press_of_the_client_in_control_is_sent() -> None:
     locked = Locked()
     assert locked.bench.press(who=locked.other).outcome == "published"
 

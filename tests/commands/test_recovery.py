@@ -197,7 +197,7 @@ def test_it_is_asked_for_and_can_be_canceled_only_when_its_server_is_offered(tmp
     run(tmp_path, test, "accepted")
 
 
-def test_a_cut_leaves_it_in_doubt(tmp_path: Path) -> None:
+def test_cut_connection_leaves_the_goal_in_doubt(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         rig.bench.lose_the_bridge()
@@ -270,7 +270,7 @@ def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> N
     run(tmp_path, test, "timed_out")
 
 
-def test_a_cancel_finds_it_under_way(tmp_path: Path) -> None:
+def test_cancel_finds_a_running_goal(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         assert await canceled(rig, 0) == "accepted"

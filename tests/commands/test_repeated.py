@@ -159,7 +159,7 @@ def pressed(number: int, robot: str = "") -> Entry:
     return new_entry("pressed", origin, {"n": number}, press=f"p{number}", action="press", robot=robot)
 
 
-def test_a_log_says_of_a_press_that_it_has(tmp_path: Path) -> None:
+def test_operators_log_finds_a_press_by_its_id(tmp_path: Path) -> None:
     async def work() -> None:
         for again in (False, True):
             log = OperatorLog(tmp_path, Limits())

@@ -100,7 +100,7 @@ def test_steps_end_at_the_limits(speed: float, down: str, up: str) -> None:
     assert (desk.shown()["step_down"], desk.shown()["step_up"]) == (down, up)
 
 
-def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
+def test_step_without_a_known_value_is_locked_with_a_reason() -> None:
     desk = Desk()
     assert desk.shown()["enabled"] is False
     assert desk.reason() == say("interlock_waiting", topic="/speed", wanted=FLOAT)

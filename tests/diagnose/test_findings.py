@@ -77,7 +77,7 @@ def test_a_text_of_a_robot_makes_no_line_and_has_a_limit() -> None:
     assert len(line) < 2 * MOST_TEXT
 
 
-def test_what_a_robot_says_is_made_printable() -> None:
+def test_text_of_a_robot_is_made_printable() -> None:
     report = Report()
     report.find("topic_type", "/a", found="\x1b[31mBool\x1b[0m\u202e", wanted="{about}")
     assert report.findings[0].what == "/a is Bool\\u202e on the robot and {about} in the panel file."

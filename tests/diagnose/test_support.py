@@ -175,7 +175,9 @@ def test_no_secret_of_a_broken_file_is_in_it(
         assert secrets_in({part.name: part.text for part in made}) == []
 
 
-def test_the_graph_is_in_it(setup: Setup, domain: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_support_bundle_has_the_graph(
+    setup: Setup, domain: int, capsys: pytest.CaptureFixture[str]
+) -> None:
     setup.panel.write_text(panel_of(call("/reset", "std_srvs/srv/Trigger")))
     bridge, path = Bridge(domain + 5), setup.folder / "bundle.zip"
     bridge.start()
@@ -212,7 +214,7 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize(("answer", "status"), [("y\n", 0), ("\n", 2), ("no\n", 2)])
-def test_it_asks_before_it_writes(
+def test_support_asks_before_writing(
     quick: Setup, answer: str, status: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(quick.folder)

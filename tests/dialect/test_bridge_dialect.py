@@ -158,7 +158,7 @@ def test_a_topic_has_the_key_that_the_bridge_gives_it(topic: str, namespace: str
 @pytest.mark.parametrize(
     "topic", ["", "a", "/", "/a/", "///a", "//", "//a/", "/a//b", "/1", "/a b", "/*", "/a\n"]
 )
-def test_what_is_no_topic_has_no_key(topic: str) -> None:
+def test_name_that_is_not_a_topic_has_no_key(topic: str) -> None:
     with pytest.raises(ValueError, match="not an absolute ROS 2 topic name"):
         key_of(topic)
 
@@ -208,7 +208,7 @@ def test_what_is_no_topics_route_is_none(key: str) -> None:
     assert bridge_dialect.route_of(key) is None
 
 
-def test_an_answer_says_whose_it_is() -> None:
+def test_response_names_its_sender() -> None:
     assert bridge_dialect.zid_of(bridge_dialect.version("b1")) == "b1"
 
 

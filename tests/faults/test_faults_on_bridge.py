@@ -206,7 +206,7 @@ def test_what_the_robot_says_counts_after_each_of_many_freezes(
         assert kiosk.press("operation1", "no").json()["outcome"] == "refused"
 
 
-def test_a_successor_of_a_required_publisher_has_to_say_it_again(
+def test_new_publisher_of_a_required_topic_must_publish_again(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))

@@ -111,7 +111,7 @@ def test_texts_that_follow_one_another_are_one() -> None:
     assert (joined([first, ""]), joined([])) == (first, "")
 
 
-def test_what_hides_in_a_parameter_is_shown() -> None:
+def test_hidden_characters_in_a_parameter_are_shown() -> None:
     assert "\\u202e" in render(say("interlock_waiting", topic="/\u202estop"))
 
 

@@ -46,7 +46,7 @@ def is_shown(text: str, language: str) -> bool:
 @example("1,500", "en")
 @example("1 500,5", "fr")
 @example("0.1000000000000000055511151231257827", "en")
-def test_what_is_accepted_equals_what_is_shown(text: str, language: str) -> None:
+def test_accepted_number_equals_the_shown_number(text: str, language: str) -> None:
     is_shown(text, language)
 
 

@@ -316,7 +316,7 @@ def test_two_builds_of_one_version_are_two_releases(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["missing.whl", "other-1.0-py3-none-any.whl"])
-def test_what_is_no_wheel_of_the_panel_is_named(tmp_path: Path, name: str) -> None:
+def test_foreign_wheel_is_named(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     if name.startswith("other"):
         path.touch()

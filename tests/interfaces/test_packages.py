@@ -95,7 +95,7 @@ def test_constants_are_there_with_their_values(make: Make) -> None:
     }
 
 
-def test_a_default_stands_for_what_is_not_said(make: Make) -> None:
+def test_omitted_field_gets_its_default(make: Make) -> None:
     cell = Interfaces("jazzy", [make(CELL)])
     tool = "cell_msgs/msg/Tool"
     decoded = cell.decode(tool, cell.encode(tool, {"wear": [{}]}))

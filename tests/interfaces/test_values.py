@@ -262,7 +262,7 @@ def test_a_byte_has_all_of_its_values() -> None:
         ([], []),
     ],
 )
-def test_a_browser_gets_what_json_can_say(value: Any, plain: Any) -> None:
+def test_browser_gets_only_values_that_json_has(value: Any, plain: Any) -> None:
     assert to_plain(value) == plain
     json.dumps(to_plain(value), allow_nan=False)
 

@@ -36,7 +36,7 @@ def test_a_page_without_a_stream_is_left_alone() -> None:
     assert set(actions(PageStatus(on_panel=True, ours=True), True, 600)) == {Action.NONE}
 
 
-def test_what_does_not_respond_is_restarted() -> None:
+def test_unresponsive_process_is_restarted() -> None:
     assert first(PageStatus(responds=False)) is Action.RESTART
 
 

@@ -95,7 +95,7 @@ TIMED: Final = {*FAULTS} if LONG else {"GPU process frozen"}
     "fault",
     [pytest.param(f, marks=pytest.mark.real_time if f in TIMED else ()) for f in sorted(FAULTS)],
 )
-def test_what_hangs_or_crashes_is_back(
+def test_hanging_or_crashed_process_is_restarted(
     server: Server, node: RosNode, screen: KioskScreen, fault: str
 ) -> None:
     took_s = break_and_press_on(server, node, screen, fault)

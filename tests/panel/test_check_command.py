@@ -66,7 +66,7 @@ def test_a_file_that_is_not_there_can_not_be_read(
     assert "No such file or directory" in capsys.readouterr().err
 
 
-def test_what_is_no_toml_can_not_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_toml_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "cell.toml"
     path.write_text("title =")
     assert main([str(path)]) == 2

@@ -100,7 +100,7 @@ def unmet(value: str, wanted: str) -> tuple[str, ...]:
          f'"{"x" * 39}…"', '"a", "b" or "c"'),
     ],
 )  # fmt: skip
-def test_a_condition_permits_or_says_what_is_and_what_must_be(
+def test_unmet_condition_names_the_present_and_the_required_value(
     tmp_path: Path, type_name: str, conditions: str, good: Any, bad: Any, value: str, wanted: str
 ) -> None:
     robot, interlock = robot_of(file_of(tmp_path, type_name, conditions))

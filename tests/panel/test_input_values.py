@@ -154,7 +154,7 @@ def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
         (MODE, "0", "0"),
     ],
 )
-def test_a_forms_text_becomes_what_its_input_is(
+def test_form_text_is_converted_to_the_type_of_its_input(
     table: Mapping[str, Any], text: str, value: Any
 ) -> None:
     assert exactly(one(table).parse_text(text, ENGLISH), value)

@@ -617,7 +617,7 @@ def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> 
         (b"a = 1\nb = '\xfc'\n", "line 2: byte 0xfc is not UTF-8"),
     ],
 )
-def test_what_is_no_toml_is_unreadable(tmp_path: Path, data: bytes, reason: str) -> None:
+def test_invalid_toml_file_is_unreadable(tmp_path: Path, data: bytes, reason: str) -> None:
     path = tmp_path / "cell.toml"
     path.write_bytes(data)
     with pytest.raises(PanelError, match=reason) as caught:
@@ -676,7 +676,7 @@ def test_keys_named_like_something_else_keep_their_place(
     ("content", "reason"),
     [("[" * 5000, "too many brackets in brackets"), ("9" * 5000, "a number has too many digits")],
 )
-def test_what_breaks_the_reader_is_unreadable(tmp_path: Path, content: str, reason: str) -> None:
+def test_file_that_exhausts_the_parser_is_unreadable(tmp_path: Path, content: str, reason: str) -> None:
     path = tmp_path / "panel.toml"
     path.write_text(f"a = {content}")
     with pytest.raises(PanelError, match=reason) as error:

@@ -33,7 +33,7 @@ def test_a_message_is_written_as_ros_prints_one(fields: dict[str, Any], lines: l
     assert list(message_lines(fields, {"n": "N", "m": "M", ".a.b": "inside"})) == lines
 
 
-def test_a_message_is_whole_with_all_that_it_leaves_out() -> None:
+def test_message_gets_the_defaults_of_omitted_fields() -> None:
     made = complete_value({"pose": {"position": {"x": 1, "y": "{n}"}}}, Type(COVARIANT), INTERFACES)
     assert made == {
         "pose": {

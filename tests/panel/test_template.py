@@ -74,7 +74,7 @@ def test_each_placeholder_is_named_with_its_place() -> None:
         "{a{b}}",
     ],
 )
-def test_what_is_no_placeholder_is_refused_with_its_place(text: str) -> None:
+def test_invalid_placeholder_is_refused_with_its_place(text: str) -> None:
     with pytest.raises(FieldError, match="brace") as caught:
         list(placeholders({"x": ["", text]}))
     assert caught.value.field == "x[1]"

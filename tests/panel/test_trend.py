@@ -59,7 +59,7 @@ def test_a_topic_has_one_type_in_all_pens() -> None:
 
 
 @pytest.mark.parametrize("given", ["10", "5s", "32d", "0m", "1 h", "-1h", "1w"])
-def test_what_is_no_duration_is_refused(given: str) -> None:
+def test_invalid_duration_is_refused(given: str) -> None:
     with pytest.raises(ValidationError, match=r"is not a duration|is out of range"):
         trend(window=given)
 

@@ -81,7 +81,7 @@ def test_a_token_that_is_carried_to_another_machine_is_no_longer_at_the_cell() -
     assert (moved.local, str(moved.name)) == (False, "Panel 1")
 
 
-def test_who_moves_in_the_network_keeps_the_name() -> None:
+def test_client_with_a_new_address_keeps_its_name() -> None:
     browsers = Clients()
     browsers.identify(token(1), "192.0.2.1")
     browsers.identify(token(2), "192.0.2.2")
@@ -98,7 +98,7 @@ def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> No
     assert browsers.identify(token(0), "192.0.2.7").number == 1
 
 
-def test_who_does_not_come_back_takes_no_number() -> None:
+def test_client_that_does_not_return_takes_no_number() -> None:
     browsers = Clients()
     first = new_client(token(1), "192.0.2.7")
     assert (first.id, first.local) == (public_id(token(1)), False)

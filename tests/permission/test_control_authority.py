@@ -80,14 +80,14 @@ def requested(held: Room) -> Room:
     return held
 
 
-def test_where_it_is_not_required_everybody_may_press() -> None:
+def test_every_client_may_press_where_control_is_not_required() -> None:
     room = Room(ControlRules(required=False))
     assert all(room.may(one) for one in (ANN, CELL, ANONYMOUS))
     assert not room.control.view()["required"]
     assert room.control.until == math.inf
 
 
-def test_at_first_no_client_has_it(room: Room) -> None:
+def test_no_client_has_control_at_first(room: Room) -> None:
     assert room.control.holder is None
     verdict = room.control.verdict(ANN)
     assert (verdict.permitted, verdict.code) == (False, "control_free")
@@ -95,7 +95,7 @@ def test_at_first_no_client_has_it(room: Room) -> None:
     assert not room.may(CELL)
 
 
-def test_who_takes_it_may_press_and_all_others_read_who_has_it(held: Room) -> None:
+def test_holder_of_control_may_press_and_others_see_the_holder(held: Room) -> None:
     assert held.may(ANN)
     for other in (BOB, CELL, ANONYMOUS):
         verdict = held.control.verdict(other)
@@ -123,12 +123,12 @@ def test_taking_twice_is_taking_once(held: Room) -> None:
     assert len(held.logged) == lines
 
 
-def test_what_another_has_is_not_taken(held: Room) -> None:
+def test_control_of_another_client_is_not_taken(held: Room) -> None:
     assert held.control.take(BOB) == "control_held_by_other"
     assert held.control.holder == ANN
 
 
-def test_who_has_no_token_gets_nothing(room: Room) -> None:
+def test_client_without_a_token_gets_nothing(room: Room) -> None:
     assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_no_cookie"
     assert room.control.until == math.inf
     room.control.take(ANN)
@@ -183,7 +183,7 @@ def test_a_request_is_shown_to_all(requested: Room) -> None:
     assert view["since"] == "1970-01-01T00:16:40.000+00:00"
 
 
-def test_who_asks_may_not_press(requested: Room) -> None:
+def test_requester_of_control_may_not_press(requested: Room) -> None:
     assert requested.may(ANN)
     assert not requested.may(BOB)
 
@@ -271,7 +271,7 @@ def test_a_press_is_a_touch(requested: Room) -> None:
     assert requested.control.holder == ANN
 
 
-def test_who_got_it_has_time_before_it_is_taken_again(requested: Room) -> None:
+def test_new_holder_keeps_control_for_a_minimum_time(requested: Room) -> None:
     requested.pass_s(TAKEOVER_S, ANN, BOB)
     requested.control.ask(ANN)
     requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
@@ -290,20 +290,20 @@ def test_a_shorter_time_may_be_set() -> None:
 # Giving it up, and being lost.
 
 
-def test_who_gives_it_up_frees_it(held: Room) -> None:
+def test_releasing_frees_control(held: Room) -> None:
     assert held.control.release(ANN) == ""
     assert held.control.holder is None
     assert held.control.release(ANN) == "control_changed"
     assert held.control.view()["since"] == ""
 
 
-def test_who_gives_it_up_while_asked_gives_it(requested: Room) -> None:
+def test_releasing_during_a_request_passes_control_to_the_requester(requested: Room) -> None:
     requested.control.release(ANN)
     assert (requested.control.holder, requested.control.requester) == (BOB, None)
 
 
 @pytest.mark.parametrize("who", [BOB, CELL, ANONYMOUS])
-def test_no_client_gives_up_what_another_has(held: Room, who: Principal) -> None:
+def test_only_the_holder_releases_control(held: Room, who: Principal) -> None:
     assert held.control.release(who) == "control_changed"
     assert held.control.holder == ANN
 
@@ -313,7 +313,7 @@ def test_a_holder_that_is_there_holds_for_hours(held: Room) -> None:
     assert held.control.holder == ANN
 
 
-def test_a_lost_holder_frees_it_in_time(held: Room) -> None:
+def test_lost_holder_frees_control_in_time(held: Room) -> None:
     held.pass_s(60, ANN)
     assert held.control.until == held.now + LIFE_S
     held.now += LIFE_S - 0.01
@@ -323,7 +323,7 @@ def test_a_lost_holder_frees_it_in_time(held: Room) -> None:
     assert held.control.holder is None
 
 
-def test_a_lost_holder_passes_it_to_who_asks(requested: Room) -> None:
+def test_lost_holder_passes_control_to_the_requester(requested: Room) -> None:
     requested.pass_s(LIFE_S, BOB)
     assert (requested.control.holder, requested.control.requester) == (BOB, None)
 
@@ -333,13 +333,13 @@ def test_a_request_ends_with_its_asker(requested: Room) -> None:
     assert (requested.control.holder, requested.control.requester) == (ANN, None)
 
 
-def test_a_lost_holder_and_a_lost_asker_leave_it_free(requested: Room) -> None:
+def test_lost_holder_and_lost_requester_leave_control_free(requested: Room) -> None:
     requested.now += 3600
     assert (requested.control.holder, requested.control.requester) == (None, None)
     assert not requested.may(BOB)
 
 
-def test_who_was_lost_takes_it_like_anybody(held: Room) -> None:
+def test_returning_client_takes_control_as_any_other(held: Room) -> None:
     held.now += LIFE_S
     held.control.keepalive(ANN, True)
     assert not held.may(ANN)

@@ -132,14 +132,14 @@ def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, n
     assert verdict == locked("interlock_not_permitted", name=name)
 
 
-def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
+def test_permission_from_before_a_cut_is_locked(robot: RobotState) -> None:
     robot.mark_peer_lost(BRIDGE, 2)
     verdict = verdict_of(robot)
     assert verdict == locked("interlock_connection_lost", topic=ENABLED, wanted=BOOL)
 
 
 @pytest.mark.parametrize("payload", [b"", b"true!", b"\0\1\0\0", b"\0\1\0\0\1\0\0\0\0\0\0\0"])
-def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
+def test_unreadable_value_locks(robot: RobotState, payload: bytes) -> None:
     robot.update(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
     assert verdict == locked("interlock_unreadable", topic=ENABLED, wanted=BOOL)
@@ -158,7 +158,7 @@ def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) ->
     assert verdict == locked("interlock_stale", topic=ENABLED, limit="2")
 
 
-def test_a_fresh_permission_says_when_it_ends(robot: RobotState) -> None:
+def test_fresh_permission_has_its_expiry_time(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     assert verdict_of(robot, {"max_age_s": 2}, NOW + 1.999) == Verdict(True, until=NOW + 2)
 

@@ -54,7 +54,7 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
     asyncio.run(work())
 
 
-def test_who_reads_nothing_is_cut_off_and_who_has_read_all_is_not() -> None:
+def test_unread_connection_is_closed_and_a_read_one_is_not() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listening:
         port = listening.getsockname()[1]
         with (

@@ -48,7 +48,7 @@ def test_the_kiosks_own_tokens_do_not_count() -> None:
     assert graph.mismatched_type("MP", "a", TEXT) is None
 
 
-def test_what_is_no_token_changes_nothing(graph: LiveGraph) -> None:
+def test_invalid_token_changes_nothing(graph: LiveGraph) -> None:
     assert graph.apply_token("@/b1/@ros2_lv/SS/add/x", True) is None
     assert graph.peers == {BRIDGE}
 
@@ -169,7 +169,7 @@ def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: 
     assert not graph.is_unrouted("a")
 
 
-def test_an_answer_of_who_is_no_bridge_does_not_help(graph: LiveGraph) -> None:
+def test_response_of_a_peer_that_is_not_a_bridge_does_not_count(graph: LiveGraph) -> None:
     graph.update_versions({"router": '"1.10.0"'})
     assert graph.has_silent_peer
 
@@ -180,7 +180,7 @@ def test_without_a_bridge_nothing_is_silent() -> None:
     assert not graph.has_silent_peer
 
 
-def test_a_bridge_that_comes_back_is_asked_anew(graph: LiveGraph) -> None:
+def test_returning_bridge_is_queried_again(graph: LiveGraph) -> None:
     graph.update_versions({})
     graph.apply_token(bridge_token(BRIDGE), False)
     graph.apply_token(bridge_token(BRIDGE), True)

@@ -118,7 +118,7 @@ def test_a_week_of_a_field_is_a_megabyte_and_a_half() -> None:
     assert history_bytes(7 * DAY) < 1_500_000
 
 
-def test_what_is_old_is_removed() -> None:
+def test_old_values_are_removed() -> None:
     history = sine(1_000, 10.0, keep_s=60.0)
     history.forget_old(START + 5_000)
     assert not history.raw.at

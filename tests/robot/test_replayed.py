@@ -116,7 +116,7 @@ def test_what_was_said_as_a_publisher_appeared_is_the_first() -> None:
     assert replayed.known_since(KEY) == 5.0 + REPLAY_S
 
 
-def test_what_comes_from_a_cache_is_never_fresh(robot: RobotState) -> None:
+def test_cached_sample_is_never_fresh(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
     assert not says(robot, JOINED + 10.0, cached=True)
     assert not says(robot, JOINED + 20.0, cached=True)

@@ -139,7 +139,7 @@ def test_what_is_small_is_read_at_once_though_something_large_is_read() -> None:
     run(test)
 
 
-def test_what_can_not_be_read_to_its_end_locks() -> None:
+def test_truncated_message_locks() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(None)

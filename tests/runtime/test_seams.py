@@ -292,7 +292,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
         assert interlock_verdict(interlock, robot, NOW).permitted is permitted
 
 
-def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
+def test_replacing_the_session_ends_holds_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for module in (controller, lease):  # a busy machine misses heartbeats

@@ -117,7 +117,7 @@ def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
         assert "whose?" not in heard(ten.robot(f"r{number + 1}"))
 
 
-def test_a_press_by_what_another_robots_page_showed_is_refused(ten: Server, way: str) -> None:
+def test_press_seen_on_the_page_of_another_robot_is_refused(ten: Server, way: str) -> None:
     ten = ten.by(way)
     event_id = ten.robot("r1").snapshot()["id"]
     answer = ten.robot("r2").press("operation", "not this one", seen=event_id)

@@ -189,7 +189,7 @@ def test_many_small_nodes_share_pages() -> None:
     assert {title for title in found if title.startswith("Robot")} == {"Robot", "Robot 2", "Robot 3"}
 
 
-def test_what_has_no_room_is_named() -> None:
+def test_widget_without_room_is_named() -> None:
     topics = [published(f"/t{n:03}", BOOL) for n in range(MOST_PAGES * MOST_WIDGETS + 2)]
     text = text_of(topics=topics)
     found = pages(text)

@@ -225,7 +225,7 @@ def test_pages_of_similar_namespaces_have_ids_of_their_own(tmp_path: Path) -> No
     assert [page.id for page in check_panel(path).panel.pages] == ["arm_left", "arm_left_2"]
 
 
-def test_what_has_no_widget_is_named() -> None:
+def test_topic_without_a_widget_is_named() -> None:
     text = text_of(**CELL, unreadable=["/cell_io"])
     assert "# - /pose (geometry_msgs/msg/Pose)" in text
     assert "# - /add (example_interfaces/srv/AddTwoInts): give its request" in text

@@ -122,7 +122,7 @@ def test_what_stays_is_repeated_each_second_and_a_change_is_told_at_once(robot: 
     assert newest(robot, "/cell/state") == "STOPPED"
 
 
-def test_what_is_shown_belongs_together(robot: Stepped) -> None:
+def test_shown_values_belong_to_one_moment(robot: Stepped) -> None:
     robot.run(20)
     boxes, pallet = newest(robot, "/boxes"), newest(robot, "/cell/pallet")
     assert newest(robot, "/cell/shift_boxes") == (pallet - 1) * BOXES + boxes

@@ -324,7 +324,7 @@ def test_names_of_constants_confirm_and_are_simulated(loaded: Loaded) -> None:
     assert robot.values("/is", "level")[-1] == 1
 
 
-def test_what_confirms_presses_changes_with_them_only(loaded: Loaded) -> None:
+def test_confirming_topic_changes_only_with_presses(loaded: Loaded) -> None:
     robot = Stepped(loaded(PRESSES)).run(60)
     assert len(set(robot.values("/is"))) == len(set(robot.values("/fan_state"))) == 1
 

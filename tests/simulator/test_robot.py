@@ -31,7 +31,7 @@ def test_it_permits_and_forbids_in_turns_and_says_so_once_a_second() -> None:
     assert robot.step(100.0 + PERMITTED_S + FORBIDDEN_S) == [("/operation_enabled", {"data": True})]
 
 
-def test_it_echoes_what_it_heard_once() -> None:
+def test_demo_robot_echoes_each_message_once() -> None:
     robot = DemoRobot()
     robot.hear("/operation1", "hello")
     assert ("/last_heard", {"data": "hello (/operation1)"}) in robot.step(0.0)
@@ -180,7 +180,7 @@ def test_a_panel_sets_and_follows_its_parameters(
 
 
 @pytest.mark.parametrize("command", ["app.simulator", "app.log", "app.log verify"])
-def test_a_command_says_how_it_is_used(command: str) -> None:
+def test_help_of_a_command_shows_its_usage(command: str) -> None:
     words = [sys.executable, "-m", *command.split(), "--help"]
     said = subprocess.run(
         words, cwd=ROOT, capture_output=True, text=True, check=True, timeout=30

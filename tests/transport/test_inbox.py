@@ -34,7 +34,7 @@ def inbox(woken: list[bool]) -> Inbox:
     return mine
 
 
-def test_of_a_topic_the_newest_is_kept_and_what_was_skipped_counted(inbox: Inbox) -> None:
+def test_topic_keeps_the_newest_sample_and_counts_skipped_ones(inbox: Inbox) -> None:
     for said in (b"one", b"two", b"three"):
         inbox.put("heard", said, None)
     sample = inbox.drain().samples["heard"]
@@ -99,7 +99,7 @@ def test_samples_and_losses_are_in_order(inbox: Inbox) -> None:
     assert token.lost_before == token.lost_seq
 
 
-def test_what_is_published_is_never_dropped_for_its_stamp(inbox: Inbox) -> None:
+def test_published_message_is_never_dropped_for_its_stamp(inbox: Inbox) -> None:
     """A clock that was an hour ahead and was set right made all that came later "older"."""
     inbox.put("permit", b"true", Sent(3600.0))
     assert inbox.drain().samples["permit"].payload == b"true"

@@ -37,7 +37,7 @@ def run(test: Callable[[Bridges, CoalescedQuery], Awaitable[None]]) -> None:
     asyncio.run(both())
 
 
-def test_who_asks_at_once_shares_one_question() -> None:
+def test_concurrent_queries_share_one_request() -> None:
     async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
         assert await asyncio.gather(*(readiness.answers() for _ in range(100))) == [True] * 100
         assert bridges.questions == 1

@@ -236,7 +236,7 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     until(lambda: found() == set(wanted), "the tokens of the new session are there")
 
 
-def test_of_a_lossless_topic_what_came_and_went_between_two_drains_is_kept(
+def test_lossless_topic_keeps_every_sample_between_two_drains(
     peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
     _, session = peer

@@ -135,7 +135,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(disks, limit, ENOUGH_S)
 
 
-def test_a_restart_finds_what_was_before(tmp_path: Path) -> None:
+def test_restart_finds_the_stored_history(tmp_path: Path) -> None:
     async def work() -> None:
         first = Cell(tmp_path)
         await first.disk.start()

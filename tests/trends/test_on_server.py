@@ -73,7 +73,7 @@ def test_the_history_of_each_pen_is_read(server: Server) -> None:
     assert answer["pens"][0][0] is None
 
 
-def test_who_follows_gets_what_is_new(server: Server) -> None:
+def test_follower_gets_new_columns(server: Server) -> None:
     until(lambda: len(columns(server)) > 5, "there are values")
     last = columns(server)[-1][0]
     found = until(
@@ -107,7 +107,7 @@ def test_a_time_that_is_over_does_not_change(server: Server) -> None:
         (PATH, {"span_s": 60, "end": "today"}, 422),
     ],
 )
-def test_what_is_no_question_is_refused(
+def test_invalid_query_is_refused(
     server: Server, path: str, query: dict[str, Any], status: int
 ) -> None:
     answer = server.http.get(path, params=query)

@@ -42,7 +42,7 @@ def test_it_says_the_time_and_has_no_id() -> None:
     assert round(before * 1000) <= beats["now"] <= round(clock.server_now() * 1000)
 
 
-def test_it_beats_while_somebody_hears_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_heartbeat_runs_while_a_listener_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(heartbeat, "BEAT_S", 0.01)
 
     async def work() -> None:
@@ -55,7 +55,9 @@ def test_it_beats_while_somebody_hears_it(monkeypatch: pytest.MonkeyPatch) -> No
     run(work)
 
 
-def test_all_who_hear_it_get_the_same_bytes_of_one_timer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_heartbeat_listeners_get_the_same_bytes_of_one_timer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(heartbeat, "BEAT_S", 0.01)
 
     async def work() -> None:
@@ -68,7 +70,7 @@ def test_all_who_hear_it_get_the_same_bytes_of_one_timer(monkeypatch: pytest.Mon
     run(work)
 
 
-def test_with_the_last_who_hears_it_its_timer_ends() -> None:
+def test_heartbeat_timer_ends_with_its_last_listener() -> None:
     async def work() -> None:
         beating = Beating()
         with beating.heart.heard():

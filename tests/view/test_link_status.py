@@ -124,7 +124,7 @@ def test_a_verdict_locks_by_its_link_only(code: str) -> None:
     assert by == [["Free"] if code in codes else [] for codes in (PEER, NODE)]
 
 
-def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:
+def test_missing_bridge_locks_all_and_the_node_nothing() -> None:
     panel = cell()
     robot = robot_there(panel)
     robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)

@@ -103,7 +103,7 @@ def test_a_state_that_is_too_old_has_no_colour(panel: Panel, robot: RobotState) 
     assert (attributes["state"], attributes["colour"], attributes["since"]) == ("old", "none", "")
 
 
-def test_a_long_state_is_told_in_hours_and_minutes(panel: Panel, robot: RobotState) -> None:
+def test_long_state_is_shown_in_hours_and_minutes(panel: Panel, robot: RobotState) -> None:
     reports(robot, "FAULT")
     reports(robot, "RUNNING", seq=2)
     reports(robot, "RUNNING", at=NOW + 8060, seq=3)

@@ -80,7 +80,9 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
     }
 
 
-def test_of_a_widget_only_what_changed_is_sent(publisher: ViewPublisher, robot: RobotState) -> None:
+def test_only_changed_attributes_of_a_widget_are_sent(
+    publisher: ViewPublisher, robot: RobotState
+) -> None:
     says(robot, "/heard", "one")
     publisher.post(view_of(robot))
     old = publisher.view
@@ -152,7 +154,7 @@ def test_a_slow_reader_skips_to_the_newest(publisher: ViewPublisher, robot: Robo
     assert b"two" not in publisher.events_since(1, old)
 
 
-def test_what_changed_and_changed_back_is_not_sent(publisher: ViewPublisher, robot: RobotState) -> None:
+def test_value_that_changed_back_is_not_sent(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
     publisher.post(view_of(robot, fault="x"))
     publisher.post(view_of(robot))
@@ -232,13 +234,13 @@ def test_each_language_has_events_of_its_own_encoded_once(
         assert publisher.events_since(1, old, reader) is german
 
 
-def test_who_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:
+def test_subscriber_that_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:
     permits(robot)
     publisher.post(view_of(robot))
     run(publisher.wait_for_change(1, 0))
 
 
-def test_who_waits_is_woken_by_a_new_view(publisher: ViewPublisher, robot: RobotState) -> None:
+def test_waiting_stream_is_woken_by_a_new_view(publisher: ViewPublisher, robot: RobotState) -> None:
     permits(robot)
     new = view_of(robot)
 
@@ -250,7 +252,7 @@ def test_who_waits_is_woken_by_a_new_view(publisher: ViewPublisher, robot: Robot
     assert publisher.version == 2
 
 
-def test_all_who_wait_are_woken(publisher: ViewPublisher, robot: RobotState) -> None:
+def test_all_waiting_tasks_are_woken(publisher: ViewPublisher, robot: RobotState) -> None:
     permits(robot)
     new = view_of(robot)
 
@@ -261,7 +263,7 @@ def test_all_who_wait_are_woken(publisher: ViewPublisher, robot: RobotState) -> 
     run(woken())
 
 
-def test_who_waits_is_woken_by_the_heartbeat(publisher: ViewPublisher) -> None:
+def test_waiting_stream_is_woken_by_the_heartbeat(publisher: ViewPublisher) -> None:
     async def woken() -> None:
         with publisher.heartbeat.heard():
             await publisher.wait_for_change(1, 0)
@@ -270,7 +272,7 @@ def test_who_waits_is_woken_by_the_heartbeat(publisher: ViewPublisher) -> None:
     assert (publisher.version, publisher.heartbeat.count) == (1, 1)
 
 
-def test_the_end_wakes_who_waits(publisher: ViewPublisher) -> None:
+def test_shutdown_wakes_waiting_tasks(publisher: ViewPublisher) -> None:
     async def woken() -> None:
         asyncio.get_running_loop().call_soon(publisher.close)
         await publisher.wait_for_change(1, 0)

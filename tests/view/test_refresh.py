@@ -68,7 +68,7 @@ def say(robot: RobotState, topic: str, word: str | None, at: float) -> None:
 
 
 @given(some.lists(SAID, max_size=20))
-def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[Said]) -> None:
+def test_incremental_values_equal_a_full_rebuild(story: list[Said]) -> None:
     robot = there(PANEL)
     now = NOW
     built = build_view(PANEL, robot, now)

@@ -164,7 +164,7 @@ def test_the_newest_of_several_messages_come_first() -> None:
     assert robot.names() == ["a", "b"]
 
 
-def test_what_is_kept_is_bounded() -> None:
+def test_kept_entries_are_bounded() -> None:
     robot, step = Robot(key="name", rows_shown=1), 1000
     for first in range(0, 2 * MAX_KEYS, step):
         robot.says(*(status(f"p{first + number}") for number in range(step)), at=NOW + first)

@@ -130,7 +130,7 @@ def test_a_press_needs_control(own_client: Callable[..., Client], own_kiosk: Ser
     until(lambda: all(f"by {n} with" in own_kiosk.process.text for n in names), "the log names each")
 
 
-def test_only_one_of_many_gets_it(client: Callable[..., Client]) -> None:
+def test_only_one_of_many_clients_gets_control(client: Callable[..., Client]) -> None:
     clients = [client(f"192.0.2.{n}") for n in range(1, 9)]
     assert [one.take() for one in clients] == [True] + [False] * 7
     assert [one.press().status_code for one in clients] == [200] + [409] * 7
@@ -235,7 +235,7 @@ def test_a_request_goes_through_without_a_touch_of_the_holder(
     until(bob_has_it, "Bob has it")
 
 
-def test_a_lost_holder_frees_it(own_client: Callable[..., Client], own_kiosk: Server) -> None:
+def test_lost_holder_frees_control(own_client: Callable[..., Client], own_kiosk: Server) -> None:
     ann = own_client("192.0.2.1")
     with own_kiosk.stream() as stream:
         stream.next("snapshot")
@@ -307,7 +307,7 @@ def test_a_cookie_that_is_none_of_ours_is_replaced(kiosk: Server) -> None:
         assert re.fullmatch(r"[0-9a-f]{32}", answer.cookies["panel_browser"])
 
 
-def test_a_link_on_another_site_does_not_change_who_somebody_is(kiosk: Server) -> None:
+def test_link_from_another_site_keeps_the_identity_of_the_client(kiosk: Server) -> None:
     answer = httpx.get(f"{kiosk.url}/", headers={"sec-fetch-site": "cross-site"}, trust_env=False)
     assert answer.status_code == 200
     assert "set-cookie" not in answer.headers
@@ -339,7 +339,7 @@ def test_pages_of_other_sites_get_no_control(kiosk: Server, client: Callable[...
     assert kiosk.snapshot()["control"]["holder"] == ""
 
 
-def test_what_is_no_act_is_refused_in_words(client: Callable[..., Client]) -> None:
+def test_unknown_control_act_is_refused_with_a_reason(client: Callable[..., Client]) -> None:
     ann = client("192.0.2.1")
     unknown = ann.control("steal")
     assert unknown.status_code == 404
@@ -456,7 +456,7 @@ def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
         kiosk.end()
 
 
-def test_after_a_restart_no_client_has_it(
+def test_no_client_has_control_after_a_restart(
     own_client: Callable[..., Client], own_kiosk: Server, tmp_path: Path
 ) -> None:
     ann = own_client("192.0.2.1")

@@ -44,7 +44,7 @@ def test_every_page_looks_as_the_panel_file_says_or_as_was_chosen(kiosk: Server,
     assert looks(kiosk, path, chosen) == ("light", "large", "left")
 
 
-def test_a_cookie_with_what_is_no_choice_is_ignored(kiosk: Server) -> None:
+def test_cookie_with_an_invalid_choice_is_ignored(kiosk: Server) -> None:
     assert looks(kiosk, "/", 'kiosk_theme="><script>; kiosk_hand=up') == ("dark", "normal", "right")
 
 
@@ -92,7 +92,7 @@ def test_other_sites_choose_nothing(kiosk: Server) -> None:
     assert "set-cookie" not in answer.headers
 
 
-def test_what_is_no_form_is_refused(kiosk: Server) -> None:
+def test_invalid_form_is_refused(kiosk: Server) -> None:
     assert kiosk.http.post("/display", content=b"theme=light&theme=dark").status_code == 422
     assert kiosk.http.post("/display", content=b"\xff=1").status_code == 422
 

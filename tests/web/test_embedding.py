@@ -109,7 +109,7 @@ def test_a_frame_gets_the_page_that_is_for_it(cell: Server) -> None:
     assert (answer.status_code, answer.headers["location"]) == (303, "/?embed=1")
 
 
-def test_what_a_frame_is_told_is_locked(cell: Server) -> None:
+def test_controls_in_a_frame_are_locked(cell: Server) -> None:
     text = cell.http.get("/events?once=1&embed=1").text
     assert '"role":"embedded"' in text
     assert '"enabled":true' not in text.split('"widgets"')[1]
@@ -121,7 +121,7 @@ def test_what_a_frame_is_told_is_locked(cell: Server) -> None:
     "headers",
     [{"referer": FRAMED}, {"sec-fetch-dest": "iframe"}, {"sec-fetch-storage-access": "active"}],
 )
-def test_what_a_frame_posts_is_refused(cell: Server, headers: dict[str, str]) -> None:
+def test_press_from_a_frame_is_refused(cell: Server, headers: dict[str, str]) -> None:
     for path in ("/widgets/jog", "/display", "/control/take"):
         answer = cell.http.post(path, headers=headers)
         assert answer.status_code == 403

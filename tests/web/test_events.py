@@ -121,7 +121,7 @@ def test_it_begins_with_a_snapshot_and_a_beat_and_goes_on_with_changes() -> None
     run(work)
 
 
-def test_who_does_not_read_costs_one_event_and_then_gets_the_newest() -> None:
+def test_slow_reader_costs_one_event_and_then_gets_the_newest() -> None:
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (client, _), bench.stream() as (other, _):
@@ -186,7 +186,7 @@ def test_the_end_of_the_board_ends_it() -> None:
     run(work)
 
 
-def test_what_fails_ends_it_and_is_logged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_stream_ends_and_is_logged(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> bytes:
         raise ValueError("no")
 

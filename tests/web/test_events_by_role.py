@@ -100,7 +100,7 @@ def test_the_server_locks_for_who_has_no_control_and_unlocks_with_it() -> None:
     run(work)
 
 
-def test_500_streams_share_what_is_encoded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_500_streams_share_encoded_events(monkeypatch: pytest.MonkeyPatch) -> None:
     encoded: list[Mapping[str, Any]] = []
     encode = module.encoded
 

@@ -24,7 +24,7 @@ def server() -> Iterator[Server]:
     mine.end()
 
 
-def test_every_kind_is_in_it() -> None:
+def test_every_widget_kind_is_in_the_gallery() -> None:
     assert {example.kind for example in EXAMPLES} == set(KINDS)
 
 

@@ -170,7 +170,7 @@ def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:
     assert values - {""} == {'{"speed": 0.5}'}
 
 
-def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
+def test_hold_can_be_released_before_the_first_response(demo: Server) -> None:
     with opened(demo) as socket:
         socket.begin()
         socket.say(do="end", why="released")
@@ -226,7 +226,7 @@ def test_a_second_holder_is_refused(demo: Server) -> None:
         ({"stamp": 1e9}, 409, "hold_press_too_late"),
     ],
 )
-def test_what_can_not_be_begun_is_refused(
+def test_hold_that_cannot_begin_is_refused(
     demo: Server, more: dict[str, Any], status: int, code: str
 ) -> None:
     with opened(demo) as socket:
@@ -326,7 +326,7 @@ def test_the_doors_are_shut_under_other_names(demo: Server) -> None:
     assert refused.value.response.status_code == 403
 
 
-def test_what_can_not_be_held_is_not_found(demo: Server) -> None:
+def test_widget_that_is_not_a_hold_is_not_found(demo: Server) -> None:
     url = f"ws://127.0.0.1:{demo.port}/widgets/speed/hold"
     with pytest.raises(InvalidStatus) as refused, connect(url):
         raise AssertionError("it opened")
@@ -350,7 +350,7 @@ def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
                 raise AssertionError("it opened")
 
 
-def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
+def test_lost_bridge_ends_the_hold_and_sends_nothing_late(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path
 ) -> None:
     own_node.subscribe("/jog", "geometry_msgs/msg/Point", depth=1000)
@@ -390,7 +390,7 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
 
 
 @pytest.mark.real_time
-def test_a_server_that_stood_still_has_ended_it_when_it_wakes(prompt: Server) -> None:
+def test_stalled_server_has_ended_the_hold_when_it_resumes(prompt: Server) -> None:
     with held(prompt) as socket:
         prompt.process.send(signal.SIGSTOP)
         time.sleep(0.5)
@@ -410,7 +410,7 @@ def at_a_terminal() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("at_a_terminal")
-def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
+def test_closed_terminal_shuts_the_server_down_cleanly(
     tmp_path: Path,
 ) -> None:
     with demo_server(tmp_path, PANEL, app=PATIENT) as mine, held(mine) as socket:

@@ -99,7 +99,7 @@ def test_metrics_are_text_and_too_many_presses_say_when_to_come_again(
     }
 
 
-def test_what_does_not_fit_the_description_is_answered_as_any_error(kiosk: Server) -> None:
+def test_invalid_request_gets_a_regular_error(kiosk: Server) -> None:
     answer = kiosk.http.get("/events?once=perhaps")
     assert answer.status_code == 422
     assert answer.json()["error"].startswith("once: Input should be a valid boolean")

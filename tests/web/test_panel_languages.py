@@ -135,7 +135,7 @@ def test_what_is_asked_without_scripts_has_the_readers_sign(kiosk: Server) -> No
     assert '<button class="yes">Erst fragen</button>' in html
 
 
-def test_the_log_has_each_entry_in_the_language_of_who_reads_it(kiosk: Server) -> None:
+def test_log_page_has_each_entry_in_the_readers_language(kiosk: Server) -> None:
     press(kiosk, "ja", limit=9.5)
     for language, sentence, title, day in (
         ("en", "Limit is 9.5: it must be 0 to 2.5 m/s", "Set the limit", r"\d{4}-\d\d-\d\d"),

@@ -98,7 +98,7 @@ def test_too_many_presses_at_once_are_refused_and_none_is_lost(kiosk: Server) ->
         assert socket.hear()["status"] == 200
 
 
-def test_who_leaves_before_the_answer_loses_only_that(kiosk: Server) -> None:
+def test_client_that_leaves_early_loses_only_its_answer(kiosk: Server) -> None:
     with kiosk.socket() as socket:
         socket.say(press(MUTE[1], "left"))
         until(lambda: kiosk.widget(MUTE[1])["busy"], "it is under way")
@@ -149,7 +149,7 @@ def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str
     assert said["reason"] in logged(mine, "long")
 
 
-def test_who_comes_while_it_ends_and_reads_nothing_holds_it_up_no_longer(tmp_path: Path) -> None:
+def test_unread_socket_does_not_delay_shutdown(tmp_path: Path) -> None:
     with (
         slow(tmp_path, LONG_S, LONG_SHUTDOWN) as mine,
         mine.socket() as socket,
@@ -165,7 +165,7 @@ def test_who_comes_while_it_ends_and_reads_nothing_holds_it_up_no_longer(tmp_pat
             mine.process.wait(ENOUGH_S)
 
 
-def test_what_is_no_press_gets_an_error(kiosk: Server) -> None:
+def test_message_that_is_not_a_press_gets_an_error(kiosk: Server) -> None:
     with kiosk.socket() as socket:
         for text, why in (
             (b"\0", "the message is not text"),

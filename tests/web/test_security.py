@@ -200,7 +200,7 @@ def test_an_answer_may_set_a_security_header_itself() -> None:
     assert answer_to("GET", "/", OWN, own).headers.get_list("referrer-policy") == ["no-referrer"]
 
 
-def test_what_is_no_http_passes() -> None:
+def test_other_asgi_scopes_pass() -> None:
     passed: list[str] = []
 
     async def inside(scope: Scope, receive: Receive, send: Send) -> None:

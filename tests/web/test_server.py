@@ -175,7 +175,7 @@ def test_bad_input_on_a_socket_is_named_too_and_loses_nothing(
         until(comes_through, "a press comes through", every_s=0.2)
 
 
-def test_only_what_can_be_pressed_can_be_pressed(demo: Server) -> None:
+def test_only_command_widgets_can_be_pressed(demo: Server) -> None:
     for widget in ("nothing", "message", "last_heard"):
         assert demo.press(widget).status_code == 404
         assert demo.by("socket").press(widget).status_code == 404
@@ -292,7 +292,7 @@ def test_openapi_describes_the_paths(demo: Server) -> None:
 
 
 @pytest.mark.real_time
-def test_it_ends_soon_with_fifty_streams_and_sockets_open(
+def test_server_stops_soon_with_fifty_open_streams_and_sockets(
     servers: Callable[[Server], Server],
 ) -> None:
     mine = servers(Server(ROOT))
@@ -317,7 +317,7 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open(
 
 
 @pytest.mark.real_time
-def test_it_ends_while_it_connects_to_what_says_nothing(tmp_path: Path) -> None:
+def test_silent_peer_does_not_delay_shutdown(tmp_path: Path) -> None:
     with socket.socket() as deaf:
         deaf.bind(("127.0.0.1", 0))
         deaf.listen()
@@ -348,7 +348,7 @@ def reads_nothing(server: Server) -> Iterator[None]:
         yield
 
 
-def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
+def test_unread_response_does_not_delay_shutdown() -> None:
     mine = Server(ROOT)
     with reads_nothing(mine):
         until(mine.answers, "it has begun to answer")
@@ -384,7 +384,7 @@ def test_head_of_a_static_file_says_its_length(demo: Server) -> None:
 
 
 @pytest.mark.parametrize("path", ["/events", "/events?once=1", "/log.csv", "/metrics"])
-def test_head_of_what_is_long_ends_at_once(demo: Server, path: str) -> None:
+def test_head_request_of_a_stream_ends_at_once(demo: Server, path: str) -> None:
     until(lambda: "kiosk_streams 0.0" in demo.http.get("/metrics").text, "no stream")
     assert (demo.http.head(path).status_code, demo.http.head(path).content) == (200, b"")
     until(lambda: "kiosk_streams 0.0" in demo.http.get("/metrics").text, "the stream is gone")

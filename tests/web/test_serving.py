@@ -196,7 +196,7 @@ def test_a_body_has_its_time(hasty: Server, path: str) -> None:
 @pytest.mark.parametrize(
     "path", ["/widgets/operation", "/widgets/operation/cancel", "/display", "/none"]
 )
-def test_who_sends_too_much_gets_the_answer(plain: Server, path: str, more: str) -> None:
+def test_oversized_body_gets_its_response(plain: Server, path: str, more: str) -> None:
     head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n{more}"
     with opened(plain) as one:
         one.sendall(f"{head}Content-Length: {5 * MB}\r\n\r\n".encode())
@@ -217,7 +217,7 @@ def test_the_rest_of_a_body_is_not_read_for_ever(plain: Server) -> None:
     assert memory(plain) - before < 8 * MB
 
 
-def test_who_drops_a_body_leaves_no_traceback(plain: Server) -> None:
+def test_dropped_request_body_leaves_no_traceback(plain: Server) -> None:
     lines = len(plain.process.lines)
     head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
     for _ in range(20):

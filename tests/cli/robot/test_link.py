@@ -152,9 +152,7 @@ def test_a_panel_file_says_where_the_robot_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words", [("--namespace", "a b"), ("--wait", "0"), ("--wait", "inf"), ("--wait", "x")]
 )
-def test_a_mistake_in_an_option_is_told(
-    words: Sequence[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mistyped_option_is_reported(words: Sequence[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         given(*words)
     assert "is not a" in capsys.readouterr().err
