@@ -50,12 +50,12 @@ else:
     AlarmText = panel_text(400)
 
 
-def _parse_patterns(given: Any) -> tuple[str, ...]:
+def _parse_patterns(value: Any) -> tuple[str, ...]:
     """The patterns, from one or a list of them."""
-    patterns = [given] if isinstance(given, str) else given
+    patterns = [value] if isinstance(value, str) else value
     if not isinstance(patterns, list | tuple) or not all(isinstance(p, str) and p for p in patterns):
         raise ValueError(
-            f"must be a name, in which * stands for any text, or a list, not {format_value(given)}"
+            f"must be a name, in which * stands for any text, or a list, not {format_value(value)}"
         )
     if not patterns:
         raise ValueError('is empty: write "*" for all names')
@@ -69,11 +69,11 @@ def _check_unique(ids: tuple[str, ...]) -> tuple[str, ...]:
     return ids
 
 
-def _check_levels(given: Mapping[str, int]) -> Mapping[str, int]:
-    for level in given:
+def _check_levels(value: Mapping[str, int]) -> Mapping[str, int]:
+    for level in value:
         if not LEVEL.fullmatch(level):
             raise ValueError(f"{format_value(level)} is not a level: a number, or a text in capitals")
-    return given
+    return value
 
 
 LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
@@ -155,8 +155,8 @@ class Alarm(Description):
     @cached_property
     def limits(self) -> Mapping[str, float]:
         """Key → value of the given limits."""
-        given = {key: getattr(self, key) for key in LIMIT_KEYS}
-        return {key: value for key, value in given.items() if value is not None}
+        values = {key: getattr(self, key) for key in LIMIT_KEYS}
+        return {key: value for key, value in values.items() if value is not None}
 
     @property
     def topic_name(self) -> str | None:

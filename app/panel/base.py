@@ -40,46 +40,47 @@ def _context(info: ValidationInfo) -> FileContext:
     return info.context or FileContext()
 
 
-def is_absolute_name(given: str) -> bool:
+def is_absolute_name(name: str) -> bool:
     """Whether it is the absolute name of a topic, service, action or node; a second slash at the
     beginning says that it is not below the panel's namespace."""
-    own = given.removeprefix("/") if given.startswith(GLOBAL) else given
+    own = name.removeprefix("/") if name.startswith(GLOBAL) else name
     return TOPIC.fullmatch(own) is not None and "__" not in own
 
 
-def _check_topic(given: str) -> str:
-    if not is_absolute_name(given):
+def _check_topic(name: str) -> str:
+    if not is_absolute_name(name):
         raise ValueError(
-            f'{format_value(given)} is not an absolute ROS 2 topic name: it starts with "/" ("//": not '
+            f'{format_value(name)} is not an absolute ROS 2 topic name: it starts with "/" ("//": not '
             'below the namespace), and each part is letters, digits and single "_", and starts with no '
             "digit"
         )
-    return given
+    return name
 
 
-def _check_message_type(given: str) -> str:
-    if not MESSAGE_TYPE.fullmatch(given):
+def _check_message_type(type_name: str) -> str:
+    if not MESSAGE_TYPE.fullmatch(type_name):
         raise ValueError(
-            f"{format_value(given)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
+            f"{format_value(type_name)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
         )
-    return given
+    return type_name
 
 
-def _check_service_type(given: str) -> str:
-    if not SERVICE_TYPE.fullmatch(given):
+def _check_service_type(type_name: str) -> str:
+    if not SERVICE_TYPE.fullmatch(type_name):
         raise ValueError(
-            f"{format_value(given)} is not a ROS 2 service type: it must be like std_srvs/srv/SetBool"
+            f"{format_value(type_name)} is not a ROS 2 service type: it must be like "
+            "std_srvs/srv/SetBool"
         )
-    return given
+    return type_name
 
 
-def _check_action_type(given: str) -> str:
-    if not ACTION_TYPE.fullmatch(given):
+def _check_action_type(type_name: str) -> str:
+    if not ACTION_TYPE.fullmatch(type_name):
         raise ValueError(
-            f"{format_value(given)} is no ROS 2 action type: "
+            f"{format_value(type_name)} is no ROS 2 action type: "
             "it must be like nav2_msgs/action/NavigateToPose"
         )
-    return given
+    return type_name
 
 
 def catalogue_default(code: str) -> Any:
@@ -91,39 +92,39 @@ def catalogue_default(code: str) -> Any:
     return Field(default_factory=lambda: say(code), json_schema_extra=described)
 
 
-def parse_namespace(given: str) -> str:
-    whole = f"/{given.strip('/')}" if given.strip("/") else ""
+def parse_namespace(namespace: str) -> str:
+    whole = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
     if not NAMESPACE.fullmatch(whole) or "__" in whole:
-        raise ValueError(f"{format_value(given)} is not a ROS 2 namespace: it must be like /robot1")
+        raise ValueError(f"{format_value(namespace)} is not a ROS 2 namespace: it must be like /robot1")
     return whole
 
 
-def _check_endpoint(given: str) -> str:
+def _check_endpoint(endpoint: str) -> str:
     """Checks a Zenoh endpoint; Zenoh itself reports a malformed one only when the session opens."""
-    found = ENDPOINT.fullmatch(given)
-    if found is None or not 0 < int(found["port"] or 1) <= MAX_PORT:
+    parts = ENDPOINT.fullmatch(endpoint)
+    if parts is None or not 0 < int(parts["port"] or 1) <= MAX_PORT:
         raise ValueError(
-            f"{format_value(given)} is not a Zenoh endpoint: it must be like tcp/robot1:7447"
+            f"{format_value(endpoint)} is not a Zenoh endpoint: it must be like tcp/robot1:7447"
         )
-    return given
+    return endpoint
 
 
-def _resolve_folder(given: Any, info: ValidationInfo) -> Path:
+def _resolve_folder(value: Any, info: ValidationInfo) -> Path:
     """The folder's path, relative to the panel file's folder."""
-    if not isinstance(given, str) or not given:
-        raise ValueError(f"must be the path of a folder, not {format_value(given)}")
-    folder = _context(info).folder / given
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"must be the path of a folder, not {format_value(value)}")
+    folder = _context(info).folder / value
     if not folder.is_dir():
         raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
     return folder
 
 
-def _resolve_file(given: Any, info: ValidationInfo) -> Path:
+def _resolve_file(value: Any, info: ValidationInfo) -> Path:
     """The file's path, relative to the panel file's folder."""
-    if not isinstance(given, str) or not given:
-        raise ValueError(f"must be the path of a file, not {format_value(given)}")
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"must be the path of a file, not {format_value(value)}")
     folder = _context(info).folder
-    file = folder / given
+    file = folder / value
     if not file.is_file():
         raise ValueError(f"{file} is not a file: the path is relative to the panel file")
     if not is_inside(file, folder):
@@ -150,46 +151,46 @@ def is_inside(file: Path, *folders: Path) -> bool:
     return any(file.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
-def _check_field_path(given: str) -> str:
+def _check_field_path(path: str) -> str:
     try:
-        path_steps(given)
+        path_steps(path)
     except InterfaceError as error:
         raise ValueError(str(error)) from None
-    return given
+    return path
 
 
-def _check_written_field(given: str) -> str:
-    if any(isinstance(step, Key) for step in path_steps(_check_field_path(given))):
-        raise ValueError(f'"{given}" is filled in: an element is given by its number, as in data[2]')
-    return given
+def _check_written_field(path: str) -> str:
+    if any(isinstance(step, Key) for step in path_steps(_check_field_path(path))):
+        raise ValueError(f'"{path}" is filled in: an element is given by its number, as in data[2]')
+    return path
 
 
-def _parse_interlocks(given: Any) -> tuple[str, ...]:
+def _parse_interlocks(value: Any) -> tuple[str, ...]:
     """The ids, from one id or a list of them."""
-    named = [given] if isinstance(given, str) else given
+    named = [value] if isinstance(value, str) else value
     if not isinstance(named, list | tuple):
-        raise ValueError(f"must be the id of an interlock, or a list of ids, not {format_value(given)}")
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {format_value(value)}")
     if not named:
         raise ValueError("is an empty list: name an interlock, or leave the key out")
-    for i, one in enumerate(named):
-        if not isinstance(one, str) or not re.fullmatch(ID, one):
-            raise ValueError(f'{format_value(one)} is not an id: a-z, 0-9 and "_", a letter first')
-        if one in named[:i]:
-            raise ValueError(f"names {format_value(one)} twice")
+    for i, name in enumerate(named):
+        if not isinstance(name, str) or not re.fullmatch(ID, name):
+            raise ValueError(f'{format_value(name)} is not an id: a-z, 0-9 and "_", a letter first')
+        if name in named[:i]:
+            raise ValueError(f"names {format_value(name)} twice")
     return tuple(named)
 
 
-def non_empty(given: tuple[Any, ...]) -> tuple[Any, ...]:
+def non_empty(tables: tuple[Any, ...]) -> tuple[Any, ...]:
     """ValueError for an empty list of tables."""
-    if not given:
+    if not tables:
         raise ValueError("is empty: it must have one table at least")
-    return given
+    return tables
 
 
 @cache
 def _texts(least: int, most: int | None) -> TypeAdapter[dict[str, str]]:
-    one = Annotated[str, Field(min_length=least, max_length=most)]
-    table = Annotated[dict[str, one], Field(min_length=1)]
+    text = Annotated[str, Field(min_length=least, max_length=most)]
+    table = Annotated[dict[str, text], Field(min_length=1)]
     return TypeAdapter(table, config=ConfigDict(strict=True))
 
 
@@ -197,20 +198,20 @@ def panel_text(most: int | None = None, least: int = 1) -> Any:
     """The type of a text that an operator reads, of `least` to `most` characters: a text, or a table of
     texts by their languages, `{ en = "Start", ja = "始動" }`."""
 
-    def by_language(given: Any, text: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-        if not isinstance(given, Mapping):
-            return text(given)
-        return PanelText(_texts(least, most).validate_python(given), _context(info).language)
+    def by_language(value: Any, text: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        if not isinstance(value, Mapping):
+            return text(value)
+        return PanelText(_texts(least, most).validate_python(value), _context(info).language)
 
     limits = {"minLength": least} if least else {}
     limits |= {} if most is None else {"maxLength": most}
-    one = {"type": "string", **limits}
-    table = {"type": "object", "title": TEXTS, "additionalProperties": one, "minProperties": 1}
+    text_schema = {"type": "string", **limits}
+    table = {"type": "object", "title": TEXTS, "additionalProperties": text_schema, "minProperties": 1}
     return Annotated[
         str,
         Field(min_length=least, max_length=most),
         WrapValidator(by_language),
-        WithJsonSchema({"anyOf": [one, table]}),
+        WithJsonSchema({"anyOf": [text_schema, table]}),
     ]
 
 

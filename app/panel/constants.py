@@ -33,25 +33,25 @@ def _parent_type(type_name: str, field: str, interfaces: Interfaces) -> str:
     return str(interfaces.type_at(type_name, where).element) if where else type_name
 
 
-def resolve_constant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
+def resolve_constant(value: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
     """The value of a comparison. A text is a constant's name if the field is no text; an
     unknown name is returned as it is.
     """
-    named = isinstance(given, str) and kind.name not in STRING_TYPES
-    return constants.get(given, given) if named else given
+    named = isinstance(value, str) and kind.name not in STRING_TYPES
+    return constants.get(value, value) if named else value
 
 
-def comparison_value(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
+def comparison_value(written: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
     """The same in the field's type: 0.1 as float32 is another number than as float64."""
-    value = resolve_constant(given, kind, constants)
+    value = resolve_constant(written, kind, constants)
     return to_float32(value) if kind.name == "float32" else value
 
 
-def resolve_at(given: Any, type_name: str, field: str, interfaces: Interfaces) -> Any:
+def resolve_at(value: Any, type_name: str, field: str, interfaces: Interfaces) -> Any:
     """A value for a field of a type: that of a constant where it is its name."""
     kind = interfaces.type_at(type_name, field)
     return resolve_constant(
-        given, kind, interfaces.constants(_parent_type(type_name, field, interfaces))
+        value, kind, interfaces.constants(_parent_type(type_name, field, interfaces))
     )
 
 
@@ -65,21 +65,21 @@ def mismatch_at(value: Any, type_name: str, field: str, interfaces: Interfaces) 
     return value_mismatch(value, kind.name)
 
 
-def resolve_names(given: Any, kind: Type, interfaces: Interfaces, names: Mapping[str, Any] = {}) -> Any:
+def resolve_names(value: Any, kind: Type, interfaces: Interfaces, names: Mapping[str, Any] = {}) -> Any:
     """A message's value with values in place of the names of constants, for a reader: `encode` accepts
     both. Texts with input ids are unchanged."""
-    if isinstance(given, list | tuple) and kind.container != "one":
-        return [resolve_names(one, kind.element, interfaces, names) for one in given]
-    if isinstance(given, Mapping) and kind.is_nested and kind.name in interfaces.structures:
+    if isinstance(value, list | tuple) and kind.container != "one":
+        return [resolve_names(element, kind.element, interfaces, names) for element in value]
+    if isinstance(value, Mapping) and kind.is_nested and kind.name in interfaces.structures:
         structure = interfaces.structures[kind.name]
         kinds = {field.name: field.type for field in structure.fields}
         return {
-            name: resolve_names(one, kinds[name], interfaces, structure.constants)
+            name: resolve_names(element, kinds[name], interfaces, structure.constants)
             if name in kinds
-            else one
-            for name, one in given.items()
+            else element
+            for name, element in value.items()
         }
-    return resolve_constant(given, kind, names)
+    return resolve_constant(value, kind, names)
 
 
 def resolve_condition(condition: Resolved, interfaces: Interfaces) -> Resolved:
@@ -87,10 +87,10 @@ def resolve_condition(condition: Resolved, interfaces: Interfaces) -> Resolved:
     kind = interfaces.type_at(condition.type, condition.field)
     constants = interfaces.constants(parent_type(condition, interfaces))
     values = {
-        key: tuple(comparison_value(one, kind, constants) for one in given)
+        key: tuple(comparison_value(value, kind, constants) for value in compared)
         if key == "one_of"
-        else comparison_value(given, kind, constants)
-        for key, given in condition.comparisons.items()
+        else comparison_value(compared, kind, constants)
+        for key, compared in condition.comparisons.items()
     }
     return condition.with_constants(values, _constant_names(condition, kind, constants))
 
@@ -98,17 +98,17 @@ def resolve_condition(condition: Resolved, interfaces: Interfaces) -> Resolved:
 def _constant_names(condition: Condition, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
     """Value → name of the constants with the same prefix as those in the comparisons, without values
     that several constants have. The prefix is removed if it is the field's name."""
-    given = [one for key in condition.comparisons for one in _as_tuple(getattr(condition, key))]
-    named = [one for one in given if isinstance(one, str) and kind.name not in STRING_TYPES]
+    compared = [value for key in condition.comparisons for value in _as_tuple(getattr(condition, key))]
+    named = [value for value in compared if isinstance(value, str) and kind.name not in STRING_TYPES]
     if not named:
         return {}
     own = f"{field_name(condition.field)}_".upper()
     alike = own if all(name.startswith(own) for name in named) else _common_prefix(named)
-    found: dict[Any, list[str]] = {}
+    names_by_value: dict[Any, list[str]] = {}
     for name, value in constants.items():
         if name.startswith(alike):
-            found.setdefault(value, []).append(name.removeprefix(own))
-    return {value: names[0] for value, names in found.items() if len(names) == 1}
+            names_by_value.setdefault(value, []).append(name.removeprefix(own))
+    return {value: names[0] for value, names in names_by_value.items() if len(names) == 1}
 
 
 def _common_prefix(names: Sequence[str]) -> str:
@@ -117,8 +117,8 @@ def _common_prefix(names: Sequence[str]) -> str:
     return "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
 
 
-def _as_tuple(given: Any) -> tuple[Any, ...]:
-    return given if isinstance(given, tuple) else (given,)
+def _as_tuple(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)
 
 
 def value_mismatch(value: Any, kind: str) -> str | None:

@@ -12,33 +12,33 @@ from app.panel.base import Description, Seconds
 RANGE_LENGTH: Final = 2
 
 
-def _check_range(given: Any) -> tuple[float, ...]:
+def _check_range(value: Any) -> tuple[float, ...]:
     """The lowest and the highest value."""
-    numbers = isinstance(given, list | tuple) and len(given) == RANGE_LENGTH
-    if not numbers or not all(_is_finite(one) for one in given):
+    numbers = isinstance(value, list | tuple) and len(value) == RANGE_LENGTH
+    if not numbers or not all(_is_finite(limit) for limit in value):
         raise ValueError(
-            f"must be the lowest and the highest value, like [0, 100], not {format_value(given)}"
+            f"must be the lowest and the highest value, like [0, 100], not {format_value(value)}"
         )
-    low, high = given
+    low, high = value
     if high <= low:
         lowest, highest = format_value(low), format_value(high)
         raise ValueError(f"the highest value ({highest}) must be more than the lowest ({lowest})")
     return low, high
 
 
-def _is_finite(given: Any) -> bool:
-    return isinstance(given, int | float) and not isinstance(given, bool) and math.isfinite(given)
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _check_values(given: Any) -> tuple[Any, ...]:
-    if not isinstance(given, list | tuple) or not given:
-        raise ValueError(f"must be a list of one value at least, not {format_value(given)}")
-    for one in given:
-        if not isinstance(one, bool | int | float | str):
+def _check_values(value: Any) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple) or not value:
+        raise ValueError(f"must be a list of one value at least, not {format_value(value)}")
+    for element in value:
+        if not isinstance(element, bool | int | float | str):
             raise ValueError(
-                f"must be numbers, true or false, or texts; {format_value(one)} is none of them"
+                f"must be numbers, true or false, or texts; {format_value(element)} is none of them"
             )
-    return tuple(given)
+    return tuple(value)
 
 
 # Of numbers as the message has them, before a readout's `scale` and `offset`.

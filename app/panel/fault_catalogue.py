@@ -57,8 +57,8 @@ def _rows(file: TextIO, language: str) -> Iterator[tuple[str, FaultTexts]]:
         lines: dict[str, int] = {}
         for row in filter(None, reader):
             if len(row) != len(columns):
-                what = f"has {len(row)} values; the header has {len(columns)}"
-                raise CatalogueError(what, reader.line_num)
+                message = f"has {len(row)} values; the header has {len(columns)}"
+                raise CatalogueError(message, reader.line_num)
             code = row[columns.index(("code", ""))].strip()
             _check_code(code, lines, reader.line_num)
             yield code, _texts(columns, row, language)

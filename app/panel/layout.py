@@ -21,11 +21,11 @@ Hand = Literal["right", "left"]
 Screen = Annotated[str, Field(pattern=SCREEN)]
 
 
-def _check_screens(given: tuple[str, ...]) -> tuple[str, ...]:
-    for i, one in enumerate(given):
-        if one in given[:i]:
-            raise ValueError(f"names {format_value(one)} twice")
-    return given
+def _check_screens(sizes: tuple[str, ...]) -> tuple[str, ...]:
+    for i, size in enumerate(sizes):
+        if size in sizes[:i]:
+            raise ValueError(f"names {format_value(size)} twice")
+    return sizes
 
 
 Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(_check_screens)]

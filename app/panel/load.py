@@ -69,8 +69,8 @@ def _load(file: TomlFile) -> Panel:
 
 def _context(file: TomlFile) -> FileContext:
     """With the panel's language, in which texts are shown that lack the reader's."""
-    given = file.tables.get("language", ENGLISH)
-    return FileContext(file.path.parent, given if isinstance(given, str) else ENGLISH)
+    language = file.tables.get("language", ENGLISH)
+    return FileContext(file.path.parent, language if isinstance(language, str) else ENGLISH)
 
 
 def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
@@ -85,7 +85,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
             group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
         ]
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
-    interlocks = tuple(resolve_condition(one, interfaces) for one in panel.interlocks)
+    interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
     state = panel.state and panel.state.with_constants(interfaces)
     return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks, "state": state})
 

@@ -51,19 +51,19 @@ from app.panel.widgets.service_action import Action
 from app.pictures import picture_files
 
 
-def _check_language(given: str) -> str:
-    if given not in files():
-        raise ValueError(one_of([*files()], given))
-    return given
+def _check_language(tag: str) -> str:
+    if tag not in files():
+        raise ValueError(one_of([*files()], tag))
+    return tag
 
 
-def _check_languages(given: tuple[str, ...]) -> tuple[str, ...]:
-    if not given:
+def _check_languages(tags: tuple[str, ...]) -> tuple[str, ...]:
+    if not tags:
         raise ValueError("is empty: name one language at least, or leave the key out")
-    for i, one in enumerate(given):
-        if one in given[:i]:
-            raise ValueError(f"names {format_value(one)} twice")
-    return given
+    for i, tag in enumerate(tags):
+        if tag in tags[:i]:
+            raise ValueError(f"names {format_value(tag)} twice")
+    return tags
 
 
 Language = Annotated[
@@ -221,18 +221,24 @@ class Panel(Description):
 
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """The interlocks that must permit a press, in the widget's order."""
-        known = {one.id: one for one in self.interlocks}
+        known = {interlock.id: interlock for interlock in self.interlocks}
         return tuple(known[name] for name in widget.interlocks)
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all subscriptions."""
-        own = {one.topic: one.type for one in self.confirmations() if one.type is not None}
+        own = {
+            confirm.topic: confirm.type for confirm in self.confirmations() if confirm.type is not None
+        }
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        return own | {of.topic: of.type for of in self.monitored() if not of.on_demand} | events
+        return (
+            own
+            | {source.topic: source.type for source in self.monitored() if not source.on_demand}
+            | events
+        )
 
     def on_demand(self) -> dict[str, str]:
         """Topic → type of all topics that are subscribed to only while a browser shows them."""
-        return {of.topic: of.type for of in self.monitored() if of.on_demand}
+        return {source.topic: source.type for source in self.monitored() if source.on_demand}
 
     def listened(self) -> dict[str, str]:
         """Topic → type of all subscriptions, also of those that are there only at times."""
@@ -240,13 +246,13 @@ class Panel(Description):
 
     def subscribed_fields(self) -> dict[str, list[str]]:
         """Topic → paths of the fields that the panel reads."""
-        found: dict[str, list[str]] = {}
-        for of in self.monitored():
-            if not of.on_demand:
-                found.setdefault(of.topic, []).extend(of.fields)
+        paths: dict[str, list[str]] = {}
+        for source in self.monitored():
+            if not source.on_demand:
+                paths.setdefault(source.topic, []).extend(source.fields)
         for confirm in self.confirmations():
-            found.setdefault(confirm.topic, []).append(confirm.field)
-        return found
+            paths.setdefault(confirm.topic, []).append(confirm.field)
+        return paths
 
     def confirmations(self) -> Iterator[Confirm]:
         """The topics that confirm commands."""
@@ -275,11 +281,11 @@ class Panel(Description):
 
     def logs(self) -> dict[str, int]:
         """Topic → number of lines to keep, of all logs that the panel shows."""
-        found: dict[str, int] = {}
+        kept: dict[str, int] = {}
         for w in self.widgets():
             if isinstance(w, LogView):
-                found[w.topic] = max(w.keep, found.get(w.topic, 0))
-        return found
+                kept[w.topic] = max(w.keep, kept.get(w.topic, 0))
+        return kept
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""
@@ -290,9 +296,9 @@ class Panel(Description):
         """The topics that are only shown, and whose reliability the panel file leaves to the
         publisher."""
         needed = [source for command in self.commands for source in command.sources()]
-        given = [source for source in self.monitored() if source.qos.reliability is not None]
+        explicit = [source for source in self.monitored() if source.qos.reliability is not None]
         strict = {condition.topic for condition in self.conditions}
-        strict |= {source.topic for source in (*needed, *given)}
+        strict |= {source.topic for source in (*needed, *explicit)}
         return frozenset(source.topic for source in self.monitored()) - strict
 
     def qos(self, topic: str) -> TopicQos:

@@ -61,8 +61,8 @@ class Range:
         if self.step is None or self.low is None:
             return value
         low, step = _exact(self.low), _exact(self.step)
-        found = low + rounded((_exact(value) - low) / step) * step
-        return int(found) if isinstance(self.low, int) else float(found)
+        nearest = low + rounded((_exact(value) - low) / step) * step
+        return int(nearest) if isinstance(self.low, int) else float(nearest)
 
 
 def is_on_step(value: float, low: float, step: float, *, whole: bool = False) -> bool:
@@ -73,9 +73,9 @@ def is_on_step(value: float, low: float, step: float, *, whole: bool = False) ->
     return min(rest, _exact(step) - rest) <= NEAR * (1 if whole else _exact(step))
 
 
-def range_text(limits: Range, given: str | PanelText) -> TextLike:
+def range_text(limits: Range, unit_name: str | PanelText) -> TextLike:
     """A range as text, with the `given` unit: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
-    unit = after_space(given)
+    unit = after_space(unit_name)
     low, high = _number_text(limits.low), _number_text(limits.high)
     text: TextLike
     if limits.low is not None and limits.high is not None:
@@ -92,20 +92,20 @@ def range_text(limits: Range, given: str | PanelText) -> TextLike:
     return say("and_further", first=text, last=steps) if text else steps
 
 
-def decimal_text(given: float) -> str:
+def decimal_text(value: float) -> str:
     """A number exactly, as in HTML; "NaN", "Infinity" or "-Infinity"."""
-    if isinstance(given, int) or not math.isfinite(given):
-        return str(to_plain(given))
-    return number_text(given) if abs(given) < MIN_WITH_EXPONENT else repr(given)
+    if isinstance(value, int) or not math.isfinite(value):
+        return str(to_plain(value))
+    return number_text(value) if abs(value) < MIN_WITH_EXPONENT else repr(value)
 
 
 def to_float32(number: float) -> float:
     """The nearest float32."""
     try:
-        found: float = unpack("f", pack("f", number))[0]
+        narrowed: float = unpack("f", pack("f", number))[0]
     except OverflowError:
         return math.copysign(math.inf, number)
-    return found
+    return narrowed
 
 
 def shortest_float(number: float) -> float:
@@ -113,11 +113,11 @@ def shortest_float(number: float) -> float:
     if not math.isfinite(number) or to_float32(number) != number:
         return number
     written = (float(f"{number:.{digits}g}") for digits in range(6, 10))
-    return next(one for one in written if to_float32(one) == number)
+    return next(text for text in written if to_float32(text) == number)
 
 
-def _number_text(given: float | None) -> TextLike:
-    return "" if given is None else number(decimal_text(given))
+def _number_text(value: float | None) -> TextLike:
+    return "" if value is None else number(decimal_text(value))
 
 
 def _exact(number: float) -> Fraction:

@@ -136,32 +136,32 @@ def _ended(done: subprocess.CompletedProcess[bytes]) -> TemplateFault:
 def _answered(answer: Answer, mark: str, request: Request) -> TemplateFault | PageParts:
     if "rendered" not in answer:
         return _fault(answer, request)
-    found = {}
+    parts_by_language = {}
     for language, text in answer["rendered"].items():
         parts = re.split(rf"{re.escape(mark)}(\d*)\.", text)
         placed = [int(number) for number in parts[1::2] if number]
         if any(mark.strip("[:") in part.lower() for part in parts[::2]) or len({*placed}) < len(placed):
             return TemplateFault(0, "what widget() and picture() give is placed once, as it is")
         ids = [request["widgets"][int(number)] if number else None for number in parts[1::2]]
-        found[language] = tuple(
+        parts_by_language[language] = tuple(
             part if number % 2 == 0 else ids[number // 2] for number, part in enumerate(parts)
         )
-    return PageParts(found)
+    return PageParts(parts_by_language)
 
 
 def _fault(answer: Answer, request: Request) -> TemplateFault:
     line, name = answer.get("line", 0), answer.get("name", "")
     if twice := answer.get("twice"):
         return TemplateFault(line, f'the widget "{twice}" is placed twice')
-    if what := answer.get("unknown"):
-        known = {"widget": request["widgets"], "picture": request["pictures"], "icon": icons()}[what]
-        cause = f"input {name}" if what == "widget" else ""
-        return TemplateFault(line, _unknown(what, name, known), cause)
+    if noun := answer.get("unknown"):
+        known = {"widget": request["widgets"], "picture": request["pictures"], "icon": icons()}[noun]
+        cause = f"input {name}" if noun == "widget" else ""
+        return TemplateFault(line, _unknown(noun, name, known), cause)
     return TemplateFault(line, answer.get("message", ""))
 
 
-def _unknown(what: str, name: str, known: Collection[str]) -> str:
+def _unknown(noun: str, name: str, known: Collection[str]) -> str:
     meant = closest_name(name, known)
-    where = " on this page" if what == "widget" else ""
+    where = " on this page" if noun == "widget" else ""
     hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(known)}"
-    return f'no {what} "{name}"{where}; {hint}'
+    return f'no {noun} "{name}"{where}; {hint}'

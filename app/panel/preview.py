@@ -42,18 +42,18 @@ def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) 
             yield from (f"  {line}" for line in message_lines(fields, every))
 
 
-def complete_value(given: Any, kind: Type, interfaces: Interfaces) -> Any:
+def complete_value(value: Any, kind: Type, interfaces: Interfaces) -> Any:
     """A value of a template with default values added; texts with input ids are unchanged."""
-    if isinstance(given, list | tuple) and kind.container != "one":
-        return [complete_value(one, kind.element, interfaces) for one in given]
-    if isinstance(given, Mapping) and kind.is_nested:
+    if isinstance(value, list | tuple) and kind.container != "one":
+        return [complete_value(element, kind.element, interfaces) for element in value]
+    if isinstance(value, Mapping) and kind.is_nested:
         fields = interfaces.structures[kind.name].fields
         return {
-            f.name: complete_value(given.get(f.name, f.default_value), f.type, interfaces)
+            f.name: complete_value(value.get(f.name, f.default_value), f.type, interfaces)
             for f in fields
         }
-    number = isinstance(given, int) and not isinstance(given, bool)
-    return float(given) if number and kind.name.startswith("float") else given
+    number = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if number and kind.name.startswith("float") else value
 
 
 def message_lines(fields: Mapping[str, Any], comments: Comments, place: str = "") -> Iterator[str]:

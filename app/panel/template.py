@@ -24,7 +24,7 @@ NS_PER_S: Final = 10**9
 def response_paths(template: TextLike) -> list[str]:
     """The fields of a response that a text about it names, in all its languages."""
     texts = each_language(template).values()
-    return list(dict.fromkeys(path for one in texts for path in RESPONSE_PLACEHOLDER.findall(one)))
+    return list(dict.fromkeys(path for text in texts for path in RESPONSE_PLACEHOLDER.findall(text)))
 
 
 def add_now(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,15 +73,15 @@ def _set_at(fields: Any, steps: list[str], path: str, value: Any) -> Any:
 
 def value_at(template: Any, where: str) -> Any:
     """The value in a template at a field such as "poses[0].x", or at the nearest one around it."""
-    found = template
+    inner = template
     for name, index in re.findall(r"([^.\[\]]+)|\[([0-9]+)\]", where):
-        if isinstance(found, Mapping) and name in found:
-            found = found[name]
-        elif isinstance(found, list) and index and int(index) < len(found):
-            found = found[int(index)]
+        if isinstance(inner, Mapping) and name in inner:
+            inner = inner[name]
+        elif isinstance(inner, list) and index and int(index) < len(inner):
+            inner = inner[int(index)]
         else:
             break
-    return found
+    return inner
 
 
 def _text(value: Any, where: str) -> str:
@@ -110,9 +110,9 @@ def input_ids(widget: Command) -> list[str]:
     return placeholder_ids(widget.templates())
 
 
-def needed_inputs(widget: Command, given: Mapping[str, Any]) -> dict[str, Any]:
+def needed_inputs(widget: Command, inputs: Mapping[str, Any]) -> dict[str, Any]:
     """The inputs of a press or a hold that the widget needs."""
-    return {name: given[name] for name in input_ids(widget) if name in given}
+    return {name: inputs[name] for name in input_ids(widget) if name in inputs}
 
 
 def placeholder_ids(templates: Iterable[Any]) -> list[str]:

@@ -8,14 +8,14 @@ from pydantic import BaseModel
 from app.i18n import PanelText
 
 
-def panel_texts(of: Any, place: str = "") -> Iterator[tuple[str, PanelText]]:
+def panel_texts(value: Any, place: str = "") -> Iterator[tuple[str, PanelText]]:
     """(place in the panel file, text) of every text in several languages in a description."""
-    if isinstance(of, PanelText):
-        yield place, of
-    elif isinstance(of, tuple):
-        for i, one in enumerate(of):
-            yield from panel_texts(one, f"{place}[{i}]")
-    elif isinstance(of, BaseModel):
-        for name, about in type(of).model_fields.items():
+    if isinstance(value, PanelText):
+        yield place, value
+    elif isinstance(value, tuple):
+        for i, element in enumerate(value):
+            yield from panel_texts(element, f"{place}[{i}]")
+    elif isinstance(value, BaseModel):
+        for name, about in type(value).model_fields.items():
             key = about.alias or name
-            yield from panel_texts(getattr(of, name), f"{place}.{key}" if place else key)
+            yield from panel_texts(getattr(value, name), f"{place}.{key}" if place else key)

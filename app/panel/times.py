@@ -16,11 +16,11 @@ def time_faults(place: str, style: str | None, kind: str, unit: object) -> Itera
     """Faults of a format, of a field of this type, that is one of times; or is none, where the field is
     a time."""
     if kind in DEFAULT_FORMATS and style is not None and style not in TIME_FORMATS:
-        what = f'"{style}" is for numbers; this is {kind}: its formats are {", ".join(TIME_FORMATS)}'
-        yield Fault(f"{place}.format", what)
+        message = f'"{style}" is for numbers; this is {kind}: its formats are {", ".join(TIME_FORMATS)}'
+        yield Fault(f"{place}.format", message)
     elif kind == DURATION and style in ("time", "age"):
-        what = f'"{style}" is for a time; this is {kind}: its format is duration'
-        yield Fault(f"{place}.format", what)
+        message = f'"{style}" is for a time; this is {kind}: its format is duration'
+        yield Fault(f"{place}.format", message)
     elif style in TIME_FORMATS and kind not in NUMBERS and kind not in DEFAULT_FORMATS:
         yield Fault(
             f"{place}.format", f'"{style}" is for times and for numbers of seconds; this is {kind}'

@@ -14,8 +14,10 @@ def used_names(panel: Panel) -> Mapping[Use, Mapping[str, str]]:
     return {
         "topic": panel.listened(),
         "publication": panel.publications(),
-        "service": {one.server_name: one.type for one in servers if one.server_role == "SS"},
-        "action": {one.server_name: one.type for one in servers if one.server_role == "AS"},
+        "service": {
+            server.server_name: server.type for server in servers if server.server_role == "SS"
+        },
+        "action": {server.server_name: server.type for server in servers if server.server_role == "AS"},
     }
 
 

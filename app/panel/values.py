@@ -15,9 +15,9 @@ def number_text(number: float) -> str:
     return str(int(number)) if number.is_integer() else repr(number)
 
 
-def same_value(one: Any, other: Any) -> bool:
+def same_value(value: Any, other: Any) -> bool:
     """Whether two values are equal in TOML and JSON: 1 equals 1.0, but not true."""
-    return one == other and isinstance(one, bool) == isinstance(other, bool)
+    return value == other and isinstance(value, bool) == isinstance(other, bool)
 
 
 def join_list(texts: Iterable[str]) -> str:
@@ -32,14 +32,14 @@ def quote_element(text: str) -> str:
 
 def split_list(text: str) -> list[str]:
     """The elements of a text; ValueError for an empty element without quotes, or unmatched quotes."""
-    found: list[str] = []
+    elements: list[str] = []
     at = 0
     more = bool(text.strip())
     while more:
         match = _ELEMENT.match(text, at)
-        plain, given = ("", None) if match is None else match.group("plain", "quoted")
-        if match is None or (given is None and not plain.strip()):
-            raise ValueError(f"the {len(found) + 1}. of them is none")
-        found.append(plain.strip() if given is None else given.replace('""', '"'))
+        plain, quoted = ("", None) if match is None else match.group("plain", "quoted")
+        if match is None or (quoted is None and not plain.strip()):
+            raise ValueError(f"the {len(elements) + 1}. of them is none")
+        elements.append(plain.strip() if quoted is None else quoted.replace('""', '"'))
         at, more = match.end(), match["end"] == ","
-    return found
+    return elements

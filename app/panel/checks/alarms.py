@@ -39,8 +39,8 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
     for i, alarm in enumerate(panel.alarms):
         place = f"alarm[{i}]"
         if alarm.id.startswith(RESERVED):
-            what = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
-            yield Fault(f"{place}.id", f"{what}: choose another id")
+            message = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
+            yield Fault(f"{place}.id", f"{message}: choose another id")
         yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
         yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
         yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
@@ -55,8 +55,8 @@ def _reference_faults(
     for i, name in enumerate(names if isinstance(names, tuple) else (names,) if names else ()):
         if name not in known:
             at = f"{place}[{i}]" if listed else place
-            what = f'no {kind} "{name}"; there is {list_names(known)}'
-            yield Fault(at, what, cause=f"{kind} {name}")
+            message = f'no {kind} "{name}"; there is {list_names(known)}'
+            yield Fault(at, message, cause=f"{kind} {name}")
 
 
 def _source_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: str) -> Iterator[Fault]:
@@ -66,8 +66,8 @@ def _source_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: s
         return
     other = next((key for key in keys if key not in _names(source)), None)
     if other is not None:
-        what = f'is another source than "{keys[0]}": an alarm has one; write a second [[alarm]]'
-        yield Fault(f"{place}.{other}", what, cause=f"source {place}")
+        message = f'is another source than "{keys[0]}": an alarm has one; write a second [[alarm]]'
+        yield Fault(f"{place}.{other}", message, cause=f"source {place}")
         return
     for key in sorted(alarm.model_fields_set & KEYS - {*OWN_KEYS[source]}):
         yield Fault(f"{place}.{key}", f'has no meaning for "{keys[0]}": leave it out')
@@ -103,13 +103,13 @@ def _limit_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> I
         yield Fault(f"{place}.field", f'"{alarm.field}" is {kind}: limits are for one number')
     for (below, low), (above, high) in itertools.pairwise(alarm.limits.items()):
         if low >= high:
-            what = f"{number_text(high)} is not above {below} ({number_text(low)})"
-            yield Fault(f"{place}.{above}", what)
+            message = f"{number_text(high)} is not above {below} ({number_text(low)})"
+            yield Fault(f"{place}.{above}", message)
     if "low" in alarm.limits and "high" in alarm.limits:
         room = alarm.limits["high"] - alarm.limits["low"]
         if 0 < room <= alarm.deadband:
-            what = f"{number_text(alarm.deadband)} is more than there is between low and high"
-            yield Fault(f"{place}.deadband", what)
+            message = f"{number_text(alarm.deadband)} is more than there is between low and high"
+            yield Fault(f"{place}.deadband", message)
 
 
 def _stale_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> Iterator[Fault]:

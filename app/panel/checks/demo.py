@@ -64,13 +64,15 @@ def _story_faults(panel: Panel, names: _Names) -> Iterator[Fault]:
     played = list(STORIES[panel.demo_story].types)
     used = False
     for use, name, wanted in played:
-        found = names.types[use].get(name)
-        if found is None or name in panel.demo:
+        panel_type = names.types[use].get(name)
+        if panel_type is None or name in panel.demo:
             continue
         used = True
-        if found != wanted:
-            what = f"plays {name} as {wanted}, and the panel has {found}; rename it or use that type"
-            yield Fault("demo_story", what, cause=name)
+        if panel_type != wanted:
+            message = (
+                f"plays {name} as {wanted}, and the panel has {panel_type}; rename it or use that type"
+            )
+            yield Fault("demo_story", message, cause=name)
     if not used:
         some = list_names(sorted(name for _, name, _ in played))
         yield Fault("demo_story", f"the panel uses no name of the story; there is {some}")
@@ -104,8 +106,8 @@ def _key_faults(place: str, name: str, entry: DemoEntry, uses: list[Use]) -> Ite
     allowed = {"silent", *(key for use in uses for key in KEYS[use])}
     for key in sorted(entry.model_fields_set - allowed):
         right = next(use for use, keys in KEYS.items() if key in keys)
-        what = f"is for {WORDS[right]}; {name} is {WORDS[uses[0]]}"
-        yield Fault(f"{place}.{key}", what, cause=f"demo {name}")
+        message = f"is for {WORDS[right]}; {name} is {WORDS[uses[0]]}"
+        yield Fault(f"{place}.{key}", message, cause=f"demo {name}")
 
 
 def _use_faults(
@@ -159,13 +161,13 @@ def _field_faults(
         yield from _range_faults(f"{place}.range", path, kind, entry.range or ())
     for path, limits in entry.ranges.items():
         if path not in numbers:
-            what = f"the panel shows no number at {path}; there is {list_names(numbers)}"
-            yield Fault(f"{place}.ranges", what)
+            message = f"the panel shows no number at {path}; there is {list_names(numbers)}"
+            yield Fault(f"{place}.ranges", message)
         else:
             yield from _range_faults(f"{place}.ranges", path, numbers[path], limits)
     for i, value in enumerate(entry.values or ()):
         misfits = [(path, mismatch_at(value, type_name, path, interfaces)) for path in kinds]
-        if wrong := next(((path, what) for path, what in misfits if what), None):
+        if wrong := next(((path, message) for path, message in misfits if message), None):
             yield Fault(f"{place}.values[{i}]", f'"{wrong[0]}": {wrong[1]}')
             return
 
@@ -173,8 +175,8 @@ def _field_faults(
 def _range_faults(place: str, path: str, kind: str, limits: tuple[float, ...]) -> Iterator[Fault]:
     low, high = INTEGER_RANGES.get(kind, (-float("inf"), float("inf")))
     if limits[0] < low or limits[1] > high:
-        given = join_list(number_text(float(one)) for one in limits)
-        yield Fault(place, f'"{path}" is {kind}, which goes from {low} to {high}, not [{given}]')
+        limits_text = join_list(number_text(float(limit)) for limit in limits)
+        yield Fault(place, f'"{path}" is {kind}, which goes from {low} to {high}, not [{limits_text}]')
 
 
 def _parameter_faults(
@@ -183,11 +185,11 @@ def _parameter_faults(
     for name, value in entry.parameters.items():
         at = f"{place}.parameters"
         if name not in known:
-            what = f"the panel has no parameter {name} of {node}; there is {list_names(known)}"
-            yield Fault(at, what)
+            message = f"the panel has no parameter {name} of {node}; there is {list_names(known)}"
+            yield Fault(at, message)
             continue
         widget = known[name]
         several = value if widget.is_list and isinstance(value, list) else [value]
         fits = widget.is_list == isinstance(value, list)
-        if not fits or not all(is_valid_value(widget.element_type, one) for one in several):
+        if not fits or not all(is_valid_value(widget.element_type, element) for element in several):
             yield Fault(at, f"{name} must be {widget.type}, not {format_value(value)}")

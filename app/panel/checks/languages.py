@@ -12,16 +12,16 @@ from app.panel.texts import panel_texts
 def language_faults(panel: Panel) -> Iterator[Fault]:
     """Faults of languages that no reader can choose, and of texts that the panel's own lacks."""
     if panel.languages and panel.language not in panel.languages:
-        what = f'lacks the panel\'s own language, "{panel.language}"'
-        yield Fault("languages", what, cause="language")
+        message = f'lacks the panel\'s own language, "{panel.language}"'
+        yield Fault("languages", message, cause="language")
     for place, text in panel_texts(panel):
         for tag in text.texts:
             if tag not in files():
-                what = f"is no language with a catalogue; there is {list_names(files())}"
-                yield Fault(f"{place}.{tag}", what)
+                message = f"is no language with a catalogue; there is {list_names(files())}"
+                yield Fault(f"{place}.{tag}", message)
         if panel.language not in text.texts:
-            what = f'has no text in the panel\'s language: add {panel.language} = "…"'
-            yield Fault(place, f"{what}, or set `language` of the panel to another one")
+            message = f'has no text in the panel\'s language: add {panel.language} = "…"'
+            yield Fault(place, f"{message}, or set `language` of the panel to another one")
 
 
 def untranslated_notes(panel: Panel) -> Iterator[Note]:

@@ -14,7 +14,7 @@ NAME_KEYS = ("topic", "service", "action", "node")
 def spelling_faults(panel: Panel, widgets: Iterator[tuple[str, BaseWidget]]) -> Iterator[Fault]:
     """Faults of names that are below the namespace and written as if they were not, beside the other
     way: what the panel knows of a topic, it knows by one name."""
-    names = [(f"interlock[{i}].topic", one.topic) for i, one in enumerate(panel.interlocks)]
+    names = [(f"interlock[{i}].topic", interlock.topic) for i, interlock in enumerate(panel.interlocks)]
     for i, alarm in enumerate(panel.alarms):
         named = (("topic", alarm.topic), ("node", alarm.node))
         names += [(f"alarm[{i}].{key}", name) for key, name in named if name]

@@ -50,8 +50,8 @@ def _unused_interlock_notes(panel: Panel) -> Iterator[Note]:
     used = {name for widget in panel.commands for name in widget.interlocks}
     for i, interlock in enumerate(panel.interlocks):
         if interlock.id not in used:
-            what = f'locks nothing: no control has interlock = "{interlock.id}"'
-            yield Note(f"interlock[{i}]", what)
+            message = f'locks nothing: no control has interlock = "{interlock.id}"'
+            yield Note(f"interlock[{i}]", message)
 
 
 def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
@@ -62,8 +62,8 @@ def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]
         if own:
             name, why = own[0]
             more = f"; {len(own) - 1} more can't be used either" if len(own) > 1 else ""
-            what = f"{name} can't be used, and this panel does not need it: {why}{more}"
-            yield Note(f"interfaces[{f}]", what)
+            message = f"{name} can't be used, and this panel does not need it: {why}{more}"
+            yield Note(f"interfaces[{f}]", message)
 
 
 def _trend_notes(panel: Panel) -> Iterator[Note]:
@@ -75,5 +75,5 @@ def _trend_notes(panel: Panel) -> Iterator[Note]:
                 size = robots * len(widget.pens) * history_bytes(widget.keep_s) / 1e6
                 where = "memory, and as much on disk" if widget.disk else "memory"
                 pens = f"{len(widget.pens)} pen{'s' * (len(widget.pens) > 1)}"
-                what = f"keeps {widget.keep} of {pens}: {size:.1f} MB of {where}"
-                yield Note(f"page[{p}].{place}", what)
+                message = f"keeps {widget.keep} of {pens}: {size:.1f} MB of {where}"
+                yield Note(f"page[{p}].{place}", message)

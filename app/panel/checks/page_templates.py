@@ -35,8 +35,8 @@ def unplaced_notes(panel: Panel) -> Iterator[Note]:
         never = [widget.id for widget in page.widgets if parts and not parts.placed(widget.id)]
         if never:
             named = ", ".join(f'"{name}"' for name in never)
-            what = f"{page.template.name} never places {named}: no one sees what is not placed"
-            yield Note(f"page[{p}].template", what)
+            message = f"{page.template.name} never places {named}: no one sees what is not placed"
+            yield Note(f"page[{p}].template", message)
 
 
 def page_parts(panel: Panel) -> "dict[str, PageParts]":
@@ -50,5 +50,5 @@ def _run(panel: Panel, page: Page) -> "tuple[PageParts | None, TemplateFault | N
     from app.panel.page_template import TemplateFault, run_template
 
     assert page.template is not None
-    found = run_template(page.template, page, panel.picture_files, panel.readers_languages)
-    return (None, found) if isinstance(found, TemplateFault) else (found, None)
+    result = run_template(page.template, page, panel.picture_files, panel.readers_languages)
+    return (None, result) if isinstance(result, TemplateFault) else (result, None)

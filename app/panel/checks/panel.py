@@ -53,16 +53,16 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
         *faulty,
         *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, reported)),
     }
-    found = [
+    faults = [
         *_interlock_faults(panel, interfaces),
         *_widget_faults(panel, interfaces, faulty),
         *alarm_faults(panel, interfaces, faulty),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
     missed |= {"input", "control"} if missed - {"interlock", "alarm"} else set()
-    found = [fault for fault in found if fault.cause.partition(" ")[0] not in missed]
-    yield from found
-    yield from _topic_conflicts(panel, [fault.place for fault in found])
+    faults = [fault for fault in faults if fault.cause.partition(" ")[0] not in missed]
+    yield from faults
+    yield from _topic_conflicts(panel, [fault.place for fault in faults])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from spelling_faults(panel, _widgets_with_places(panel))
     yield from _record_faults(panel)
@@ -70,7 +70,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from page_template_faults(panel)
     yield from _scan_faults(panel)
     yield from language_faults(panel)
-    if not (found or ids or inputs or faulty):  # else they may be consequences
+    if not (faults or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
 
 
@@ -89,8 +89,8 @@ def _scan_faults(panel: Panel) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
         asking = [(at, w) for at, w in page.placed() if isinstance(w, TextInput) and w.scan]
         for place, _ in asking[1:]:
-            what = f'"{asking[0][1].id}" has it already: a bar code goes to one input of a page'
-            yield Fault(f"page[{p}].{place}.scan", what)
+            message = f'"{asking[0][1].id}" has it already: a bar code goes to one input of a page'
+            yield Fault(f"page[{p}].{place}.scan", message)
 
 
 def _contains_any(place: str, places: Iterable[str]) -> bool:
@@ -117,7 +117,7 @@ def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Faul
         except InterfaceError as error:
             source = error.source
             folders = enumerate(panel.interfaces)
-            at = next((i for i, one in folders if source and source.is_relative_to(one)), 0)
+            at = next((i for i, folder in folders if source and source.is_relative_to(folder)), 0)
             yield Fault(f"interfaces[{at}]", f"the panel needs this type: {error}")
             return
 
@@ -133,7 +133,7 @@ def _check_context(
         interfaces,
         inputs={w.id: w for w in widgets if isinstance(w, Input)},
         all_inputs=[w.id for w in panel.widgets() if isinstance(w, Input)],
-        interlocks=[one.id for one in panel.interlocks],
+        interlocks=[interlock.id for interlock in panel.interlocks],
         types=panel.subscriptions(),
         faulty=faulty,
         pages=[page.id for page in panel.pages],
@@ -171,10 +171,10 @@ def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str])
         if widget.allowed_in_frame:
             yield from widget.faults(place, checking)
         elif widget.id not in faulty:
-            what = (
+            message = (
                 f'"{widget.kind}" is not for the frame: it has keys of the kinds publish, call and hold'
             )
-            yield Fault(f"{place}.kind", what)
+            yield Fault(f"{place}.kind", message)
 
 
 def _trend_faults(panel: Panel) -> Iterator[Fault]:
@@ -182,8 +182,8 @@ def _trend_faults(panel: Panel) -> Iterator[Fault]:
     size = memory_of(trends_of(panel), len(panel.robots) or 1)
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, Trend) and size > MAX_BYTES:
-            what = f"all trends together would take {size / 1e6:.0f} MB of memory"
-            yield Fault(f"{place}.keep", f"{what}, and may take {MAX_BYTES / 1e6:.0f}: keep less")
+            message = f"all trends together would take {size / 1e6:.0f} MB of memory"
+            yield Fault(f"{place}.keep", f"{message}, and may take {MAX_BYTES / 1e6:.0f}: keep less")
             return
 
 
@@ -192,8 +192,8 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
     known = panel.subscriptions()
     for t, topic in enumerate((panel.record and panel.record.topics) or ()):
         if topic not in known:
-            what = f"{topic} is no topic that this panel listens to; there is {list_names(known)}"
-            yield Fault(f"record.topics[{t}]", what, cause=f"listens {topic}")
+            message = f"{topic} is no topic that this panel listens to; there is {list_names(known)}"
+            yield Fault(f"record.topics[{t}]", message, cause=f"listens {topic}")
 
 
 def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
@@ -218,7 +218,7 @@ def _duplicate_robot_faults(
 ) -> Iterator[Fault]:
     """Faults of a robot with the name or the address of another one. An equal id is reported
     elsewhere."""
-    for a, above in enumerate(others if robot.id not in [one.id for one in others] else ()):
+    for a, above in enumerate(others if robot.id not in [other.id for other in others] else ()):
         if alike(robot.name, above.name):
             yield Fault(f"{place}.name", f'"{robot.name}" is already the name of robot[{a}]')
         if (robot.namespace, robot.connect) == (above.namespace, above.connect):
@@ -227,9 +227,9 @@ def _duplicate_robot_faults(
 
 
 def _duplicate_ids(table: str, ids: list[str]) -> Iterator[Fault]:
-    for i, one in enumerate(ids):
-        if one in ids[:i]:
-            yield Fault(f"{table}[{i}].id", f'"{one}" is already the id of {table}[{ids.index(one)}]')
+    for i, name in enumerate(ids):
+        if name in ids[:i]:
+            yield Fault(f"{table}[{i}].id", f'"{name}" is already the id of {table}[{ids.index(name)}]')
 
 
 def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
@@ -253,7 +253,7 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     skipped: their type may be the mistake."""
     places: list[tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
-    places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
+    places += [(f"interlock[{i}]", interlock) for i, interlock in enumerate(panel.interlocks)]
     for i, alarm in enumerate(panel.alarms):
         places.extend((f"alarm[{i}]", source) for source in alarm.topic_sources())
     for place, widget in _widgets_with_places(panel):
@@ -265,15 +265,18 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
         if isinstance(widget, PublishPress) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
     firsts: dict[str, tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = {}
-    for place, one in (*places, *confirms):
-        above, first = firsts.setdefault(one.topic, (place, one))
-        if one.type != first.type:
+    for place, topic_user in (*places, *confirms):
+        above, first = firsts.setdefault(topic_user.topic, (place, topic_user))
+        if topic_user.type != first.type:
             if not _contains_any(place, reported) and not _contains_any(above, reported):
-                what = f"{one.topic} is {one.type} here but {first.type} above"
-                yield Fault(f"{place}.type", what, cause=f"topic {one.topic}")
+                message = f"{topic_user.topic} is {topic_user.type} here but {first.type} above"
+                yield Fault(f"{place}.type", message, cause=f"topic {topic_user.topic}")
             continue
-        if isinstance(one, Confirm) or isinstance(first, Confirm):
+        if isinstance(topic_user, Confirm) or isinstance(first, Confirm):
             continue  # it has no QoS of its own
-        if (one.qos.wire_qos, one.qos.durability) != (first.qos.wire_qos, first.qos.durability):
-            what = f"{one.topic} has another QoS at {above}: a topic has one"
-            yield Fault(f"{place}.qos", what, cause=f"topic {one.topic}")
+        if (topic_user.qos.wire_qos, topic_user.qos.durability) != (
+            first.qos.wire_qos,
+            first.qos.durability,
+        ):
+            message = f"{topic_user.topic} has another QoS at {above}: a topic has one"
+            yield Fault(f"{place}.qos", message, cause=f"topic {topic_user.topic}")

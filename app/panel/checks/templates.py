@@ -33,7 +33,7 @@ def template_faults(
 
 def example_values(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
     """Values of inputs by id; each example of each input appears at least once."""
-    tried = {name: one.examples() for name, one in inputs.items()}
+    tried = {name: input_widget.examples() for name, input_widget in inputs.items()}
     for turn in range(max(map(len, tried.values()), default=1)):
         yield {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
 
@@ -43,8 +43,10 @@ def unknown_input_faults(
 ) -> Iterator[Fault]:
     for where, name in names:
         if name not in inputs and name != NOW:
-            what = f"; there is {list_names(sorted(inputs))}" if name not in anywhere else ON_OTHER_PAGE
-            yield Fault(f"{place}.{where}", f'no input "{name}"{what}', cause=f"input {name}")
+            message = (
+                f"; there is {list_names(sorted(inputs))}" if name not in anywhere else ON_OTHER_PAGE
+            )
+            yield Fault(f"{place}.{where}", f'no input "{name}"{message}', cause=f"input {name}")
 
 
 def _misplaced_now_faults(
@@ -100,9 +102,9 @@ def _fault_message(
         return error.message
     if written != f"{{{names[0]}}}":
         return error.message if _detail(error) else f'"{written}" makes text; the field is {field}'
-    one = inputs[names[0]]
-    gives = one.describe_value(values[one.id], narrow=bool(_detail(error)))
-    return f'input "{one.id}" gives {gives}; the field is {field}{_detail(error)}'
+    input_widget = inputs[names[0]]
+    gives = input_widget.describe_value(values[input_widget.id], narrow=bool(_detail(error)))
+    return f'input "{input_widget.id}" gives {gives}; the field is {field}{_detail(error)}'
 
 
 def _detail(error: FieldError) -> str:

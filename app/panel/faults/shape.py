@@ -33,20 +33,20 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
     faults: list[Fault] = []
     keys: dict[Path, TableKeys] = {}
     without_header: list[Path] = []
-    for one in error.errors():
-        _, path = _resolve_location(one["loc"])
-        match one["type"]:
+    for detail in error.errors():
+        _, path = _resolve_location(detail["loc"])
+        match detail["type"]:
             case "missing" | "extra_forbidden" as kind:
-                model, above = _resolve_location(one["loc"][:-1])
+                model, above = _resolve_location(detail["loc"][:-1])
                 table = keys.setdefault(above, TableKeys(above, model, _table_at(tables, above)))
                 (table.missing if kind == "missing" else table.unknown).append(str(path[-1]))
             case "union_tag_not_found" | "union_tag_invalid":
-                faults.append(_kind_fault(path, one["input"]))
-            case "tuple_type" if path[-1] == "group" and isinstance(one["input"], Mapping):
+                faults.append(_kind_fault(path, detail["input"]))
+            case "tuple_type" if path[-1] == "group" and isinstance(detail["input"], Mapping):
                 without_header.append(path)
             case _:
                 key = next(step for step in reversed(path) if isinstance(step, str))
-                faults.append(Fault(place_of(path), describe_error(one, key)))
+                faults.append(Fault(place_of(path), describe_error(detail, key)))
     of_keys, follow = key_faults(keys)
     faults += of_keys
     for path in without_header:

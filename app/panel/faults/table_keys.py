@@ -39,9 +39,9 @@ class TableKeys:
     missing: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
-    def fault(self, key: str, what: str) -> Fault:
+    def fault(self, key: str, message: str) -> Fault:
         """A fault of a key or, if that is "", of the table."""
-        return Fault(place_of((*self.path, key) if key else self.path), what)
+        return Fault(place_of((*self.path, key) if key else self.path), message)
 
 
 def inner_model(model: Model, key: str | int) -> Model | None:
@@ -89,7 +89,7 @@ def _misplaced_keys(table: TableKeys, tables: Mapping[Path, TableKeys]) -> Itera
     path = table.path
     for key in list(table.unknown) if path else ():
         around = (tables[path[:n]] for n in range(len(path)) if path[:n] in tables)
-        outer = next((one for one in around if key in one.missing), None)
+        outer = next((candidate for candidate in around if key in candidate.missing), None)
         if outer is None and (
             key not in known_keys(Panel) or inner_model(Panel, key) or len(table.unknown) > 1
         ):
@@ -161,13 +161,13 @@ def _wrong_kind(table: TableKeys, follow: Consequences) -> list[Fault]:
     ]
     if not kinds or not table.unknown:
         return []
-    given, listed = format_value(table.table["kind"]), _quote_names(kinds)
+    kind_text, listed = format_value(table.table["kind"]), _quote_names(kinds)
     if len(table.missing) + len(table.unknown) == 1:
-        what = f"unknown key of {given}; all the keys are those of {listed}"
-        return [table.fault(table.unknown[0], what)]
+        message = f"unknown key of {kind_text}; all the keys are those of {listed}"
+        return [table.fault(table.unknown[0], message)]
     needs = f" and needs {_quote_names(table.missing)}" if table.missing else ""
-    what = f"{given} has no {_quote_names(table.unknown)}{needs}; the keys are those of {listed}"
-    fault = table.fault("kind", what)
+    message = f"{kind_text} has no {_quote_names(table.unknown)}{needs}; the keys are those of {listed}"
+    fault = table.fault("kind", message)
     follow.append((place_of(table.path), fault))
     return [fault]
 
@@ -177,8 +177,8 @@ def _remaining_faults(table: TableKeys) -> list[Fault]:
     missing, unknown = table.missing, table.unknown
     here = f"known here: {', '.join(known_keys(table.model))}"
     if len(missing) == len(unknown) == 1:
-        what = f'is it the "{missing[0]}" that is missing? {here}'
-        return [table.fault(unknown[0], f"unknown key; {what}")]
+        hint = f'is it the "{missing[0]}" that is missing? {here}'
+        return [table.fault(unknown[0], f"unknown key; {hint}")]
     faults = []
     if unknown:
         more = f", as {_quote_names(unknown[1:])}" if len(unknown) > 1 else ""

@@ -69,8 +69,8 @@ def _misspelt_header(text: str) -> Fault | None:
                 break  # the tables of a message are not known here
             meant = get_close_matches(part, TABLES, n=1, cutoff=TABLE_SIMILARITY)
             if meant and meant[0] != part:
-                what = f'there is no table "{part}"; did you mean "{meant[0]}"?'
-                return Fault("", what, line=number)
+                message = f'there is no table "{part}"; did you mean "{meant[0]}"?'
+                return Fault("", message, line=number)
     return None
 
 
@@ -90,9 +90,9 @@ def _read_fault(error: Exception) -> Fault:
 
 def _syntax_fault(text: str) -> Fault:
     """The fault of a syntax error, with the names of tables as in the file."""
-    found = AT_LINE.fullmatch(text)
-    what, line = (found[1], found[2]) if found else (text, None)
+    match = AT_LINE.fullmatch(text)
+    message, line = (match[1], match[2]) if match else (text, None)
     for theirs, plainer in PLAIN_MESSAGES.items():
-        what = what.replace(theirs, plainer)
-    what = NAMES.sub(lambda names: ".".join(re.findall("'([^']*)'", names[1])), what)
-    return Fault("", what if line else f"{what}, at the end of the file", line=int(line or 0))
+        message = message.replace(theirs, plainer)
+    message = NAMES.sub(lambda names: ".".join(re.findall("'([^']*)'", names[1])), message)
+    return Fault("", message if line else f"{message}, at the end of the file", line=int(line or 0))

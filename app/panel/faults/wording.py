@@ -49,18 +49,18 @@ LIMITS: Final[Mapping[str, str]] = {
 
 def describe_error(error: Mapping[str, Any], key: str) -> str:
     """The message about an error of pydantic; never pydantic's own text."""
-    kind, given, about = error["type"], format_value(error["input"]), error.get("ctx", {})
+    kind, value, about = error["type"], format_value(error["input"]), error.get("ctx", {})
     match kind:
         case "value_error":
             return str(about["error"])
         case "string_pattern_mismatch":
-            return f"{given} {PATTERNS.get(key, 'is not written as it must be')}"
+            return f"{value} {PATTERNS.get(key, 'is not written as it must be')}"
         case "literal_error":
             return one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
         case "tuple_type":
-            return f"must be a list of {LIST_WORDS.get(key, 'values')}, not {given}"
+            return f"must be a list of {LIST_WORDS.get(key, 'values')}, not {value}"
         case "dict_type":
-            return f'must be a table, like {{ field = "value" }}, not {given}'
+            return f'must be a table, like {{ field = "value" }}, not {value}'
         case "string_too_short" | "too_short":
             return "must not be empty"
         case "string_too_long" | "too_long":
@@ -68,8 +68,8 @@ def describe_error(error: Mapping[str, Any], key: str) -> str:
             return f"must be {about['max_length']} characters at most; it has {length}"
     for name, words in LIMITS.items():
         if name in about:
-            return f"must be {words.format(number_text(float(about[name])))}, not {given}"
-    return f"{_must_be(kind)}, not {given}"
+            return f"must be {words.format(number_text(float(about[name])))}, not {value}"
+    return f"{_must_be(kind)}, not {value}"
 
 
 def closest_name(name: str, known: Iterable[str]) -> str:
@@ -77,17 +77,17 @@ def closest_name(name: str, known: Iterable[str]) -> str:
     return next(iter(get_close_matches(name, list(known), n=1, cutoff=NAME_SIMILARITY)), "")
 
 
-def one_of(known: list[str], given: Any) -> str:
+def one_of(known: list[str], value: Any) -> str:
     """The message about a value that is none of the known ones."""
-    *others, last = (f'"{one}"' for one in known)
+    *others, last = (f'"{name}"' for name in known)
     listed = f"{', '.join(others)} or {last}" if others else last
-    meant = closest_name(str(given).lower(), known)
+    meant = closest_name(str(value).lower(), known)
     hint = f': did you mean "{meant}"?' if meant else ""
-    return f"must be {listed}, not {format_value(given)}{hint}"
+    return f"must be {listed}, not {format_value(value)}{hint}"
 
 
 def _must_be(kind: str) -> str:
-    for part, what in (
+    for part, phrase in (
         ("string", "text"),
         ("bool", "true or false"),
         ("int", "a whole number"),
@@ -96,5 +96,5 @@ def _must_be(kind: str) -> str:
         ("model", "a table"),
     ):
         if kind.startswith(part):
-            return f"must be {what}"
+            return f"must be {phrase}"
     return "can't be used here"

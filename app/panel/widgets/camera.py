@@ -35,6 +35,6 @@ class Camera(TopicWidget, DisplayWidget):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.topic in checking.types:
-            what = f"{self.topic} is listened to at all times by another part of the panel"
-            yield Fault(f"{place}.topic", f"{what}: a camera's topic is only a camera's")
+            message = f"{self.topic} is listened to at all times by another part of the panel"
+            yield Fault(f"{place}.topic", f"{message}: a camera's topic is only a camera's")
         yield from super().faults(place, checking)

@@ -45,10 +45,10 @@ class Readout(Display):
         yield from constant_faults(place, self, interfaces)
 
 
-def _check_state_value(given: Any) -> Any:
-    if not isinstance(given, bool | int | str):
-        raise ValueError(f"must be a whole number, true or false, or text, not {format_value(given)}")
-    return given
+def _check_state_value(value: Any) -> Any:
+    if not isinstance(value, bool | int | str):
+        raise ValueError(f"must be a whole number, true or false, or text, not {format_value(value)}")
+    return value
 
 
 class LampState(Description):
@@ -75,34 +75,34 @@ class Indicator(Display):
         kind = interfaces.field_type(self.type, self.field)
         constants = interfaces.constants(parent_type(self, interfaces))
         states = [
-            one.model_copy(update={"value": resolve_state_value(one.value, kind, constants)})
-            for one in self.states
+            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
+            for state in self.states
         ]
         return self.model_copy(update={"states": tuple(states)})
 
 
-def resolve_state_value(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
+def resolve_state_value(value: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
     """The value of a lamp's state. A text is a constant's name if the field is a whole number; an
     unknown name is returned as it is.
     """
-    named = isinstance(given, str) and kind in INTEGER_RANGES
-    return constants.get(str(given), given) if named else given
+    named = isinstance(value, str) and kind in INTEGER_RANGES
+    return constants.get(str(value), value) if named else value
 
 
-def _same_look(one: tuple[str, TextLike], other: tuple[str, TextLike]) -> bool:
-    return one[0] == other[0] and alike(one[1], other[1])
+def _same_look(look: tuple[str, TextLike], other: tuple[str, TextLike]) -> bool:
+    return look[0] == other[0] and alike(look[1], other[1])
 
 
 def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
     scaled = (readout.scale, readout.offset) != (1.0, 0.0)
     style = None if kind in DEFAULT_FORMATS else readout.format
-    for key, given in (("format", style), ("scale", scaled), ("unit", readout.unit)):
-        if given and kind not in NUMBERS:
-            what = f'is for numbers; "{readout.field}" is {kind}'
-            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
-        elif given and readout.constants is not None:
-            what = "is for numbers; constants are shown by their names"
-            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
+    for key, setting in (("format", style), ("scale", scaled), ("unit", readout.unit)):
+        if setting and kind not in NUMBERS:
+            message = f'is for numbers; "{readout.field}" is {kind}'
+            yield Fault(f"{place}.{key}", message, cause=f"number {place}")
+        elif setting and readout.constants is not None:
+            message = "is for numbers; constants are shown by their names"
+            yield Fault(f"{place}.{key}", message, cause=f"number {place}")
     yield from format_fault(place, readout, kind)
 
 
@@ -126,8 +126,8 @@ def format_fault(place: str, widget: WrittenNumber, kind: str) -> Iterator[Fault
         and kind in NUMBERS
         and (scaled or kind not in INTEGER_RANGES)
     ):
-        what = "a scaled number" if scaled else kind
-        yield Fault(f"{place}.format", f'"{widget.format}" is for whole numbers; this is {what}')
+        kind_text = "a scaled number" if scaled else kind
+        yield Fault(f"{place}.format", f'"{widget.format}" is for whole numbers; this is {kind_text}')
 
 
 class NamedByConstants(HasField, Protocol):
@@ -144,15 +144,17 @@ def constant_faults(place: str, readout: NamedByConstants, interfaces: Interface
     type_name = parent_type(readout, interfaces)
     kind = interfaces.type_at(readout.type, readout.field)
     names = fitting_constants(kind, interfaces.constants(type_name))
-    found = {name: value for name, value in names.items() if name.startswith(readout.constants)}
-    if not found:
-        what = f"no constant of {type_name} starts so; it has {list_names(names)}"
-        yield Fault(f"{place}.constants", what)
-    for name, value in found.items():
-        first = next(other for other, its in found.items() if its == value)
+    shown = {name: value for name, value in names.items() if name.startswith(readout.constants)}
+    if not shown:
+        message = f"no constant of {type_name} starts so; it has {list_names(names)}"
+        yield Fault(f"{place}.constants", message)
+    for name, value in shown.items():
+        first = next(other for other, its in shown.items() if its == value)
         if first != name:
-            what = f"{first} and {name} are both {value}: a longer prefix tells them apart, or a lamp"
-            yield Fault(f"{place}.constants", what)
+            message = (
+                f"{first} and {name} are both {value}: a longer prefix tells them apart, or a lamp"
+            )
+            yield Fault(f"{place}.constants", message)
             return
 
 
@@ -168,21 +170,21 @@ def state_faults(
 ) -> Iterator[Fault]:
     """Faults of states for a field of this type; `who` has them."""
     if kind in ("float32", "float64"):
-        what = f"{who} is for whole numbers, bools and texts"
-        yield Fault(f"{place}.field", f'"{indicator.field}" is {kind}: {what}')
+        message = f"{who} is for whole numbers, bools and texts"
+        yield Fault(f"{place}.field", f'"{indicator.field}" is {kind}: {message}')
         return
     looks = [(state.shape, state.text) for state in indicator.states]
     type_name = parent_type(indicator, interfaces)
     constants = interfaces.constants(type_name)
-    given = [resolve_state_value(state.value, kind, constants) for state in indicator.states]
-    values = [(type(value), value) for value in given]
+    state_values = [resolve_state_value(state.value, kind, constants) for state in indicator.states]
+    values = [(type(value), value) for value in state_values]
     for i, state in enumerate(indicator.states):
         at = f"{place}.states[{i}]"
-        if isinstance(given[i], str) and kind in INTEGER_RANGES:
-            what = unknown_constant(given[i], Type(kind), type_name, constants)
-            yield Fault(f"{at}.value", what, cause=f"state {place}")
+        if isinstance(state_values[i], str) and kind in INTEGER_RANGES:
+            message = unknown_constant(state_values[i], Type(kind), type_name, constants)
+            yield Fault(f"{at}.value", message, cause=f"state {place}")
             continue
-        if fault := value_mismatch(given[i], kind):
+        if fault := value_mismatch(state_values[i], kind):
             yield Fault(f"{at}.value", fault, cause=f"state {place}")
             continue
         if values[i] in values[:i]:

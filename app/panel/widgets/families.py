@@ -132,7 +132,7 @@ class Input(EntryWidget):
         """Values to try a template with: limits, every option, true and false."""
 
     @abstractmethod
-    def check_value(self, given: Any) -> Any:
+    def check_value(self, value: Any) -> Any:
         """The value to be sent; InputError names label and limits."""
 
     def describe_value(self, value: Any, *, narrow: bool) -> str:
@@ -195,8 +195,8 @@ class Display(TopicWidget, DisplayWidget):
         is_several = field_type.is_nested and str(field_type) not in self.whole_types
         if is_several or field_type.container != "one":
             who = f"an {self.kind}" if self.kind[0] in "aeiou" else f"a {self.kind}"
-            what = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
-            yield Fault(f"{place}.field", what)
+            message = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
+            yield Fault(f"{place}.field", message)
         else:
             yield from self.value_faults(place, str(field_type), interfaces)
 
@@ -236,8 +236,8 @@ class Command(BaseWidget):
         for i, name in enumerate(self.interlocks):
             if name not in checking.interlocks:
                 at = f"[{i}]" if len(self.interlocks) > 1 else ""
-                what = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
-                yield Fault(f"{place}.interlock{at}", what, cause=f"interlock {name}")
+                message = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
+                yield Fault(f"{place}.interlock{at}", message, cause=f"interlock {name}")
 
 
 class KeyCommand(Command):
@@ -263,8 +263,8 @@ class KeyCommand(Command):
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         allowed = COLOURS[self.role]
         if self.colour is not None and self.colour not in allowed:
-            what = f"a {self.role} key is {' or '.join(allowed)} (IEC 60204-1), never {self.colour}"
-            yield Fault(f"{place}.colour", what)
+            message = f"a {self.role} key is {' or '.join(allowed)} (IEC 60204-1), never {self.colour}"
+            yield Fault(f"{place}.colour", message)
         yield from super().faults(place, checking)
 
 
@@ -295,6 +295,6 @@ class PublishCommand(TopicWidget, Command):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.topic in (ROSOUT_TOPIC, f"/{ROSOUT_TOPIC}"):
-            what = "/rosout is where the panel server's own log goes: choose another"
-            yield Fault(f"{place}.topic", what)
+            message = "/rosout is where the panel server's own log goes: choose another"
+            yield Fault(f"{place}.topic", message)
         yield from super().faults(place, checking)

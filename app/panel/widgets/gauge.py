@@ -27,18 +27,20 @@ class SetpointField(TopicField):
 class _OrNumber:
     """A JSON schema that has a number beside the table."""
 
-    def __get_pydantic_json_schema__(self, of: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [{"type": "number"}, handler(of)]}
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "number"}, handler(schema)]}
 
 
-def _number_or_table(given: Any, validate: Any) -> Any:
-    number = isinstance(given, int | float) and not isinstance(given, bool)
-    if number and isfinite(given) and abs(given) <= MAX_EXACT_NUMBER:
-        return float(given)
-    if isinstance(given, Mapping):
-        return validate(given)
-    what = 'a number, or a table like { topic = "/setpoint", type = "std_msgs/msg/Float64" }'
-    raise ValueError(f"must be {what}, not {format_value(given)}")
+def _number_or_table(value: Any, validate: Any) -> Any:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if number and isfinite(value) and abs(value) <= MAX_EXACT_NUMBER:
+        return float(value)
+    if isinstance(value, Mapping):
+        return validate(value)
+    expected = 'a number, or a table like { topic = "/setpoint", type = "std_msgs/msg/Float64" }'
+    raise ValueError(f"must be {expected}, not {format_value(value)}")
 
 
 if TYPE_CHECKING:
@@ -47,10 +49,10 @@ else:
     Setpoint = Annotated[SetpointField, WrapValidator(_number_or_table), _OrNumber()]
 
 
-def _check_normal(given: Any) -> Any:
-    if not isinstance(given, list | tuple) or len(given) != 2:
-        raise ValueError(f"must be two numbers, like [4.5, 6.5], not {format_value(given)}")
-    return tuple(given)
+def _check_normal(value: Any) -> Any:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ValueError(f"must be two numbers, like [4.5, 6.5], not {format_value(value)}")
+    return tuple(value)
 
 
 TWO: Final = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
@@ -124,7 +126,7 @@ def _order_faults(place: str, gauge: Gauge) -> Iterator[Fault]:
             return
     inside = list(gauge.limits.items())
     if gauge.normal is not None:
-        below = [one for one in inside if one[0].startswith("low")]
+        below = [limit for limit in inside if limit[0].startswith("low")]
         inside = [*below, *(("normal", end) for end in gauge.normal), *inside[len(below) :]]
         if not gauge.min <= gauge.normal[0] < gauge.normal[1] <= gauge.max:
             ends = " to ".join(map(number_text, gauge.normal))
@@ -132,8 +134,8 @@ def _order_faults(place: str, gauge: Gauge) -> Iterator[Fault]:
             return
     for (key, value), (above, next_value) in pairwise(inside):
         if value > next_value or (value == next_value and "normal" not in (key, above)):
-            what = f"{number_text(next_value)} must be more than {key} ({number_text(value)})"
-            yield Fault(f"{place}.{above}", what)
+            message = f"{number_text(next_value)} must be more than {key} ({number_text(value)})"
+            yield Fault(f"{place}.{above}", message)
             return
     if isinstance(gauge.setpoint, float) and not gauge.min <= gauge.setpoint <= gauge.max:
         yield Fault(f"{place}.setpoint", f"{number_text(gauge.setpoint)} is {_off_scale(gauge)}")

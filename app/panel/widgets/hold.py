@@ -92,8 +92,8 @@ class HoldCommand(KeyCommand, PublishCommand):
         }
         often = f"{number_text(self.rate_hz)} times a second while it is held"
         first = fill_own_fields(self, self.previewed, self.deadline_ms, 1)
-        what = f"publishes {self.topic} ({self.type}) {often}"
-        yield SentMessage(what, self.type, first, {**own, **self.own_comments})
+        when = f"publishes {self.topic} ({self.type}) {often}"
+        yield SentMessage(when, self.type, first, {**own, **self.own_comments})
         last = fill_own_fields(self, self.stopping(), 0, 1)
         yield SentMessage("and once when it ends", self.type, last, own)
 
@@ -150,26 +150,26 @@ def _own_field_faults(place: str, hold: HoldCommand, interfaces: Interfaces) -> 
         if path is None:
             continue
         try:
-            found = interfaces.field_type(hold.type, path)
+            field_type = interfaces.field_type(hold.type, path)
         except InterfaceError as error:
             yield Fault(f"{place}.{key}", str(error))
             continue
-        if not re.fullmatch(kinds, found):
-            yield Fault(f"{place}.{key}", f'"{path}" is {found}: it must be {words}')
+        if not re.fullmatch(kinds, field_type):
+            yield Fault(f"{place}.{key}", f'"{path}" is {field_type}: it must be {words}')
             continue
         for part, template in hold.checked:
             if _has_field(template, path):
-                what = f"is filled in by the panel server: it is the {key}"
-                yield Fault(f"{place}.{part}.{path}", what, cause=f"own {place} {key}")
+                message = f"is filled in by the panel server: it is the {key}"
+                yield Fault(f"{place}.{part}.{path}", message, cause=f"own {place} {key}")
     if hold.counter_field is not None and hold.counter_field == hold.deadline_field:
         yield Fault(f"{place}.counter_field", f'"{hold.counter_field}" is the deadline_field already')
 
 
 def _has_field(template: Mapping[str, Any], path: str) -> bool:
     """Whether a template sets the field. A list must have all its elements in any case."""
-    found: Any = template
+    inner: Any = template
     for step in path.split("."):
-        if "[" in step or not isinstance(found, Mapping) or step not in found:
+        if "[" in step or not isinstance(inner, Mapping) or step not in inner:
             return False
-        found = found[step]
+        inner = inner[step]
     return True

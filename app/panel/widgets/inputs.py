@@ -48,30 +48,30 @@ class TextInput(Input):
     def examples(self) -> list[Any]:
         return ["x" * self.max_length]
 
-    def check_value(self, given: Any) -> str:
+    def check_value(self, value: Any) -> str:
         """The text; lengths are in characters."""
-        if not isinstance(given, str):
+        if not isinstance(value, str):
             raise InputError(
-                say("input_not_text", label=self.label, id=self.id, given=format_value(given))
+                say("input_not_text", label=self.label, id=self.id, given=format_value(value))
             )
-        if len(given) > self.max_length:
+        if len(value) > self.max_length:
             raise InputError(
-                say("input_text_too_long", label=self.label, count=len(given), most=self.max_length)
+                say("input_text_too_long", label=self.label, count=len(value), most=self.max_length)
             )
-        return given
+        return value
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if len(self.default) > self.max_length:
             yield Fault(f"{place}.default", f"is longer than max_length ({self.max_length})")
 
 
-def _check_json_value(given: Any) -> Any:
+def _check_json_value(value: Any) -> Any:
     """An option's value: anything of TOML that JSON has too."""
     try:
-        json.dumps(given)
+        json.dumps(value)
     except TypeError:
         raise ValueError("must be text, a number, true or false, a list or a table") from None
-    return given
+    return value
 
 
 class Option(Description):
@@ -115,14 +115,14 @@ class SelectInput(Input):
     def examples(self) -> list[Any]:
         return [option.value for option in self.options]
 
-    def check_value(self, given: Any) -> Any:
+    def check_value(self, value: Any) -> Any:
         """The value of the option with the given value or key; forms and browsers send keys."""
         for option in self.options:
-            if same_value(option.value, given) or option.key == given:
+            if same_value(option.value, value) or option.key == value:
                 return option.value
         options = tuple(option.label for option in self.options)
         raise InputError(
-            say("input_not_an_option", label=self.label, options=options, given=format_value(given))
+            say("input_not_an_option", label=self.label, options=options, given=format_value(value))
         )
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
@@ -161,13 +161,13 @@ class ToggleInput(Input):
     def parse_text(self, text: str, language: str) -> bool | str:
         return BOOL_TEXTS.get(text, text)
 
-    def check_value(self, given: Any) -> bool:
-        if isinstance(given, bool):
-            return given
-        what = say(
-            "input_not_a_boolean", label=self.label, on=self.on, off=self.off, given=format_value(given)
+    def check_value(self, value: Any) -> bool:
+        if isinstance(value, bool):
+            return value
+        message = say(
+            "input_not_a_boolean", label=self.label, on=self.on, off=self.off, given=format_value(value)
         )
-        raise InputError(what)
+        raise InputError(message)
 
 
 def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
@@ -178,5 +178,5 @@ def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
         if key in keys[:i]:
             yield Fault(f"{place}.options[{i}].value", f"{key} is already options[{keys.index(key)}]")
         if (first := next((n for n in range(i) if alike(labels[n], label)), None)) is not None:
-            what = f'"{label}" is already the label of options[{first}]'
-            yield Fault(f"{place}.options[{i}].label", what)
+            message = f'"{label}" is already the label of options[{first}]'
+            yield Fault(f"{place}.options[{i}].label", message)

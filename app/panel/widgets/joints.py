@@ -125,7 +125,7 @@ class Joints(TopicWidget, DisplayWidget):
         yield from faults
         for j, joint in enumerate(self.joints):
             at = f"{place}.joint[{j}]"
-            first = next(i for i, one in enumerate(self.joints) if one.name == joint.name)
+            first = next(i for i, other in enumerate(self.joints) if other.name == joint.name)
             if first != j:
                 yield Fault(f"{at}.name", f'"{joint.name}" is already the name of joint[{first}]')
             yield from _limit_faults(at, joint)
@@ -145,17 +145,17 @@ class Joints(TopicWidget, DisplayWidget):
         if not named:
             names = interfaces.type_at(self.type, f"{around}{dot}{self.names}")
             if names.container == "one" or names.name not in STRING_TYPES:
-                what = f'"{self.names}" is {names}: names are a list of texts'
-                yield Fault(f"{place}.names", what)
+                message = f'"{self.names}" is {names}: names are a list of texts'
+                yield Fault(f"{place}.names", message)
 
 
 def _limit_faults(place: str, joint: Joint) -> Iterator[Fault]:
     """The first fault of a joint's limits."""
-    given = (("min", joint.min), ("low", joint.low), ("high", joint.high), ("max", joint.max))
-    ordered = [(key, value) for key, value in given if value is not None]
+    limits = (("min", joint.min), ("low", joint.low), ("high", joint.high), ("max", joint.max))
+    ordered = [(key, value) for key, value in limits if value is not None]
     for (key, value), (above, next_value) in pairwise(ordered):
         touching = (key, above) in (("min", "low"), ("high", "max"))
         if value > next_value or (value == next_value and not touching):
-            what = f"{number_text(next_value)} must be more than {key} ({number_text(value)})"
-            yield Fault(f"{place}.{above}", what)
+            message = f"{number_text(next_value)} must be more than {key} ({number_text(value)})"
+            yield Fault(f"{place}.{above}", message)
             return

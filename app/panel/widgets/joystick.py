@@ -57,8 +57,8 @@ class Joystick(HoldCommand):
         return {"header": {"stamp": "{now}", "frame_id": self.frame_id}, "twist": TWIST}
 
     def moving(self, x: float, y: float) -> Mapping[str, Any]:
-        found: Mapping[str, Any] = _with_axes(self.template, x, y)
-        return found
+        fields: Mapping[str, Any] = _with_axes(self.template, x, y)
+        return fields
 
     def stopping(self) -> Mapping[str, Any]:
         return self.release or self.moving(0.0, 0.0)
@@ -78,7 +78,7 @@ class Joystick(HoldCommand):
     @property
     def own_comments(self) -> Mapping[str, str]:
         axes = (("x", "to the right", self.x_axis), ("y", "to the front", self.y_axis))
-        return {name: f"{number_text(of.max)} when {where}" for name, where, of in axes}
+        return {name: f"{number_text(axis.max)} when {where}" for name, where, axis in axes}
 
     @property
     def checked(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -91,11 +91,11 @@ class Joystick(HoldCommand):
             if axis.max == 0:
                 yield Fault(f"{place}.{name}_axis.max", "is 0: the axis would do nothing")
             if name in checking.all_inputs:
-                what = f'"{name}" is the id of an input: in this message {{{name}}} is the axis'
-                yield Fault(f"{place}.{name}_axis", what)
+                message = f'"{name}" is the id of an input: in this message {{{name}}} is the axis'
+                yield Fault(f"{place}.{name}_axis", message)
         if not self.template:
-            what = f'is missing: a message of {self.type} names its axes, as in {{ x = "{{x}}" }}'
-            yield Fault(f"{place}.message", what)
+            message = f'is missing: a message of {self.type} names its axes, as in {{ x = "{{x}}" }}'
+            yield Fault(f"{place}.message", message)
             return
         yield from super().faults(place, checking)
 

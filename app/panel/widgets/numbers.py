@@ -24,9 +24,9 @@ else:
     Unit = panel_text(20, least=0)
 
 
-def no_number(label: TextLike, limits: TextLike, given: Any, *, whole: bool) -> Text:
+def no_number(label: TextLike, limits: TextLike, value: Any, *, whole: bool) -> Text:
     """Why a value is refused that is not a number, or not written like one."""
-    shown, example = format_value(given), number_like(whole=whole)
+    shown, example = format_value(value), number_like(whole=whole)
     return say("input_not_a_number", label=label, limits=limits, given=shown, example=example)
 
 
@@ -58,11 +58,11 @@ class Numeric(SteppedWidget, Input):
 
     @model_validator(mode="before")
     @classmethod
-    def _default_step(cls, given: Any) -> Any:
+    def _default_step(cls, table: Any) -> Any:
         """Sets the default step; only the raw table shows how the limits are written."""
-        limits = [given.get(key) for key in ("min", "max")] if isinstance(given, Mapping) else []
+        limits = [table.get(key) for key in ("min", "max")] if isinstance(table, Mapping) else []
         whole = limits and all(type(limit) is int for limit in limits)
-        return {"step": 1, **given} if whole else given
+        return {"step": 1, **table} if whole else table
 
     @property
     def initial_text(self) -> str:
@@ -117,18 +117,18 @@ class Numeric(SteppedWidget, Input):
         value = read_number(text, language, whole=self.is_whole)
         return text.strip() if value is None else value
 
-    def check_value(self, given: Any) -> int | float:
+    def check_value(self, value: Any) -> int | float:
         label, allowed = self.label, self.limits_text
-        if given == "" or given is None:
+        if value == "" or value is None:
             raise InputError(say("input_number_empty", label=label, limits=allowed))
-        if isinstance(given, bool) or not isinstance(given, int | float):
-            raise InputError(no_number(label, allowed, given, whole=self.is_whole))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(no_number(label, allowed, value, whole=self.is_whole))
         # Limits first: a value beyond them may be no float, or take long to divide.
-        if not self.min <= given <= self.max or not self.is_on_step(float(given)):
-            small = isinstance(given, float) and abs(given) <= MAX_EXACT_NUMBER
-            text = number(number_text(given) if small else format_value(given))
+        if not self.min <= value <= self.max or not self.is_on_step(float(value)):
+            small = isinstance(value, float) and abs(value) <= MAX_EXACT_NUMBER
+            text = number(number_text(value) if small else format_value(value))
             raise InputError(say("input_outside_limits", label=label, limits=allowed, given=text))
-        return self.to_type(float(given))
+        return self.to_type(float(value))
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         low, high = number_text(self.min), number_text(self.max)
@@ -137,14 +137,16 @@ class Numeric(SteppedWidget, Input):
         if self.max <= self.min:
             yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
         elif not self.is_on_step(self.max):
-            what = f"no whole number of steps of {step} leads from {low} to {high}"
-            yield Fault(f"{place}.step", what)
+            message = f"no whole number of steps of {step} leads from {low} to {high}"
+            yield Fault(f"{place}.step", message)
         elif self.default is not None and not self.min <= self.default <= self.max:
             yield Fault(f"{place}.default", f"{default} is not from {low} to {high}")
         elif self.default is not None and not self.is_on_step(self.default):
-            what = f"is not on a step of {step} from {low}"
+            message = f"is not on a step of {step} from {low}"
             any_number = f"; limits written as {self.min} and {self.max} take any number"
-            yield Fault(f"{place}.default", f"{default} {what}{any_number if self.step == 1 else ''}")
+            yield Fault(
+                f"{place}.default", f"{default} {message}{any_number if self.step == 1 else ''}"
+            )
 
 
 class NumberInput(Numeric):

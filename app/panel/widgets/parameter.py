@@ -41,13 +41,12 @@ TYPE_TEXTS: Final[Mapping[str, str]] = {
 }
 
 
-def _check_node(given: str) -> str:
-    if not is_absolute_name(given):
+def _check_node(name: str) -> str:
+    if not is_absolute_name(name):
         raise ValueError(
-            f"{format_value(given)} is not the absolute name of a ROS 2 node: "
-            "it must be like /cell1/arm"
+            f"{format_value(name)} is not the absolute name of a ROS 2 node: it must be like /cell1/arm"
         )
-    return given
+    return name
 
 
 NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
@@ -129,18 +128,18 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
         keys = ("min", "max", "step")
-        given = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
+        limits = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
         if not self.has_numbers:
-            for key in (*given, *(["unit"] if self.unit else [])):
-                what = f'is for numbers; the type is "{self.type}"'
-                yield Fault(f"{place}.{key}", what, cause=f"number {place}")
+            for key in (*limits, *(["unit"] if self.unit else [])):
+                message = f'is for numbers; the type is "{self.type}"'
+                yield Fault(f"{place}.{key}", message, cause=f"number {place}")
         if self.options:
             yield from _option_faults(place, self)
-            for key in given if self.has_numbers else ():
-                what = "is for what is entered: with options one of them is chosen"
-                yield Fault(f"{place}.{key}", what, cause=f"number {place}")
+            for key in limits if self.has_numbers else ():
+                message = "is for what is entered: with options one of them is chosen"
+                yield Fault(f"{place}.{key}", message, cause=f"number {place}")
         elif self.has_numbers:
-            yield from _limit_faults(place, self, given)
+            yield from _limit_faults(place, self, limits)
 
     @property
     def press_label(self) -> Text:
@@ -155,7 +154,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
     def find_option(self, value: Any) -> Option | None:
         """The option with this value; None without one."""
         value = list(value) if isinstance(value, tuple) else value
-        return next((one for one in self.options if same_value(one.value, value)), None)
+        return next((option for option in self.options if same_value(option.value, value)), None)
 
     def value_text(self, value: Value) -> TextLike:
         """A value as text for an operator: an option's label, or the exact value with its unit."""
@@ -183,7 +182,8 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
         if not isinstance(value, tuple):
             return self.element_text(value)
         return join_list(
-            quote_element(one) if isinstance(one, str) else self.element_text(one) for one in value
+            quote_element(element) if isinstance(element, str) else self.element_text(element)
+            for element in value
         )
 
     def element_text(self, value: bool | float | str) -> str:
@@ -202,12 +202,13 @@ def _option_faults(place: str, parameter: Parameter) -> Iterator[Fault]:
         value = option.value
         several = value if parameter.is_list and isinstance(value, list) else [value]
         right = parameter.is_list == isinstance(value, list) and all(
-            is_valid_value(parameter.element_type, one) for one in several
+            is_valid_value(parameter.element_type, element) for element in several
         )
         if not right:
-            what = f"must be {TYPE_TEXTS[parameter.element_type]}, not {format_value(value)}"
+            message = f"must be {TYPE_TEXTS[parameter.element_type]}, not {format_value(value)}"
             yield Fault(
-                f"{place}.options[{i}].value", f"a list: each {what}" if parameter.is_list else what
+                f"{place}.options[{i}].value",
+                f"a list: each {message}" if parameter.is_list else message,
             )
 
 
@@ -224,12 +225,12 @@ def is_valid_value(kind: str, value: Any) -> bool:
     return isinstance(value, int) and low <= value <= high if kind == "integer" else isfinite(value)
 
 
-def _limit_faults(place: str, parameter: Parameter, given: Mapping[str, float]) -> Iterator[Fault]:
+def _limit_faults(place: str, parameter: Parameter, limits: Mapping[str, float]) -> Iterator[Fault]:
     if parameter.element_type == "integer":
-        broken = {key: one for key, one in given.items() if not one.is_integer()}
-        for key, one in broken.items():
-            what = f"{number_text(one)} must be whole: the type is {parameter.type}"
-            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
+        broken = {key: limit for key, limit in limits.items() if not limit.is_integer()}
+        for key, limit in broken.items():
+            message = f"{number_text(limit)} must be whole: the type is {parameter.type}"
+            yield Fault(f"{place}.{key}", message, cause=f"number {place}")
         if broken:
             return
     if parameter.min is None or parameter.max is None:
@@ -250,6 +251,6 @@ def type_faults(parameters: Iterable[tuple[str, Parameter]]) -> Iterator[Fault]:
     for place, widget in parameters:
         first = firsts.setdefault((widget.node, widget.parameter), widget.type)
         if first != widget.type:
-            what = f"{widget.parameter} of {widget.node} is {widget.type} here but {first} above"
+            message = f"{widget.parameter} of {widget.node} is {widget.type} here but {first} above"
             cause = f"parameter {widget.node} {widget.parameter}"
-            yield Fault(f"{place}.type", what, cause=cause)
+            yield Fault(f"{place}.type", message, cause=cause)

@@ -71,8 +71,8 @@ class SinglePublish(PublishPress):
         if self.confirm is not None:
             yield from _confirm_faults(f"{place}.confirm", self.confirm, checking)
         elif self.one_shot:
-            what = "needs `confirm`: without it the panel does not know when the command is done"
-            yield Fault(f"{place}.one_shot", what)
+            message = "needs `confirm`: without it the panel does not know when the command is done"
+            yield Fault(f"{place}.one_shot", message)
 
 
 class Publish(SinglePublish):
@@ -82,8 +82,8 @@ class Publish(SinglePublish):
 def _confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Iterator[Fault]:
     known = confirm.type or checking.types.get(confirm.topic)
     if known is None:
-        what = f"is missing: nothing else in the panel says what {confirm.topic} is"
-        yield Fault(f"{place}.type", what, cause=f"listens {confirm.topic}")
+        message = f"is missing: nothing else in the panel says what {confirm.topic} is"
+        yield Fault(f"{place}.type", message, cause=f"listens {confirm.topic}")
         return
     faults = list(field_faults(place, known, confirm.field, checking.interfaces))
     yield from faults
@@ -96,8 +96,8 @@ def _equals_faults(
     place: str, confirm: Confirm, type_name: str, kind: str, checking: CheckContext
 ) -> Iterator[Fault]:
     if re.search(r"[/\]]", kind):
-        what = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
-        yield Fault(f"{place}.field", what)
+        message = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
+        yield Fault(f"{place}.field", message)
         return
     try:
         names = list(placeholders(confirm.equals, "equals"))

@@ -134,9 +134,9 @@ def _path_faults(
 ) -> Iterator[Fault]:
     """A fault if the field does not exist, or its type does not match `kind` (a regular expression)."""
     try:
-        found = interfaces.field_type(type_name, path)
+        field_type = interfaces.field_type(type_name, path)
     except InterfaceError as error:
         yield Fault(place, str(error))
         return
-    if not re.fullmatch(kind, found):
-        yield Fault(place, f'"{path}" is {found}: it must be {TYPE_WORDS.get(kind, kind)}')
+    if not re.fullmatch(kind, field_type):
+        yield Fault(place, f'"{path}" is {field_type}: it must be {TYPE_WORDS.get(kind, kind)}')

@@ -32,8 +32,8 @@ class Picture(Static):
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.src not in checking.pictures:
             there = list_names(checking.pictures)
-            what = f'"{self.src}" is not among the pictures; there is {there}'
-            yield Fault(f"{place}.src", what, cause=f"picture {self.src}")
+            message = f'"{self.src}" is not among the pictures; there is {there}'
+            yield Fault(f"{place}.src", message, cause=f"picture {self.src}")
 
 
 class PageLink(Static):
@@ -45,5 +45,5 @@ class PageLink(Static):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.page not in checking.pages:
-            what = f'no page "{self.page}"; there is {list_names(checking.pages)}'
-            yield Fault(f"{place}.page", what, cause=f"page {self.page}")
+            message = f'no page "{self.page}"; there is {list_names(checking.pages)}'
+            yield Fault(f"{place}.page", message, cause=f"page {self.page}")

@@ -47,16 +47,16 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
 
     @property
     def template(self) -> dict[str, Any]:
-        found: dict[str, Any] = _renamed(self.message, f"{{{self.id}}}")
-        return found
+        template: dict[str, Any] = _renamed(self.message, f"{{{self.id}}}")
+        return template
 
     @property
     def confirm(self) -> Confirm:
-        of = self.value
+        source = self.value
         return Confirm(
-            topic=of.topic,
-            type=of.type,
-            field=of.field,
+            topic=source.topic,
+            type=source.type,
+            field=source.field,
             equals=f"{{{self.id}}}",
             within_s=self.within_s,
         )
@@ -99,13 +99,15 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
             yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
             return
         if self.confirm_press:
-            what = "is not for a step: each press is one step, from the value that is shown"
-            yield Fault(f"{place}.confirm_press", what)
+            reason = "is not for a step: each press is one step, from the value that is shown"
+            yield Fault(f"{place}.confirm_press", reason)
         own = {**checking.inputs, self.id: self._as_number()}
-        found = list(super().faults(place, replace(checking, inputs=own)))
-        yield from found
+        faults = list(super().faults(place, replace(checking, inputs=own)))
+        yield from faults
         message = f"{place}.message"
-        if self.template == self.message and not any(one.place.startswith(message) for one in found):
+        if self.template == self.message and not any(
+            fault.place.startswith(message) for fault in faults
+        ):
             yield Fault(message, 'has no "{value}": every press would publish the same')
         yield from number_field_faults(f"{place}.value", self.value, "a value", checking.interfaces)
 

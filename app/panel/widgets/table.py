@@ -115,12 +115,12 @@ class Table(TopicWidget, DisplayWidget):
     def _resolved(self, column: Column, interfaces: Interfaces) -> Column:
         if not column.states:
             return column
-        of = self.column_field(column)
-        kind = interfaces.field_type(of.type, of.field)
-        constants = interfaces.constants(parent_type(of, interfaces))
+        field = self.column_field(column)
+        kind = interfaces.field_type(field.type, field.field)
+        constants = interfaces.constants(parent_type(field, interfaces))
         states = [
-            one.model_copy(update={"value": resolve_state_value(one.value, kind, constants)})
-            for one in column.states
+            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
+            for state in column.states
         ]
         return column.model_copy(update={"states": tuple(states)})
 
@@ -132,27 +132,27 @@ class Table(TopicWidget, DisplayWidget):
             return
         kind = interfaces.type_at(self.type, self.field)
         if kind.container != "sequence":
-            what = f'"{self.field}" is {kind}: a table is for a list of any length'
-            yield Fault(f"{place}.field", what)
+            message = f'"{self.field}" is {kind}: a table is for a list of any length'
+            yield Fault(f"{place}.field", message)
             return
         if kind.size and self.entries_read > kind.size and "entries_read" in self.model_fields_set:
-            what = f'"{self.field}" has {kind.size} entries at most: read no more'
-            yield Fault(f"{place}.entries_read", what)
+            message = f'"{self.field}" has {kind.size} entries at most: read no more'
+            yield Fault(f"{place}.entries_read", message)
             return
         for c, column in enumerate(self.columns):
             yield from self._column_faults(f"{place}.column[{c}]", column, interfaces)
         yield from self._order_faults(place, interfaces)
 
     def _column_faults(self, place: str, column: Column, interfaces: Interfaces) -> Iterator[Fault]:
-        of = self.column_field(column)
+        field = self.column_field(column)
         whole = () if column.states else DEFAULT_FORMATS.keys()
         faults = list(self._entry_faults(f"{place}.field", column.field, interfaces, whole))
         yield from faults
         if faults:
             return
-        kind = interfaces.field_type(of.type, of.field)
+        kind = interfaces.field_type(field.type, field.field)
         if column.states:
-            yield from state_faults(place, of, kind, interfaces, "a column with states")
+            yield from state_faults(place, field, kind, interfaces, "a column with states")
             for key in ("format", "unit", "constants"):
                 if key in column.model_fields_set:
                     yield Fault(f"{place}.{key}", "is not for a column with states: they are its texts")
@@ -166,8 +166,8 @@ class Table(TopicWidget, DisplayWidget):
                     f"{place}.{key}", f'is for numbers; "{column.field or self.field}" is {kind}'
                 )
                 return
-        yield from format_fault(place, of, kind)
-        yield from constant_faults(place, of, interfaces)
+        yield from format_fault(place, field, kind)
+        yield from constant_faults(place, field, interfaces)
 
     def _entry_faults(
         self, place: str, field: str | None, interfaces: Interfaces, whole: Collection[str] = ()
@@ -189,7 +189,9 @@ class Table(TopicWidget, DisplayWidget):
         if sort is None:
             return
         if (sort.first == "newest") != (sort.by is None):
-            what = "is for the largest or smallest" if sort.by else "is missing: the field to sort by"
-            yield Fault(f"{place}.sort.by", what)
+            message = (
+                "is for the largest or smallest" if sort.by else "is missing: the field to sort by"
+            )
+            yield Fault(f"{place}.sort.by", message)
         elif sort.by is not None:
             yield from self._entry_faults(f"{place}.sort.by", sort.by, interfaces)

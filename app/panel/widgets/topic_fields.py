@@ -10,10 +10,10 @@ from app.panel.widgets.families import TopicField
 
 
 def number_field_faults(
-    place: str, of: TopicField, what: str, interfaces: Interfaces
+    place: str, source: TopicField, noun: str, interfaces: Interfaces
 ) -> Iterator[Fault]:
     """Faults of a field that must be one number; `what` is it, with its article."""
-    faults = list(field_faults(place, of.type, of.field, interfaces))
+    faults = list(field_faults(place, source.type, source.field, interfaces))
     yield from faults
-    if not faults and (found := interfaces.field_type(of.type, of.field)) not in NUMBERS:
-        yield Fault(f"{place}.field", f'"{of.field}" is {found}: {what} is a number')
+    if not faults and (field_type := interfaces.field_type(source.type, source.field)) not in NUMBERS:
+        yield Fault(f"{place}.field", f'"{source.field}" is {field_type}: {noun} is a number')

@@ -44,14 +44,14 @@ SLACK: Final = 1.25  # what is not removed yet, and what the lists reserve
 MAX_BYTES: Final = 128_000_000  # the histories of all trends of a panel
 
 
-def _check_duration(given: str) -> str:
-    if not re.fullmatch(DURATION, given):
+def _check_duration(text: str) -> str:
+    if not re.fullmatch(DURATION, text):
         raise ValueError(
-            f'{format_value(given)} is not a duration: it must be like "90s", "10m" or "24h"'
+            f'{format_value(text)} is not a duration: it must be like "90s", "10m" or "24h"'
         )
-    if not SHORTEST_S <= seconds_of(given) <= LONGEST_S:
-        raise ValueError(f'{format_value(given)} is out of range: durations go from "10s" to "31d"')
-    return given
+    if not SHORTEST_S <= seconds_of(text) <= LONGEST_S:
+        raise ValueError(f'{format_value(text)} is out of range: durations go from "10s" to "31d"')
+    return text
 
 
 def seconds_of(duration: str) -> int:
@@ -95,9 +95,9 @@ class Pen(Description):
         return value * self.scale + self.offset
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        found = list(field_faults(place, self.type, self.field, checking.interfaces))
-        yield from found
-        if not found:
+        faults = list(field_faults(place, self.type, self.field, checking.interfaces))
+        yield from faults
+        if not faults:
             field_type = checking.interfaces.type_at(self.type, self.field)
             if field_type.container != "one" or field_type.name not in NUMBERS:
                 yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a pen is for a number')
@@ -130,7 +130,7 @@ class Trend(DisplayWidget):
     @property
     def choices(self) -> list[int]:
         """The windows to choose from, in seconds, the shortest first."""
-        return sorted({seconds_of(one) for one in (*self.windows, self.window)})
+        return sorted({seconds_of(window) for window in (*self.windows, self.window)})
 
     @property
     def keep_s(self) -> int:
@@ -162,21 +162,21 @@ class Trend(DisplayWidget):
         for number, pen in enumerate(self.pens):
             yield from pen.faults(f"{place}.pen[{number}]", checking)
         windows = {"window": self.window} | {f"windows[{i}]": w for i, w in enumerate(self.windows)}
-        for key, given in windows.items():
-            if seconds_of(given) > self.keep_s:
-                what = f'"{given}" is longer than what is kept, which is "{self.keep}"'
-                yield Fault(f"{place}.{key}", what)
+        for key, duration in windows.items():
+            if seconds_of(duration) > self.keep_s:
+                message = f'"{duration}" is longer than what is kept, which is "{self.keep}"'
+                yield Fault(f"{place}.{key}", message)
         if self.min is not None and self.max is not None and self.min >= self.max:
             yield Fault(f"{place}.min", f"{self.min:g} is not below max, which is {self.max:g}")
 
 
 def kept_fields(trends: Iterable[Trend]) -> dict[tuple[str, str], Trend]:
     """(topic, field) → the trend that keeps it for the longest time, of each field with a history."""
-    found: dict[tuple[str, str], Trend] = {}
-    for trend in sorted(trends, key=lambda one: one.keep_s):
+    kept: dict[tuple[str, str], Trend] = {}
+    for trend in sorted(trends, key=lambda trend: trend.keep_s):
         for pen in trend.pens:
-            found[pen.topic, pen.field] = trend
-    return found
+            kept[pen.topic, pen.field] = trend
+    return kept
 
 
 def disk_fields(trends: Iterable[Trend]) -> set[tuple[str, str]]:
@@ -186,7 +186,7 @@ def disk_fields(trends: Iterable[Trend]) -> set[tuple[str, str]]:
 
 def memory_of(trends: Iterable[Trend], robots: int) -> int:
     """The most memory that the histories of all trends take, in bytes; `robots` is their number."""
-    return robots * sum(history_bytes(one.keep_s) for one in kept_fields(trends).values())
+    return robots * sum(history_bytes(trend.keep_s) for trend in kept_fields(trends).values())
 
 
 class HasDisplays(Protocol):
