@@ -63,23 +63,23 @@ def bridge_token(zid: str) -> str:
 
 def parsed(token_key: str) -> Endpoint | None:
     """The endpoint of a token; None for clients and for what is not a token."""
-    found = _TOKEN.fullmatch(token_key)
-    if found is None:
+    match = _TOKEN.fullmatch(token_key)
+    if match is None:
         return None
-    if found["server"] is not None:
-        server: ServerRole = "SS" if found["server"] == "SS" else "AS"
-        key, type_name = _unescaped(found["name"]), valid_type(_unescaped(found["server_type"]))
-        return Endpoint(found["zid"], server, key, type_name) if is_valid_name(key) else None
-    if found["role"] is None:
-        return Endpoint(found["zid"])
-    role: TopicRole = "MP" if found["role"] == "MP" else "MS"
-    key, type_name = _unescaped(found["key"]), valid_type(_unescaped(found["type"]))
+    if match["server"] is not None:
+        server: ServerRole = "SS" if match["server"] == "SS" else "AS"
+        key, type_name = _unescaped(match["name"]), valid_type(_unescaped(match["server_type"]))
+        return Endpoint(match["zid"], server, key, type_name) if is_valid_name(key) else None
+    if match["role"] is None:
+        return Endpoint(match["zid"])
+    role: TopicRole = "MP" if match["role"] == "MP" else "MS"
+    key, type_name = _unescaped(match["key"]), valid_type(_unescaped(match["type"]))
     if not is_valid_name(key):
         return None
-    reliable = {"0": False, "1": True}.get(found["reliability"])
-    type_hash = _HASH.search(found["more"])
+    reliable = {"0": False, "1": True}.get(match["reliability"])
+    type_hash = _HASH.search(match["more"])
     hashes = ((type_name, type_hash[1]),) if type_hash else ()
-    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable, hashes)
+    return Endpoint(match["zid"], role, key, type_name, match["durability"] == "1", reliable, hashes)
 
 
 def version(zid: str) -> str:
@@ -99,10 +99,10 @@ def zid_of(admin_key: str) -> str:
 
 def route_of(admin_key: str) -> tuple[str, Direction, str] | None:
     """(zid, direction, topic key) of an answer to `ROUTES`."""
-    found = _ROUTE.fullmatch(admin_key)
-    if found is None:
+    match = _ROUTE.fullmatch(admin_key)
+    if match is None:
         return None
-    return found["zid"], "pub" if found["direction"] == "pub" else "sub", found["key"]
+    return match["zid"], "pub" if match["direction"] == "pub" else "sub", match["key"]
 
 
 class BridgeDialect:
@@ -122,7 +122,7 @@ class BridgeDialect:
         return None
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
-        return [_own_token(zid, one) for one in endpoints]
+        return [_own_token(zid, endpoint) for endpoint in endpoints]
 
     def endpoint(self, token: str) -> Endpoint | None:
         return parsed(token)
@@ -135,10 +135,10 @@ class BridgeDialect:
         return _escaped(key)
 
 
-def _own_token(zid: str, of: OwnEndpoint) -> str:
-    if of.role == "AC":
-        return action_client_token(zid, of.key, of.type)
-    return token(zid, of.role, of.key, of.type, of.qos, of.type_hash)
+def _own_token(zid: str, endpoint: OwnEndpoint) -> str:
+    if endpoint.role == "AC":
+        return action_client_token(zid, endpoint.key, endpoint.type)
+    return token(zid, endpoint.role, endpoint.key, endpoint.type, endpoint.qos, endpoint.type_hash)
 
 
 def _escaped(name: str) -> str:

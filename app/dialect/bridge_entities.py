@@ -62,8 +62,8 @@ def nodes_of(writer: Writer) -> str:
 
 def writer_place(admin_key: str) -> Writer | None:
     """The writer of an answer to `writers`."""
-    found = _WRITER.fullmatch(admin_key)
-    return None if found is None else Writer(*found.groups())
+    match = _WRITER.fullmatch(admin_key)
+    return None if match is None else Writer(*match.groups())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,8 +127,8 @@ def entity_of(admin_key: str, answer: Any) -> DdsEntity | None:
 
 
 def _kind(qos: Mapping[str, Any], policy: str, default: str) -> str:
-    given = qos.get(policy)
-    return str(given.get("kind", default)) if isinstance(given, dict) else default
+    setting = qos.get(policy)
+    return str(setting.get("kind", default)) if isinstance(setting, dict) else default
 
 
 def _depth(qos: Mapping[str, Any], participant: str) -> int | None:
@@ -144,8 +144,8 @@ def _type_hash(user_data: Any) -> str:
         text = bytes(user_data).decode("utf-8", "replace")
     except (TypeError, ValueError):
         return ""
-    found = _HASH.search(text)
-    return found[1] if found else ""
+    match = _HASH.search(text)
+    return match[1] if match else ""
 
 
 def of_participant(zid: str, participant: str) -> str:
@@ -166,41 +166,41 @@ class TokenQos:
 
 def qos_of(token: str) -> TokenQos:
     """The QoS at the end of a token of a topic; all unknown for a malformed one."""
-    found = _TOKEN_QOS.fullmatch(token.rpartition("/")[2])
-    if found is None:
+    match = _TOKEN_QOS.fullmatch(token.rpartition("/")[2])
+    if match is None:
         return TokenQos(None, False, False, None, "")
-    type_hash = _HASH.search(found["data"] or "")
+    type_hash = _HASH.search(match["data"] or "")
     return TokenQos(
-        {"0": False, "1": True}.get(found["reliable"]),
-        found["durability"] == "1",
-        found["all"] == "1",
-        int(found["depth"]) if found["depth"] else None,
+        {"0": False, "1": True}.get(match["reliable"]),
+        match["durability"] == "1",
+        match["all"] == "1",
+        int(match["depth"]) if match["depth"] else None,
         type_hash[1] if type_hash else "",
     )
 
 
 def route_place(admin_key: str) -> tuple[str, str, str, str] | None:
     """(bridge, kind, direction, key) of an answer to `EVERY_ROUTE`."""
-    found = _ROUTE.fullmatch(admin_key)
-    return None if found is None else (found["zid"], found["kind"], found["direction"], found["key"])
+    match = _ROUTE.fullmatch(admin_key)
+    return None if match is None else (match["zid"], match["kind"], match["direction"], match["key"])
 
 
 def node_place(admin_key: str) -> tuple[str, str, str] | None:
     """(bridge, participant, node name like "/arm/driver") of an answer for a node."""
-    found = _NODE.fullmatch(admin_key)
-    if found is None or not is_valid_name(found["name"]):
+    match = _NODE.fullmatch(admin_key)
+    if match is None or not is_valid_name(match["name"]):
         return None
-    return found["zid"], found["participant"], f"/{found['name']}"
+    return match["zid"], match["participant"], f"/{match['name']}"
 
 
 def names_of(answer: Mapping[str, Any], part: str) -> Iterator[tuple[str, str]]:
     """(name, type) of each entry of a node's list, such as its "publishers"; malformed ones are left
     out."""
     listed = answer.get(part)
-    for one in listed if isinstance(listed, list) else ():
-        name = str(one.get("name")) if isinstance(one, dict) else ""
+    for entry in listed if isinstance(listed, list) else ():
+        name = str(entry.get("name")) if isinstance(entry, dict) else ""
         if name.startswith("/") and is_valid_name(name[1:]):
-            yield name, valid_type(str(one.get("type")))
+            yield name, valid_type(str(entry.get("type")))
 
 
 # The lists of an answer for a node, by the roles of what is in them.
@@ -229,15 +229,15 @@ def node_endpoints(admin_key: str, answer: Mapping[str, Any], namespace: str) ->
 def with_entities(endpoint: Endpoint, name: str, entities: Iterable[DdsEntity]) -> Endpoint:
     """An endpoint of a node with its QoS and hashes, from the readers and writers of the node's
     participant. `name` is the endpoint's on the robot."""
-    own = [one for one in entities if _is_part(one, endpoint.role, name)]
-    hashes = tuple(dict.fromkeys((one.type, one.type_hash) for one in own if one.type_hash))
+    own = [entity for entity in entities if _is_part(entity, endpoint.role, name)]
+    hashes = tuple(dict.fromkeys((entity.type, entity.type_hash) for entity in own if entity.type_hash))
     if not own or endpoint.role in ("SS", "AS"):
         return replace(endpoint, hashes=hashes)
     return replace(
         endpoint,
         hashes=hashes,
-        reliable=all(one.reliable for one in own),
-        transient_local=all(one.transient_local for one in own),
+        reliable=all(entity.reliable for entity in own),
+        transient_local=all(entity.transient_local for entity in own),
     )
 
 

@@ -37,8 +37,8 @@ class RecordingDirectory:
             if left.name.endswith(f".recovered{UNFINISHED}"):
                 left.unlink()  # recovered again from its source below
         for left in sorted(self.path.glob(f"*{UNFINISHED}")):
-            if found := recover(self.path, left):
-                log.warning("%s was unfinished; its readable part is recovered", found)
+            if recovered := recover(self.path, left):
+                log.warning("%s was unfinished; its readable part is recovered", recovered)
         self.make_room(0)
 
     def make_room(self, size: int) -> None:

@@ -138,11 +138,11 @@ def recover(folder: Path, unfinished: Path) -> Path | None:
             return None
         file = McapFile(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
         try:
-            found = _finish_recovered(file) if _copy_messages(stream, file) else None
+            recovered = _finish_recovered(file) if _copy_messages(stream, file) else None
         finally:
             file.abandon()  # if it is not finished
         unfinished.unlink()
-    return found
+    return recovered
 
 
 def _finish_recovered(file: McapFile) -> Path:

@@ -63,10 +63,10 @@ class Recorder:
     def record_sample(self, key: str, sample: Sample) -> None:
         """A sample was received."""
         if key in self._channels:
-            one = to_buffered(key, sample)
-            self._ring.add(one)
+            buffered = to_buffered(key, sample)
+            self._ring.add(buffered)
             if self._recording is not None:
-                self._recording.add(one)
+                self._recording.add(buffered)
 
     def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
         """A press was made; it is not checked yet."""
@@ -100,8 +100,8 @@ class Recorder:
         self._close()
         name = recording_name(time.time(), self._robot_id, widget)
         self._recording = self._recordings.begin(name, self._channels, self._metadata)
-        for one in self._ring.recent(time.monotonic()):
-            self._recording.add(one)
+        for buffered in self._ring.recent(time.monotonic()):
+            self._recording.add(buffered)
 
     def _write_press(self, **press: Any) -> None:
         if self._recording is None:

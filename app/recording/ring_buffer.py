@@ -39,12 +39,12 @@ class RingBuffer:
         self._samples: deque[Buffered] = deque()
         self.size = 0
 
-    def add(self, one: Buffered) -> None:
+    def add(self, buffered: Buffered) -> None:
         """Adds a sample. One that is larger than the ring is ignored; the others are kept."""
-        if one.size <= self._max_bytes and self._max_age_s > 0:
-            self._samples.append(one)
-            self.size += one.size
-        self._drop_old(one.sample.at)
+        if buffered.size <= self._max_bytes and self._max_age_s > 0:
+            self._samples.append(buffered)
+            self.size += buffered.size
+        self._drop_old(buffered.sample.at)
 
     def recent(self, now: float) -> Iterator[Buffered]:
         """The samples that are at most `max_age_s` old at `now` (monotonic seconds), oldest first."""

@@ -156,11 +156,11 @@ class Recording:
     def is_full(self) -> bool:
         return self._bytes_left <= 0 or self._abandoned or not self._accepted
 
-    def add(self, one: Buffered) -> None:
+    def add(self, buffered: Buffered) -> None:
         """Adds a sample."""
-        self._bytes_left -= one.size
+        self._bytes_left -= buffered.size
         if self.is_full or not self._recordings.enqueue(
-            one.size, lambda: self._run_guarded(lambda: self._write_sample(one))
+            buffered.size, lambda: self._run_guarded(lambda: self._write_sample(buffered))
         ):
             self._dropped += 1
 
@@ -188,12 +188,12 @@ class Recording:
     def _open_file(self, name: str, about: Mapping[str, str]) -> None:
         self._file = self._recordings.open_file(name, about)
 
-    def _write_sample(self, one: Buffered) -> None:
+    def _write_sample(self, buffered: Buffered) -> None:
         if self._file is not None:
-            sample = one.sample
+            sample = buffered.sample
             received = round(sample.wall * 1e9)
             sent = received if sample.sent is None else round(sample.sent * 1e6) * 1000
-            self._file.add(self._channels[one.key], bytes(sample.payload), received, sent)
+            self._file.add(self._channels[buffered.key], bytes(sample.payload), received, sent)
 
     def _write_press(self, press: Mapping[str, Any], at: int) -> None:
         if self._file is not None:

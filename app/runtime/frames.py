@@ -105,19 +105,19 @@ class Feed:
 
     async def newer(self, than: int) -> Frame:
         """The newest frame with a larger number; waits for the next one if there is none."""
-        while (found := self._newest) is None or found.number <= than:
+        while (newest := self._newest) is None or newest.number <= than:
             if self._next_frame is None:
                 self._next_frame = self._loop.create_future()
-            if self._newest is found:  # none has arrived in between
+            if self._newest is newest:  # none has arrived in between
                 await asyncio.shield(self._next_frame)
-        self._show(found)
-        return found
+        self._show(newest)
+        return newest
 
     async def picture(self, frame: Frame, widget: Camera) -> Picture:
         """The picture of a frame, encoded once for all viewers; NoPicture says why there is none."""
         try:
-            if found := self._robot.difference("MP", self._key):
-                raise NoPicture(say("topic_definition_differs", name=self.topic, type=found.type))
+            if difference := self._robot.difference("MP", self._key):
+                raise NoPicture(say("topic_definition_differs", name=self.topic, type=difference.type))
             if len(frame.payload) > widget.max_bytes:
                 size, most = len(frame.payload), widget.max_bytes
                 raise NoPicture(say("camera_large", size=size, most=most))

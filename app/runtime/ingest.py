@@ -74,13 +74,15 @@ class Ingest:
         self._handlers = handlers
         self._log = RobotLog(log, robot.name)
         self._interlocks = {
-            robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
-            for of in panel.interlocks
+            robot.key(interlock.topic): [i for i in panel.interlocks if i.topic == interlock.topic]
+            for interlock in panel.interlocks
         }
         sources = (source for widget in panel.commands for source in widget.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
-        permitting = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
+        permitting = self._interlocks.keys() | {
+            robot.key(confirmation.topic) for confirmation in panel.confirmations()
+        }
         self.lossless = permitting | robot.keyed_topics
         self.immediate = permitting | {*handlers.immediate}
         self._by_key: dict[str, list[SampleListener]] = {}
@@ -94,7 +96,9 @@ class Ingest:
         and at the end. At each step the robot's state is up to date."""
         updates = Updates(urgent=bool(changes.tokens), graph=bool(changes.tokens))
         # Interlocks first: a failure in another topic must not delay them.
-        ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
+        ordered = sorted(
+            changes.samples.items(), key=lambda arrived: arrived[0] not in self._interlocks
+        )
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
                 self._robot.invalidate(key)
@@ -133,7 +137,10 @@ class Ingest:
 
     def _verdicts(self, key: str, now: float) -> list[Verdict]:
         """The verdicts of the interlocks on a topic."""
-        return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
+        return [
+            interlock_verdict(interlock, self._robot, now)
+            for interlock in self._interlocks.get(key, ())
+        ]
 
     def _notify(self, changes: Changes) -> None:
         for key, sample in changes.kept:

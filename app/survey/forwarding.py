@@ -101,7 +101,7 @@ def _matches(pattern: str, name: str) -> bool:
 def _is_quick(pattern: str) -> bool:
     """Whether Python decides it in a short time: unlike Rust's, its expressions may take for ever. The
     others are not tried."""
-    repeats = (len(_REPEAT.findall(one)) for one in pattern.split("|"))
+    repeats = (len(_REPEAT.findall(alternative)) for alternative in pattern.split("|"))
     return (
         len(pattern) <= MOST_PATTERN and not _REPEATED.search(pattern) and max(repeats) <= MOST_REPEATS
     )

@@ -40,20 +40,20 @@ class Bridge:
     @property
     def namespace(self) -> str:
         """Like "/robot1"; "" for none. One that can't be a namespace is in escapes."""
-        given = self.config.get("namespace")
-        return one_line(given.rstrip("/"), MAX_NAME) if isinstance(given, str) else ""
+        namespace = self.config.get("namespace")
+        return one_line(namespace.rstrip("/"), MAX_NAME) if isinstance(namespace, str) else ""
 
     @property
     def domain(self) -> int | None:
         """The ROS_DOMAIN_ID that it joined; None if unknown."""
-        given = self.config.get("domain")
-        return given if isinstance(given, int) else None
+        domain = self.config.get("domain")
+        return domain if isinstance(domain, int) else None
 
     @property
     def node(self) -> str:
         """Its own node's name in ROS; "" if unknown."""
-        given = self.config.get("nodename")
-        return f"/{given}" if isinstance(given, str) else ""
+        name = self.config.get("nodename")
+        return f"/{name}" if isinstance(name, str) else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,11 +249,11 @@ class GraphSnapshot:
 
     def robot(self, namespace: str) -> RobotGraph | None:
         """The robot whose bridges have this namespace ("" for none)."""
-        return next((one for one in self.robots if one.namespace == namespace.rstrip("/")), None)
+        return next((robot for robot in self.robots if robot.namespace == namespace.rstrip("/")), None)
 
 
 def find(entries: Sequence[NamedItem], name: str) -> NamedItem | None:
-    return next((one for one in entries if one.name == name), None)
+    return next((entry for entry in entries if entry.name == name), None)
 
 
 def near(name: str, known: Iterable[str]) -> list[str]:
@@ -261,7 +261,7 @@ def near(name: str, known: Iterable[str]) -> list[str]:
     part in other namespaces."""
     names = list(known)
     last = name.rpartition("/")[2].lower()
-    same = [one for one in names if one.rpartition("/")[2].lower() == last]
+    same = [candidate for candidate in names if candidate.rpartition("/")[2].lower() == last]
     return list(dict.fromkeys([*same, *get_close_matches(name, names[:COMPARED_MOST], NEAR_MOST)]))[
         :NEAR_MOST
     ]

@@ -137,8 +137,8 @@ def _parameter(node: str, descriptor: Any, value: Any) -> NodeParameter:
 
 
 def _value(value: Any, kind: str) -> Any:
-    found = getattr(value, _FIELDS[kind])
-    return list(found) if kind.endswith("[]") else found
+    field = getattr(value, _FIELDS[kind])
+    return list(field) if kind.endswith("[]") else field
 
 
 def _finite(number: float) -> float | None:

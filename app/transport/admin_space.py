@@ -21,8 +21,8 @@ class GraphLink(AdminSpace, Protocol):
 
 async def ask_json(link: AdminSpace, selector: str) -> list[tuple[str, Any]]:
     """(key, answer) of each answer that is JSON; others are ignored. LinkError without a link."""
-    found = []
+    answers = []
     for key, answer in await link.query_all(selector):
         with suppress(ValueError, RecursionError):
-            found.append((key, json.loads(answer)))
-    return found
+            answers.append((key, json.loads(answer)))
+    return answers

@@ -57,7 +57,10 @@ class BridgeAdmin:
         nodes = await ask_json(self._link, bridge_dialect.NODES)
         own = {zid: namespaces.get(zid, self._robot.namespace) for zid in graph.peers}
         endpoints = await self._participants.endpoints(
-            nodes, own, self._robot.required_keys, lambda one: graph.since(one.role, one.key)
+            nodes,
+            own,
+            self._robot.required_keys,
+            lambda endpoint: graph.since(endpoint.role, endpoint.key),
         )
         graph.update_routes(routes, endpoints, began)
 

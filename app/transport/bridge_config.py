@@ -143,7 +143,7 @@ def _timed(limits: Mapping[str, float], names: _Names) -> str:
 def _allow(panel: Panel, names: _Names) -> Iterator[str]:
     every = allowed(panel)
     yield "      // Nothing else of the robot goes through: not to the panel, and not to its nodes."
-    for name in sorted({one for some in every.values() for one in some}):
+    for name in sorted({name for some in every.values() for name in some}):
         if names.on_robot(name) is None:
             yield f"      // {name} is not below {names.namespace}: it needs another bridge."
     yield "      allow: {"

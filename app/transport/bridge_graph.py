@@ -43,8 +43,9 @@ class GraphAnswers:
 
 def ros_graph(answers: GraphAnswers) -> GraphSnapshot:
     """The graph that these answers describe."""
-    parsed = [(token, one) for token in answers.tokens if (one := dialect.parsed(token)) is not None]
-    zids = {one.zid for _, one in parsed if one.role is None} | answers.versions.keys()
+    endpoints = map(dialect.parsed, answers.tokens)
+    parsed = [(t, e) for t, e in zip(answers.tokens, endpoints, strict=True) if e is not None]
+    zids = {endpoint.zid for _, endpoint in parsed if endpoint.role is None} | answers.versions.keys()
     bridges = [
         Bridge(zid=zid, version=answers.versions.get(zid, ""), config=answers.configs.get(zid, {}))
         for zid in sorted(zids)
@@ -55,28 +56,28 @@ def ros_graph(answers: GraphAnswers) -> GraphSnapshot:
     parts = _parts(parsed, answers)
     peers = [
         PeerEndpoint(
-            zid=one.zid,
-            role=str(one.role),
-            key=one.key,
-            type=one.type,
+            zid=endpoint.zid,
+            role=str(endpoint.role),
+            key=endpoint.key,
+            type=endpoint.type,
             qos=_qos(entities.qos_of(token)),
         )
-        for token, one in parsed
-        if one.zid not in zids and one.zid != answers.zid and one.role in ("MP", "MS")
+        for token, endpoint in parsed
+        if endpoint.zid not in zids and endpoint.zid != answers.zid and endpoint.role in ("MP", "MS")
     ]
     robots = [
-        _Robot(namespace, tuple(found), parts).graph()
-        for namespace, found in sorted(by_namespace.items())
+        _Robot(namespace, tuple(own_bridges), parts).graph()
+        for namespace, own_bridges in sorted(by_namespace.items())
     ]
     return GraphSnapshot(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
 
 
-def _qos(of: DdsEntity | TokenQos) -> EndpointQos:
+def _qos(qos: DdsEntity | TokenQos) -> EndpointQos:
     return EndpointQos(
-        reliable=of.reliable,
-        transient_local=of.transient_local,
-        keep_all=of.keep_all,
-        depth=of.depth,
+        reliable=qos.reliable,
+        transient_local=qos.transient_local,
+        keep_all=qos.keep_all,
+        depth=qos.depth,
     )
 
 
@@ -125,8 +126,8 @@ class _Robot:
                 self._nodes[zid, participant].append(node)
         self._entities = [entity for _, part in own for entity in part.entities]
         self._parts: defaultdict[tuple[str, str], list[DdsEntity]] = defaultdict(list)  # of servers
-        for one in self._entities:
-            self._parts[one.zid, one.name.partition(entities.ACTION_PART)[0]].append(one)
+        for entity in self._entities:
+            self._parts[entity.zid, entity.name.partition(entities.ACTION_PART)[0]].append(entity)
         self._routes = [route for _, part in own for route in _routes(part.routes, namespace)]
 
     def graph(self) -> RobotGraph:
@@ -134,11 +135,13 @@ class _Robot:
         return RobotGraph(
             namespace=self._namespace,
             bridges=self._bridges,
-            nodes=tuple(sorted(nodes, key=lambda one: one.name)),
+            nodes=tuple(sorted(nodes, key=lambda node: node.name)),
             topics=tuple(self._topics()),
             services=tuple(self._servers("SS")),
             actions=tuple(self._servers("AS")),
-            routes=tuple(sorted(self._routes, key=lambda one: (one.kind, one.key, one.direction))),
+            routes=tuple(
+                sorted(self._routes, key=lambda route: (route.kind, route.key, route.direction))
+            ),
         )
 
     def _name(self, key: str) -> str:
@@ -148,14 +151,16 @@ class _Robot:
     def _topics(self) -> Iterator[SurveyedTopic]:
         publishers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
         subscribers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
-        for one in self._entities:
-            if entities.ACTION_PART not in one.name and not one.of_service:
-                (publishers if one.writer else subscribers)[one.name].append(self._endpoint(one))
+        for entity in self._entities:
+            if entities.ACTION_PART not in entity.name and not entity.of_service:
+                (publishers if entity.writer else subscribers)[entity.name].append(
+                    self._endpoint(entity)
+                )
         announced = {self._name(e.key) for _, e in self._tokens if e.role in ("MP", "MS")}
         for token, endpoint in self._tokens:  # a bridge that knows no DDS, as the simulated robot's
             name = self._name(endpoint.key)
             known = {"MP": publishers, "MS": subscribers}.get(str(endpoint.role))
-            if known is not None and all(one.bridge != endpoint.zid for one in known[name]):
+            if known is not None and all(e.bridge != endpoint.zid for e in known[name]):
                 known[name].append(self._by_token(token, endpoint))
         for name in sorted(publishers.keys() | subscribers.keys()):
             if publishers[name] or subscribers[name]:
@@ -167,19 +172,19 @@ class _Robot:
                     announced=name in announced,
                 )
 
-    def _endpoint(self, of: DdsEntity) -> TopicEndpoint:
+    def _endpoint(self, entity: DdsEntity) -> TopicEndpoint:
         nodes = [
             node.name
-            for node in self._nodes.get((of.zid, of.participant), ())
-            if of.name in (node.publishers if of.writer else node.subscribers)
+            for node in self._nodes.get((entity.zid, entity.participant), ())
+            if entity.name in (node.publishers if entity.writer else node.subscribers)
         ]
         return TopicEndpoint(
-            type=of.type,
-            qos=_qos(of),
-            bridge=of.zid,
+            type=entity.type,
+            qos=_qos(entity),
+            bridge=entity.zid,
             nodes=tuple(sorted(nodes)),
-            dds=of.vendor,
-            type_hash=of.type_hash,
+            dds=entity.vendor,
+            type_hash=entity.type_hash,
         )
 
     def _by_token(self, token: str, endpoint: Endpoint) -> TopicEndpoint:
@@ -192,14 +197,14 @@ class _Robot:
         )
 
     def _servers(self, role: str) -> Iterator[Server]:
-        found = {
+        servers = {
             (e.key, e.zid): Server(
                 name=self._name(e.key), key=e.key, type=e.type, bridge=e.zid, **self._serving(role, e)
             )
             for _, e in self._tokens
             if e.role == role and entities.ACTION_PART not in e.key
         }
-        yield from (found[key] for key in sorted(found))
+        yield from (servers[key] for key in sorted(servers))
 
     def _serving(self, role: str, endpoint: Endpoint) -> dict[str, Any]:
         """The nodes that serve an endpoint, their DDS and type hashes. If there are several, one that
@@ -268,5 +273,5 @@ def _routes(answers: Answers, namespace: str) -> Iterator[BridgeRoute]:
         )
 
 
-def _texts(given: Any) -> tuple[str, ...]:
-    return tuple(map(str, given)) if isinstance(given, list) else ()
+def _texts(listed: Any) -> tuple[str, ...]:
+    return tuple(map(str, listed)) if isinstance(listed, list) else ()

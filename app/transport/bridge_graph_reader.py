@@ -52,7 +52,7 @@ def _unannounced(earlier: GraphSnapshot, graph: GraphSnapshot) -> set[str]:
 
 
 def _servers(graph: GraphSnapshot) -> set[str]:
-    return {one.key for robot in graph.robots for one in (*robot.services, *robot.actions)}
+    return {server.key for robot in graph.robots for server in (*robot.services, *robot.actions)}
 
 
 async def _read_until(
@@ -89,7 +89,9 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
                 dialect.zid_of(key): one_line(version.decode(errors="replace").strip('"'), MOST_VERSION)
                 for key, version in versions
             },
-            configs={dialect.zid_of(key): one for key, one in configs if isinstance(one, dict)},
+            configs={
+                dialect.zid_of(key): config for key, config in configs if isinstance(config, dict)
+            },
             nodes=nodes,
             entities=dds,
             routes=routes,

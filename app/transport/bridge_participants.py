@@ -40,10 +40,12 @@ class BridgeParticipants:
         """The endpoints of these keys in the bridges' answers about nodes, with QoS and hashes.
         LinkError without a link. `namespaces` are the bridges' by zid; others are left out. `since` is
         when the newest token of such an endpoint appeared."""
-        found = _by_participant(answers, namespaces, keys)
+        by_place = _by_participant(answers, namespaces, keys)
         asked = {
-            place: frozenset((one, since(one)) for one in ends if _is_described(one))
-            for place, ends in found.items()
+            place: frozenset(
+                (endpoint, since(endpoint)) for endpoint in ends if _is_described(endpoint)
+            )
+            for place, ends in by_place.items()
         }
         stale = [
             place
@@ -55,18 +57,24 @@ class BridgeParticipants:
             for place, announced in zip(some, await self._read(some), strict=True):
                 if announced:  # else the bridge did not answer in time: it is asked again
                     self._announced[place] = asked[place], announced
-        self._announced = {place: one for place, one in self._announced.items() if place in found}
+        self._announced = {
+            place: announced for place, announced in self._announced.items() if place in by_place
+        }
         return [
-            self._completed(place, one, namespaces[place[0]])
-            for place, ends in found.items()
-            for one in ends
+            self._completed(place, endpoint, namespaces[place[0]])
+            for place, ends in by_place.items()
+            for endpoint in ends
         ]
 
     async def _read(self, places: Iterable[Place]) -> list[list[DdsEntity]]:
         selectors = [entities.of_participant(*place) for place in places]
-        answers = await asyncio.gather(*(ask_json(self._link, one) for one in selectors))
+        answers = await asyncio.gather(*(ask_json(self._link, selector) for selector in selectors))
         return [
-            [found for key, answer in several if (found := entities.entity_of(key, answer)) is not None]
+            [
+                entity
+                for key, answer in several
+                if (entity := entities.entity_of(key, answer)) is not None
+            ]
             for several in answers
         ]
 
@@ -84,11 +92,11 @@ def _is_described(endpoint: Endpoint) -> bool:
 def _by_participant(
     answers: Iterable[tuple[str, Any]], namespaces: Mapping[str, str], keys: Collection[str]
 ) -> dict[Place, list[Endpoint]]:
-    found: defaultdict[Place, list[Endpoint]] = defaultdict(list)
+    endpoints: defaultdict[Place, list[Endpoint]] = defaultdict(list)
     for place, endpoint in _endpoints(answers, namespaces):
         if endpoint.key in keys:
-            found[place].append(endpoint)
-    return found
+            endpoints[place].append(endpoint)
+    return endpoints
 
 
 def _endpoints(

@@ -36,8 +36,8 @@ class PublisherWatch:
         self._bridges = bridges
         self._log = log
         interlocks = context.panel.interlocks
-        self._keys = sorted({self._robot.key(one.topic) for one in interlocks})
-        is_needed = any(one.publishers == "one" for one in interlocks)
+        self._keys = sorted({self._robot.key(interlock.topic) for interlock in interlocks})
+        is_needed = any(interlock.publishers == "one" for interlock in interlocks)
         self._every_s = ASK_EVERY_S if is_needed else ASK_SELDOM_S
         self._nodes: Nodes = {}
         self._task: asyncio.Task[None] | None = None
@@ -53,12 +53,16 @@ class PublisherWatch:
 
     async def update(self) -> bool:
         """Asks once; returns whether publishers have changed. LinkError without a link."""
-        found = await asyncio.gather(*(self._publishers(key) for key in self._keys))
+        publishers_of_topics = await asyncio.gather(*(self._publishers(key) for key in self._keys))
         changed = [
             self._robot.topic_publishers.update(key, publishers)
-            for key, publishers in zip(self._keys, found, strict=True)
+            for key, publishers in zip(self._keys, publishers_of_topics, strict=True)
         ]
-        known = {(one.peer, one.guid) for publishers in found for one in publishers}
+        known = {
+            (publisher.peer, publisher.guid)
+            for publishers in publishers_of_topics
+            for publisher in publishers
+        }
         self._nodes = {at: n for at, n in self._nodes.items() if (at[0].zid, at[0].guid) in known}
         return any(changed)
 
@@ -85,16 +89,16 @@ class PublisherWatch:
 
     async def _writers(self, zid: str, name: str) -> Collection[Writer]:
         answers = await self._link.query_all(entities.writers(zid, name))
-        found = (entities.writer_place(key) for key, _ in answers)
-        return sorted({one for one in found if one is not None})
+        writers = (entities.writer_place(key) for key, _ in answers)
+        return sorted({writer for writer in writers if writer is not None})
 
     async def _nodes_of(self, writer: Writer, name: str) -> tuple[str, ...]:
         """The nodes of a writer's process that publish the topic; asked for until they are known."""
-        if nodes := self._nodes.get((writer, name)):
-            return nodes
+        if known := self._nodes.get((writer, name)):
+            return known
         answers = await self._link.query_all(entities.nodes_of(writer))
-        found = [node for key, answer in answers if (node := _publishing(key, answer, name))]
-        self._nodes[writer, name] = tuple(sorted(found))
+        nodes = [node for key, answer in answers if (node := _publishing(key, answer, name))]
+        self._nodes[writer, name] = tuple(sorted(nodes))
         return self._nodes[writer, name]
 
 

@@ -67,8 +67,10 @@ class Superseded:
         self.values: BoundedQueue[SkippedPayload] = BoundedQueue(UNSEEN_MOST, UNSEEN_BYTES)
         self.overrun = False
 
-    def add(self, one: "_Arrived") -> None:
-        if self.values.add(SkippedPayload(one.payload, one.at, one.wall), len(one.payload)):
+    def add(self, arrived: "_Arrived") -> None:
+        if self.values.add(
+            SkippedPayload(arrived.payload, arrived.at, arrived.wall), len(arrived.payload)
+        ):
             self.overrun = True
 
 
@@ -144,10 +146,10 @@ class Inbox:
         """`function`, called under the lock. It does nothing once the session has been renewed."""
         session = self._session
 
-        def handle(what: Any) -> None:
+        def handle(event: Any) -> None:
             with self._lock:
                 if session == self._session:
-                    function(what)
+                    function(event)
 
         return handle
 

@@ -58,10 +58,12 @@ class LivelinessTokens:
         own = []
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)
-            if found := self._robot.graph.mismatched_type(role, key, type_name):
-                if (topic, found) not in self._reported:
-                    self._reported.add((topic, found))
-                    self._log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
+            if robot_type := self._robot.graph.mismatched_type(role, key, type_name):
+                if (topic, robot_type) not in self._reported:
+                    self._reported.add((topic, robot_type))
+                    self._log.error(
+                        "%s is %s on the robot, %s in the panel", topic, robot_type, type_name
+                    )
                 continue
             type_hash = self._interfaces.type_hash(type_name)
             own.append(OwnEndpoint(role, key, type_name, qos, type_hash))

@@ -67,7 +67,7 @@ class RobotObserver:
         `hold`: declares tokens, so that a bridge keeps its routes and each sample arrives once. Not
         for a topic without a publisher: the token would fix the QoS of the route for a later publisher.
         """
-        expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
+        expressions = {topic.key: self._dialect.topic(topic.key, topic.type) for topic in topics}
         self._session.start(
             Declarations(subscribe=expressions, recorded=set(expressions), immediate=set(expressions))
         )

@@ -33,23 +33,23 @@ class TokenQuery:
             self._watched = self._session.liveliness().declare_subscriber(
                 self._expression, Callback(_ignore, indirect=False), history=True
             )
-        found = await self._query(timeout_s)
+        tokens = await self._query(timeout_s)
         end = asyncio.get_running_loop().time() + HISTORY_WITHIN_S
         while self._watched is not None and asyncio.get_running_loop().time() < end:
             await asyncio.sleep(POLL_S)
-            before, found = found, await self._query(timeout_s)
-            if len(before) == len(found) and len({*map(_owner, found)}) >= routers:
+            before, tokens = tokens, await self._query(timeout_s)
+            if len(before) == len(tokens) and len({*map(_owner, tokens)}) >= routers:
                 break
-        return found
+        return tokens
 
     async def _query(self, timeout_s: float) -> list[str]:
         get = self._session.liveliness().get
-        found, whole = await collected(
+        replies, whole = await collected(
             lambda back: get(self._expression, back, timeout=timeout_s), timeout_s
         )
         if not whole:
             raise LinkError(f"the ROS graph did not come within {timeout_s:g} s")
-        return [key for key, _ in found]
+        return [key for key, _ in replies]
 
 
 def _owner(token: str) -> str:

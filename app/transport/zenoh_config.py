@@ -80,10 +80,10 @@ def error_text(error: zenoh.ZError) -> str:
 
 def endpoints_of(config: zenoh.Config) -> tuple[str, ...]:
     """The endpoints that a session connects to; empty if it only scouts."""
-    found = json.loads(config.get_json("connect/endpoints"))
-    if isinstance(found, dict):  # for each mode
-        found = found.get(json.loads(config.get_json("mode")) or "peer", [])
-    return tuple(map(str, found))
+    endpoints = json.loads(config.get_json("connect/endpoints"))
+    if isinstance(endpoints, dict):  # for each mode
+        endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
+    return tuple(map(str, endpoints))
 
 
 @contextmanager

@@ -97,15 +97,20 @@ class ZenohSession:
                 ),
             )
             self._publishers = {
-                key: declare_publisher(self._session, one, latched=key in self._declared.latched)
-                for key, one in self._declared.publish.items()
+                key: declare_publisher(
+                    self._session, publication, latched=key in self._declared.latched
+                )
+                for key, publication in self._declared.publish.items()
             }
             self._subscribers = [
                 declared
                 for key, expression in self._declared.subscribe.items()
                 for declared in self._subscriptions(key, expression)
             ]
-            self._demanded = {key: self._subscriber(*of) for key, of in dict(self._on_demand).items()}
+            self._demanded = {
+                key: self._subscriber(*subscription)
+                for key, subscription in dict(self._on_demand).items()
+            }
 
     def _subscriptions(self, key: str, expression: str) -> Iterator[zenoh.Subscriber[None]]:
         """A subscriber to the topic, and one to the tokens of its publishers' caches. Zenoh's own
@@ -162,9 +167,9 @@ class ZenohSession:
         """A handler that runs on Zenoh's receiving thread. It does nothing after `renew`."""
         take = self._inbox.guarded(function)
 
-        def handle(what: Any) -> None:
+        def handle(event: Any) -> None:
             attach()
-            take(what)
+            take(event)
 
         return Callback(handle, indirect=False)
 
@@ -220,8 +225,8 @@ class ZenohSession:
         """(key, payload) of each answer to a query that arrives within `timeout_s`."""
         get = self._session.get
         with translated(f"can't ask {selector}"):
-            found, _ = await collected(lambda back: get(selector, back, timeout=timeout_s), timeout_s)
-        return found
+            answers, _ = await collected(lambda back: get(selector, back, timeout=timeout_s), timeout_s)
+        return answers
 
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
         """The liveliness tokens of the ROS graph; LinkError if not all of them arrive in time."""

@@ -125,14 +125,16 @@ class TrendDisk:
         rows: dict[FieldName, dict[int, list[Bucket]]] = {}
         newest: dict[int, float] = {}
         more = False
-        for one in self._kept:
-            one.history.set_clock(monotonic, wall)
-            for level in one.field.levels:
-                since = self._saved.get(id(level), one.history.start)
+        for stored in self._kept:
+            stored.history.set_clock(monotonic, wall)
+            for level in stored.field.levels:
+                since = self._saved.get(id(level), stored.history.start)
                 due = list(islice(level.since(since), most))
                 if due:
                     newest[id(level)] = due[-1].at
-                    rows.setdefault(one.name, {})[int(level.width)] = _by_wall_clock(due, one.history)
+                    rows.setdefault(stored.name, {})[int(level.width)] = _by_wall_clock(
+                        due, stored.history
+                    )
                     more = more or len(due) == most
         if rows:
             self._busy, self._more = True, more
@@ -140,16 +142,18 @@ class TrendDisk:
 
     def _put_loaded(self, loaded: Loaded) -> None:
         """Puts loaded buckets before those of this run."""
-        last = {id(one.history): one.history for one in self._kept}
+        last = {id(stored.history): stored.history for stored in self._kept}
         for history in last.values():
-            own = [one for one in self._kept if one.history is history]
-            recorded = any(level.at for one in own for level in one.field.levels)
-            ends = [b[-1].at for one in own for key, b in loaded.items() if key[0] == one.name and b]
+            own = [stored for stored in self._kept if stored.history is history]
+            recorded = any(level.at for stored in own for level in stored.field.levels)
+            ends = [
+                b[-1].at for stored in own for key, b in loaded.items() if key[0] == stored.name and b
+            ]
             if ends and not recorded:
                 history.begin_after(max(ends))
-            for one in own:
-                for level in one.field.levels:
-                    buckets = loaded.get((one.name, int(level.width)), [])
+            for stored in own:
+                for level in stored.field.levels:
+                    buckets = loaded.get((stored.name, int(level.width)), [])
                     level.put_before(b for b in buckets if b.at < history.start)
 
     def _show_fault(self, fault: TextLike) -> None:

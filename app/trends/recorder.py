@@ -71,8 +71,8 @@ class TrendRecorder:
             current = [(o, n) for o, n in self._origins.items() if o[0] != key or n == cuts]
             self._origins = dict(current)
             self._origins[key, sample.source] = cuts
-        one = Pending(key, sample.at, bytes(sample.payload), whole)
-        for lost in self._pending.add(one, len(one.data)):
+        pending = Pending(key, sample.at, bytes(sample.payload), whole)
+        for lost in self._pending.add(pending, len(pending.data)):
             self._interrupt(lost.key)
         if self._timer is None:
             loop = asyncio.get_running_loop()
@@ -110,16 +110,16 @@ class TrendRecorder:
         for _, history in self._fields[key]:
             history.interrupt()
 
-    def _record(self, one: Pending) -> None:
-        if not one.whole:
-            self._interrupt(one.key)
+    def _record(self, pending: Pending) -> None:
+        if not pending.whole:
+            self._interrupt(pending.key)
         try:
-            values = self._readers[one.key].read(one.data)
+            values = self._readers[pending.key].read(pending.data)
         except DecodeError:  # the topic's state counts and logs it
-            self._interrupt(one.key)
+            self._interrupt(pending.key)
             return
-        at = self._robot.history.time(one.at)
-        for field, history in self._fields[one.key]:
+        at = self._robot.history.time(pending.at)
+        for field, history in self._fields[pending.key]:
             value = values.get(field)
             if value is None and has_key(field) and not values.is_ambiguous(field):
                 continue  # another node's part of the list

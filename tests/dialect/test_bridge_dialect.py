@@ -214,9 +214,9 @@ def test_response_names_its_sender() -> None:
 
 @pytest.mark.parametrize("qos", [":1:2:0,1:", ":1:1:0,1:a=b/c;", "K:::"])
 def test_a_token_of_a_native_dds_program_is_read(qos: str) -> None:
-    found = parsed(f"@/b1/@ros2_lv/MP/enabled/std_msgs§msg§Bool/{qos}")
-    assert found is not None
-    assert (found.key, found.type) == ("enabled", "std_msgs/msg/Bool")
+    endpoint = parsed(f"@/b1/@ros2_lv/MP/enabled/std_msgs§msg§Bool/{qos}")
+    assert endpoint is not None
+    assert (endpoint.key, endpoint.type) == ("enabled", "std_msgs/msg/Bool")
 
 
 @pytest.mark.parametrize("role", ["SS", "AS"])
@@ -235,7 +235,7 @@ def test_a_type_that_can_not_be_one_is_no_type(type_name: str) -> None:
         endpoint = parsed(f"@/b1/@ros2_lv/MP/enabled/{type_name.replace('/', '§')}/:1:0:0,1:")
         assert endpoint is None or endpoint.type == NO_TYPE
     node = {"publishers": [{"name": "/enabled", "type": type_name}], "subscribers": []}
-    assert [one.type for one in node_endpoints("@/b1/ros2/node/g/n", node, "")] == [NO_TYPE]
+    assert [endpoint.type for endpoint in node_endpoints("@/b1/ros2/node/g/n", node, "")] == [NO_TYPE]
 
 
 @pytest.mark.parametrize("key", ["a" * 600, "1st", "a\u202eb", "a b"])

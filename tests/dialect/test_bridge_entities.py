@@ -13,32 +13,32 @@ BOOL = "std_msgs::msg::dds_::Bool_"
 
 def parsed(participant: str = FAST, role: str = "writer", **qos: Any) -> DdsEntity:
     answer = {"topic_name": "rt/on", "type_name": BOOL, "qos": qos}
-    found = entity_of(f"@/a/ros2/dds/{participant}/{role}/{participant[:30]}03/rt/on", answer)
-    assert found is not None
-    return found
+    entity = entity_of(f"@/a/ros2/dds/{participant}/{role}/{participant[:30]}03/rt/on", answer)
+    assert entity is not None
+    return entity
 
 
 def test_qos_and_type_of_a_dds_writer() -> None:
-    found = parsed(
+    entity = parsed(
         reliability={"kind": "RELIABLE"},
         durability={"kind": "TRANSIENT_LOCAL"},
         history={"kind": "KEEP_LAST", "depth": 5},
         user_data=list(f"typehash={HASH};".encode()),
     )
-    assert (found.name, found.type, found.type_hash) == ("/on", "std_msgs/msg/Bool", HASH)
-    assert (found.reliable, found.transient_local, found.keep_all, found.depth) == (
+    assert (entity.name, entity.type, entity.type_hash) == ("/on", "std_msgs/msg/Bool", HASH)
+    assert (entity.reliable, entity.transient_local, entity.keep_all, entity.depth) == (
         True,
         True,
         False,
         5,
     )
-    assert found.vendor == "Fast DDS"
+    assert entity.vendor == "Fast DDS"
 
 
 @pytest.mark.parametrize(("role", "reliable"), [("writer", True), ("reader", False)])
 def test_what_is_left_out_is_the_default_of_dds(role: str, reliable: bool) -> None:
-    found = parsed(role=role)
-    assert (found.reliable, found.transient_local, found.depth) == (reliable, False, None)
+    entity = parsed(role=role)
+    assert (entity.reliable, entity.transient_local, entity.depth) == (reliable, False, None)
     assert parsed(participant=CYCLONE).depth == 1
 
 

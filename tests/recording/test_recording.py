@@ -53,8 +53,8 @@ def test_a_ring_keeps_what_is_young_enough() -> None:
     ring = RingBuffer(10.0, MB)
     for at in (0.0, 5.0, 9.0, 12.0):
         ring.add(to_buffered("heard", sample(at)))
-    assert [one.sample.at for one in ring.recent(12.0)] == [5.0, 9.0, 12.0]
-    assert [one.sample.at for one in ring.recent(20.0)] == [12.0]
+    assert [buffered.sample.at for buffered in ring.recent(12.0)] == [5.0, 9.0, 12.0]
+    assert [buffered.sample.at for buffered in ring.recent(20.0)] == [12.0]
     assert list(ring.recent(99.0)) == []
     assert ring.size == 0
 
@@ -74,7 +74,7 @@ def test_what_is_larger_than_the_ring_does_not_drive_out_the_rest() -> None:
     ring = RingBuffer(10.0, MB)
     ring.add(to_buffered("heard", sample(1.0)))
     ring.add(to_buffered("heard", sample(2.0, FLOOD)))
-    assert [one.sample.at for one in ring.recent(2.0)] == [1.0]
+    assert [buffered.sample.at for buffered in ring.recent(2.0)] == [1.0]
 
 
 def test_small_samples_count_with_what_they_cost() -> None:
@@ -99,9 +99,9 @@ class Shared:
 
 @pytest.mark.parametrize(("size", "kind"), [(COPY_BELOW_BYTES - 1, bytes), (COPY_BELOW_BYTES, Shared)])
 def test_a_small_payload_keeps_no_large_buffer(size: int, kind: type) -> None:
-    one = to_buffered("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
-    assert type(one.sample.payload) is kind
-    assert one.size == size + OVERHEAD_BYTES
+    buffered = to_buffered("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
+    assert type(buffered.sample.payload) is kind
+    assert buffered.size == size + OVERHEAD_BYTES
 
 
 # Definitions as text.
@@ -111,7 +111,7 @@ def test_every_definition_reads_back_as_it_was() -> None:
     for name, structure in INTERFACES.structures.items():
         if "/msg/" in name and not wide(structure):
             read = get_types_from_msg(INTERFACES.definition(name), name)
-            assert [field for field, _ in read[name][1]] == [one.name for one in structure.fields]
+            assert [field for field, _ in read[name][1]] == [member.name for member in structure.fields]
             constants = {each: value for each, _, value in read[name][0]}
             assert constants == pytest.approx(dict(structure.constants))
             assert {inner for _, inner in structure.nested_fields()} <= read.keys()
@@ -119,7 +119,7 @@ def test_every_definition_reads_back_as_it_was() -> None:
 
 def wide(structure: Structure) -> bool:
     """rosbags reads no wstring."""
-    return any("wstring" in str(one.type) for one in structure.fields)
+    return any("wstring" in str(field.type) for field in structure.fields)
 
 
 def test_a_definition_is_written_as_ros2msg_asks_for() -> None:
@@ -281,7 +281,7 @@ def test_a_recording_goes_from_before_a_press_to_after_it(run: Callable[..., Non
         assert received[1].log_time - received[0].log_time == pytest.approx(4e9, rel=0.1)
         assert {message.publish_time for message in received} == {1_500_000_000}
         presses = [json.loads(m.data) for m in messages(cell.folder, PRESS_TOPIC)]
-        assert [one["outcome"] for one in presses] == [None, "published"]
+        assert [press["outcome"] for press in presses] == [None, "published"]
         assert presses[1] == {
             "id": "p1",
             "widget": "free",

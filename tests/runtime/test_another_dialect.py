@@ -66,17 +66,17 @@ class TinyDialect:
         return b"%d of %s" % (number, zid.encode())
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
-        topics = (self.token(zid, one.role, one.key, one.type) for one in endpoints)
+        topics = (self.token(zid, endpoint.role, endpoint.key, endpoint.type) for endpoint in endpoints)
         return [f"tiny/{zid}/node/web_ui", *topics]
 
     def token(self, zid: str, role: str, key: str, type_name: str) -> str:
         return f"tiny/{zid}/{role}/{key.replace('/', '%')}/{type_name.replace('/', '%')}"
 
     def endpoint(self, token: str) -> Endpoint | None:
-        _, zid, role, *what = token.split("/")
+        _, zid, role, *names = token.split("/")
         if role == "node":
             return Endpoint(zid)
-        key, type_name = (one.replace("%", "/") for one in what)
+        key, type_name = (name.replace("%", "/") for name in names)
         return Endpoint(zid, ROLES[role], key, type_name) if role in ROLES else None
 
     def name_in(self, token: str) -> str:
@@ -125,7 +125,7 @@ async def observe_tiny(
 ) -> GraphSnapshot:
     """One robot, of all nodes on the link."""
     tokens = await link.tokens()
-    found = [e for e in map(TinyDialect().endpoint, tokens) if e is not None and e.zid != zid]
+    endpoints = [e for e in map(TinyDialect().endpoint, tokens) if e is not None and e.zid != zid]
     names = [token.rpartition("/")[2] for token in tokens if "/node/" in token]
     nodes = [Node(name=f"/{name}", bridge="") for name in sorted(names)]
     topics = [
@@ -134,11 +134,13 @@ async def observe_tiny(
             key=e.key,
             publishers=(TopicEndpoint(type=e.type, qos=EndpointQos(), bridge=e.zid),),
         )
-        for e in found
+        for e in endpoints
         if e.role == "MP"
     ]
     servers = [
-        Server(name=f"/{e.key}", key=e.key, type=e.type, bridge=e.zid) for e in found if e.role == "SS"
+        Server(name=f"/{e.key}", key=e.key, type=e.type, bridge=e.zid)
+        for e in endpoints
+        if e.role == "SS"
     ]
     robot = RobotGraph(nodes=tuple(nodes), topics=tuple(topics), services=tuple(servers))
     return GraphSnapshot(robots=(robot,) if nodes else ())
@@ -169,7 +171,7 @@ class TinyRobot:
     def appear(self) -> None:
         tiny, declare = TinyDialect(), self._session.liveliness().declare_token
         own = [("MP", "operation_enabled", BOOL), ("SS", "reset", TRIGGER)]
-        self._declared += [declare(tiny.token(self.zid, *one)) for one in own]
+        self._declared += [declare(tiny.token(self.zid, *arguments)) for arguments in own]
         self.nodes_alive = [declare(f"tiny/{self.zid}/node/{name}") for name in ("arm", "gripper")]
 
     def say(self, permitted: bool) -> bool:
@@ -183,7 +185,7 @@ class TinyRobot:
     def nodes(self) -> set[str]:
         """All tokens that are there."""
         replies = self._session.liveliness().get("tiny/**", timeout=2)
-        return {str(one.ok.key_expr) for one in replies if one.ok is not None}
+        return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
 
     def _hear(self, sample: zenoh.Sample) -> None:
         text = INTERFACES.decode("std_msgs/msg/String", sample.payload.to_bytes()).data
@@ -219,46 +221,51 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
 
     async def scene() -> None:
         fleet = Fleet(PANEL, lambda _: config_to(endpoint), "r1", NullLog())
-        one = fleet.first
-        await one.start()
-        await when(lambda: one.robot.link_up)
-        assert one.link_verdict.code == "service_unavailable"  # by the sentences of this kind of peer
-        assert one.publisher.view["link"]["bridge"]["name"] == say("robot")
-        assert one.publisher.view["link"]["bridge"]["text"] == say("absent")
+        session = fleet.first
+        await session.start()
+        await when(lambda: session.robot.link_up)
+        assert (
+            session.link_verdict.code == "service_unavailable"
+        )  # by the sentences of this kind of peer
+        assert session.publisher.view["link"]["bridge"]["name"] == say("robot")
+        assert session.publisher.view["link"]["bridge"]["text"] == say("absent")
         robot.appear()
-        await when(lambda: one.link_verdict.permitted)
-        assert isinstance(one.peer, TinyPeer)
-        assert one.peer.said == [f"found {robot.zid}"]
-        assert (await one.check_readiness()).permitted
+        await when(lambda: session.link_verdict.permitted)
+        assert isinstance(session.peer, TinyPeer)
+        assert session.peer.said == [f"found {robot.zid}"]
+        assert (await session.check_readiness()).permitted
 
-        shown = one.publisher
+        shown = session.publisher
         await when(lambda: robot.say(True) and shown.view["interlocks"]["operation"]["enabled"])
-        await when(lambda: one.link.has_reader("go"))
+        await when(lambda: session.link.has_reader("go"))
         for number, text in enumerate(("one", "two"), 1):
-            receipt = await one.presses.press("go", {"message": text}, text, FROM)
+            receipt = await session.presses.press("go", {"message": text}, text, FROM)
             assert receipt.outcome == "published", receipt.reason
             await when(partial(robot.has_heard, number))
-        zid = one.link.zid.encode()
+        zid = session.link.zid.encode()
         assert robot.heard == [("one", b"1 of " + zid), ("two", b"2 of " + zid)]
 
-        await when(lambda: one.publisher.view["widgets"]["reset"]["enabled"])
-        receipt = await one.presses.press("reset", {}, "p3", FROM)
+        await when(lambda: session.publisher.view["widgets"]["reset"]["enabled"])
+        receipt = await session.presses.press("reset", {}, "p3", FROM)
         assert receipt.outcome == "succeeded", receipt.reason
         assert robot.attachments == [b"1 of " + zid]
-        own = {f"tiny/{one.link.zid}/node/web_ui", f"tiny/{one.link.zid}/MP/go/std_msgs%msg%String"}
+        own = {
+            f"tiny/{session.link.zid}/node/web_ui",
+            f"tiny/{session.link.zid}/MP/go/std_msgs%msg%String",
+        }
         assert own <= await asyncio.to_thread(robot.nodes)
 
         robot.nodes_alive.pop().undeclare()  # one of the two nodes of this session ends
         robot.say(False)  # arrives after that
         await when(lambda: not shown.view["interlocks"]["operation"]["enabled"])
-        assert one.robot.reading(ENABLED).value("data") is False
-        assert one.link_verdict.permitted
-        assert one.peer.said == [f"found {robot.zid}"]
+        assert session.robot.reading(ENABLED).value("data") is False
+        assert session.link_verdict.permitted
+        assert session.peer.said == [f"found {robot.zid}"]
         assert shown.view["widgets"]["reset"]["enabled"]
         robot.nodes_alive.pop().undeclare()
-        await when(lambda: one.link_verdict.code == "service_unavailable")
-        assert one.peer.said == [f"found {robot.zid}", f"lost {robot.zid}"]
-        await one.stop()
+        await when(lambda: session.link_verdict.code == "service_unavailable")
+        assert session.peer.said == [f"found {robot.zid}", f"lost {robot.zid}"]
+        await session.stop()
 
     asyncio.run(scene())
 

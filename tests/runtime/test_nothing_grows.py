@@ -144,7 +144,7 @@ def side_by_side(kiosk: Server, counts: dict[str, int]) -> Counter[str]:
     """Outcomes of so many calls of each service, all services at once."""
     with ThreadPoolExecutor(len(counts)) as pool:
         done = [pool.submit(pressed, kiosk, name, times) for name, times in counts.items()]
-    return sum((one.result() for one in done), Counter())
+    return sum((task.result() for task in done), Counter())
 
 
 def rest(kiosk: Server) -> tuple[dict[str, int], int]:

@@ -58,7 +58,7 @@ def flag(value: bool) -> bytes:
 
 
 def sample(payload: bytes, *between: bytes) -> Sample:
-    passed = tuple(SkippedPayload(one, NOW, NOW) for one in between)
+    passed = tuple(SkippedPayload(payload, NOW, NOW) for payload in between)
     return Sample(payload, 9, NOW, NOW, BRIDGE, skipped_payloads=passed)
 
 
@@ -79,11 +79,11 @@ def session_of(panel: Panel, endpoint: str) -> RobotSession:
 
 def taken(steps: Iterable[Updates], page: "Page") -> Updates:
     """What is taken in, with each step shown; the last of them."""
-    found = []
+    seen = []
     for updates in steps:
         page.show()
-        found.append(updates)
-    return found[-1]
+        seen.append(updates)
+    return seen[-1]
 
 
 class Page:
@@ -251,7 +251,7 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
                 await asyncio.sleep(0.01)
 
     async def lost() -> None:
-        one = session_of(small_panel(), "tcp/127.0.0.1:1")
+        session = session_of(small_panel(), "tcp/127.0.0.1:1")
 
         def renew() -> None:
             renewals.append("renewed")
@@ -259,17 +259,17 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
             if len(renewals) == 2:
                 raise RuntimeError("no session")
 
-        monkeypatch.setattr(one.link, "renew", renew)
-        one.renew()
+        monkeypatch.setattr(session.link, "renew", renew)
+        session.renew()
         await renewed(1)
-        one.renew()
+        session.renew()
         lost_again.set()
         await renewed(3)
         await asyncio.sleep(0.1)
         assert len(renewals) == 3
-        one.renew()
+        session.renew()
         await renewed(4)
-        await one.stop()
+        await session.stop()
 
     asyncio.run(lost())
     assert len(renewals) == 4
@@ -303,44 +303,46 @@ def test_replacing_the_session_ends_holds_first(
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
         with in_process(panel) as there:
-            one = session_of(panel, there)
-            await one.start()
+            session = session_of(panel, there)
+            await session.start()
             sent: list[float] = []
-            put = one.link.put
+            put = session.link.put
 
             def noted(key: str, payload: bytes) -> None:
                 if key == "jog":
                     sent.append(INTERFACES.decode(POINT, payload).x)
                 put(key, payload)
 
-            monkeypatch.setattr(one.link, "put", noted)
+            monkeypatch.setattr(session.link, "put", noted)
             ended: list[Receipt] = []
             async with asyncio.timeout(ENOUGH_S):
-                while not one.publisher.view["widgets"]["jog"]["enabled"]:
+                while not session.publisher.view["widgets"]["jog"]["enabled"]:
                     await asyncio.sleep(0.05)
-                hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
+                hold = session.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
                 assert isinstance(hold, ActiveHold)
-                lost = one.robot.key("/last_heard")
-                monkeypatch.setattr(type(one.robot.graph), "is_unrouted", lambda _, key: key == lost)
+                lost = session.robot.key("/last_heard")
+                monkeypatch.setattr(
+                    type(session.robot.graph), "is_unrouted", lambda _, key: key == lost
+                )
                 for number in itertools.count(1):
                     if ended:
                         break
-                    one.holds.beat(hold, number, time.monotonic())
+                    session.holds.beat(hold, number, time.monotonic())
                     await asyncio.sleep(0.05)
             assert sent[-1] == 0.0
             assert "is being reconnected" in str(ended[0].reason)
-            await one.stop()
+            await session.stop()
 
     asyncio.run(scene())
 
 
 def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
-        one = session_of(small_panel(), "tcp/127.0.0.1:1")
-        permits(one.robot)
-        by = one.press_guard.context_for("free", Principal(anonymous("192.0.2.1")))
+        session = session_of(small_panel(), "tcp/127.0.0.1:1")
+        permits(session.robot)
+        by = session.press_guard.context_for("free", Principal(anonymous("192.0.2.1")))
         assert not by.grounds().ending
-        await one.stop()
+        await session.stop()
         assert by.grounds().ending
 
     asyncio.run(pressed())

@@ -81,11 +81,11 @@ class Cell:
     def note_the_order(self) -> None:
         """Notes in which order things are judged and shown from now on."""
 
-        def noted(owner: Any, name: str, what: str) -> None:
+        def noted(owner: Any, name: str, event: str) -> None:
             real = getattr(owner, name)
 
             def note(*args: Any, **named: Any) -> Any:
-                self.order.append(what)
+                self.order.append(event)
                 return real(*args, **named)
 
             self._monkeypatch.setattr(owner, name, note)

@@ -22,7 +22,7 @@ def entity(
 
 def node(zid: str, participant: str, name: str, **lists: list[str]) -> tuple[str, Any]:
     answer = {
-        part: [{"name": one, "type": "x/msg/Y"} for one in names] for part, names in lists.items()
+        part: [{"name": name, "type": "x/msg/Y"} for name in names] for part, names in lists.items()
     }
     return f"@/{zid}/ros2/node/{participant}{name}", answer
 
@@ -123,19 +123,19 @@ def test_services_and_who_serves_them() -> None:
     ("role", "name", "part"), [("SS", "/reset", ""), ("AS", "/walk", "/_action/send_goal")]
 )
 def test_a_server_has_the_hashes_of_what_it_exchanges(role: str, name: str, part: str) -> None:
-    given = f"RIHS01_{'1' * 64}"
+    type_hash = f"RIHS01_{'1' * 64}"
     place = f"rq{name}{part}Request"
     answer = {
         "topic_name": place,
         "type_name": "x::srv::dds_::Y_Request_",
-        "qos": {"user_data": list(f"serviceid= 1.2;typehash={given};".encode())},
+        "qos": {"user_data": list(f"serviceid= 1.2;typehash={type_hash};".encode())},
     }
     robot = read(
         tokens=["@/a/@ros2_lv", token("a", role, name[1:], "x/srv/Y")],
         entities=[(f"@/a/ros2/dds/{CYCLONE}/reader/{CYCLONE[:30]}03/{place}", answer)],
     )
     (server,) = (*robot.services, *robot.actions)
-    assert server.hashes == (("x/srv/Y_Request", given),)
+    assert server.hashes == (("x/srv/Y_Request", type_hash),)
     assert robot.topics == ()
 
 

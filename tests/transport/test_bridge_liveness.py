@@ -29,7 +29,7 @@ def network(silence: LivenessDetector, took_s: float, begin: float, count: int) 
     """Questions of which each is answered after so long; returns when the last one was."""
     events = [(begin + n * EVERY_S, None) for n in range(count)]
     heard = [(sent_at + took_s, sent_at) for sent_at, _ in events]
-    for now, sent_at in sorted([*events, *heard], key=lambda one: one[0]):
+    for now, sent_at in sorted([*events, *heard], key=lambda event: event[0]):
         if sent_at is None:
             silence.on_query(now)
         else:
@@ -145,9 +145,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bridge_liveness, "STALLED_S", 60.0)
 
 
-async def until(what: Callable[[], object]) -> None:
+async def until(condition: Callable[[], object]) -> None:
     async with asyncio.timeout(5):
-        while not what():
+        while not condition():
             await asyncio.sleep(0.005)
 
 

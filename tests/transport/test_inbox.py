@@ -73,7 +73,7 @@ def test_parts_of_a_list_are_kept_and_wait_for_a_frame(inbox: Inbox, woken: list
         inbox.put("parts", said, None)
     sample = inbox.drain().samples["parts"]
     assert woken == [False]
-    assert [one.payload for one in sample.skipped_payloads] == [b"arm", b"gripper"]
+    assert [skipped.payload for skipped in sample.skipped_payloads] == [b"arm", b"gripper"]
 
 
 def test_the_graph_and_the_link_are_immediate(inbox: Inbox, woken: list[bool]) -> None:
@@ -136,12 +136,12 @@ def test_of_a_lossless_topic_each_change_in_between_is_kept(inbox: Inbox) -> Non
     for said in (b"yes", b"no", b"no", b"yes"):
         inbox.put("permit", said, None)
     sample = inbox.drain().samples["permit"]
-    assert ([one.payload for one in sample.skipped_payloads], sample.overrun) == (
+    assert ([skipped.payload for skipped in sample.skipped_payloads], sample.overrun) == (
         [b"yes", b"no"],
         False,
     )
-    assert sorted(one.at for one in sample.skipped_payloads) == [
-        one.at for one in sample.skipped_payloads
+    assert sorted(skipped.at for skipped in sample.skipped_payloads) == [
+        skipped.at for skipped in sample.skipped_payloads
     ]
     assert sample.skipped_payloads[-1].at <= sample.at
 
@@ -153,7 +153,7 @@ def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) ->
     for number in range(UNSEEN_MOST + 2):
         inbox.put("permit", b"%d" % number, None)
     sample = inbox.drain().samples["permit"]
-    assert [one.payload for one in sample.skipped_payloads] == [
+    assert [skipped.payload for skipped in sample.skipped_payloads] == [
         b"%d" % n for n in range(1, UNSEEN_MOST + 1)
     ]
     assert sample.overrun
@@ -168,7 +168,7 @@ def test_of_a_recorded_topic_every_sample_is_kept_in_order(inbox: Inbox) -> None
         inbox.put("taped", b"%d" % number, None)
         inbox.put("heard", b"x", None)
     changes = inbox.drain()
-    assert [(key, one.payload) for key, one in changes.kept] == [
+    assert [(key, kept.payload) for key, kept in changes.kept] == [
         ("taped", b"0"),
         ("taped", b"1"),
         ("taped", b"2"),

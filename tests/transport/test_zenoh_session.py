@@ -194,7 +194,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
         took.append(time.monotonic() - began)
         peer.kill()
         link.close()
-    long = [one for one in took if one > 0.1]
+    long = [seconds for seconds in took if seconds > 0.1]
     assert len(long) == 1, "it waits for room once"
     assert long[0] < 2 * BLOCKED_MOST_US / 1e6
 
@@ -263,12 +263,15 @@ def test_lossless_topic_keeps_every_sample_between_two_drains(
     lossless, other = samples["a"], samples["b"]
     assert bytes(lossless.payload) == bytes(other.payload) == b"yes"
     changes = [b"yes", b"no", b"yes", *(b"%d" % n for n in range(100))]
-    assert [bytes(one.payload) for one in lossless.skipped_payloads] == changes
+    assert [bytes(skipped.payload) for skipped in lossless.skipped_payloads] == changes
     assert other.skipped_payloads == ()
     for payload in (b"yes", b"no", b"no", b"yes"):
         put("a", payload)
     put_end(b"second")
-    assert [bytes(one.payload) for one in link.drain().samples["a"].skipped_payloads] == [b"yes", b"no"]
+    assert [bytes(skipped.payload) for skipped in link.drain().samples["a"].skipped_payloads] == [
+        b"yes",
+        b"no",
+    ]
 
 
 def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
@@ -285,7 +288,7 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
 
     def all_heard() -> bool:
         if sample := link.drain().samples.get("a"):
-            heard.extend(bytes(one.payload) for one in sample.skipped_payloads)
+            heard.extend(bytes(skipped.payload) for skipped in sample.skipped_payloads)
             heard.append(bytes(sample.payload))
         return len(heard) >= 26
 

@@ -82,11 +82,11 @@ def test_a_torn_end_is_dropped_and_what_was_before_it_stays(tmp_path: Path, torn
     wal = killed_while_writing(tmp_path / "a", tmp_path / "b")
     wal.write_bytes(wal.read_bytes()[:-torn])
     file = TrendFile(tmp_path / "b")
-    found = list(file.buckets(FIELD, 1, 0.0))
-    assert found in (buckets(50), buckets(100))
-    assert found == buckets(50) or torn > 4_000
+    stored = list(file.buckets(FIELD, 1, 0.0))
+    assert stored in (buckets(50), buckets(100))
+    assert stored == buckets(50) or torn > 4_000
     file.write({FIELD: {1: buckets(1, first=200)}}, {}, NOW)
-    assert list(file.buckets(FIELD, 1, 0.0)) == [*found, *buckets(1, first=200)]
+    assert list(file.buckets(FIELD, 1, 0.0)) == [*stored, *buckets(1, first=200)]
     file.close()
 
 
@@ -115,16 +115,18 @@ class Cell:
     def peaks(self) -> list[float]:
         now = time.time() + 10
         self.robot.history.set_clock(time.monotonic(), time.time())
-        return [one.high for one in self.robot.history.columns(self.field, now - 3_600, now, 600.0)]
+        return [
+            column.high for column in self.robot.history.columns(self.field, now - 3_600, now, 600.0)
+        ]
 
 
 def run(work: Coroutine[Any, Any, None]) -> None:
     asyncio.run(work)
 
 
-async def settled(what: Any) -> None:
+async def settled(condition: Any) -> None:
     async with asyncio.timeout(20):
-        while not what():
+        while not condition():
             await asyncio.sleep(0.01)
 
 
@@ -202,12 +204,12 @@ def test_while_the_disk_fails_trends_go_on_in_memory_and_nothing_is_left_out_aft
     whole = TrendFile.write
     full = [True]
 
-    def write(self: TrendFile, *given: Any) -> None:
+    def write(self: TrendFile, *arguments: Any) -> None:
         if full[0]:
             error = sqlite3.OperationalError("database or disk is full")
             error.sqlite_errorname = "SQLITE_FULL"
             raise error
-        whole(self, *given)
+        whole(self, *arguments)
 
     monkeypatch.setattr(TrendFile, "write", write)
 

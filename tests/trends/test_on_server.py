@@ -54,12 +54,12 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def history(server: Server, **query: Any) -> dict[str, Any]:
     answer = server.http.get(PATH, params={"span_s": 60, **query})
     assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    values: dict[str, Any] = answer.json()
+    return values
 
 
 def columns(server: Server, pen: int = 0, **query: Any) -> list[list[float]]:
-    return [one for one in history(server, **query)["pens"][pen] if one]
+    return [column for column in history(server, **query)["pens"][pen] if column]
 
 
 def test_the_history_of_each_pen_is_read(server: Server) -> None:
@@ -67,7 +67,7 @@ def test_the_history_of_each_pen_is_read(server: Server) -> None:
     answer = history(server, points=100)
     assert answer["width_s"] == 0.6
     assert abs(answer["now"] - answer["end"]) < 1
-    numbers = [one[0] for one in answer["pens"][0] if one]
+    numbers = [column[0] for column in answer["pens"][0] if column]
     assert numbers == sorted(set(numbers))
     assert (numbers[-1] + 1) * 0.6 > answer["end"] - 5
     assert answer["pens"][0][0] is None
@@ -76,10 +76,11 @@ def test_the_history_of_each_pen_is_read(server: Server) -> None:
 def test_follower_gets_new_columns(server: Server) -> None:
     until(lambda: len(columns(server)) > 5, "there are values")
     last = columns(server)[-1][0]
-    found = until(
-        lambda: [one for one in columns(server, since=last + 1) if one[0] > last], "there are new ones"
+    columns_after = until(
+        lambda: [column for column in columns(server, since=last + 1) if column[0] > last],
+        "there are new ones",
     )
-    assert len(found) < 50
+    assert len(columns_after) < 50
 
 
 def test_a_time_that_is_over_does_not_change(server: Server) -> None:
@@ -87,7 +88,7 @@ def test_a_time_that_is_over_does_not_change(server: Server) -> None:
     end = history(server)["end"] - 2.0
     first = columns(server, end=end)
     until(lambda: history(server)["end"] > end + 3.0, "time passes")
-    assert [one for one in columns(server, end=end) if one in first] == first
+    assert [column for column in columns(server, end=end) if column in first] == first
     assert history(server, end=4e9)["end"] < 4e9
 
 
@@ -141,13 +142,13 @@ def test_a_killed_server_has_the_values_from_before(
     second = servers(demo_server(tmp_path, PANEL, KIOSK_DATA=data))
     until(lambda: columns(second, span_s=600, points=600)[-1][0] > before[-1][0] + 1, "it records")
     answer = history(second, span_s=600, points=600)["pens"][0]
-    after = {one[0]: one for one in answer if one}
+    after = {column[0]: column for column in answer if column}
     # What is written every 5 s is there, as it was; columns begin a little elsewhere after a restart.
-    found = [one for one in before if one[0] in after]
-    assert len(found) >= 2
-    assert found[0][0] <= before[1][0]
-    assert all(len(one) == 2 or abs(after[one[0]][-1] - one[-1]) < 5 for one in found)
-    begins = [answer[i + 1][0] for i, one in enumerate(answer[:-1]) if one is None]
+    survived = [column for column in before if column[0] in after]
+    assert len(survived) >= 2
+    assert survived[0][0] <= before[1][0]
+    assert all(len(column) == 2 or abs(after[column[0]][-1] - column[-1]) < 5 for column in survived)
+    begins = [answer[i + 1][0] for i, column in enumerate(answer[:-1]) if column is None]
     assert begins[-1] >= before[-1][0], "the time without a server is a gap"
 
 
