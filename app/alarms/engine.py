@@ -98,6 +98,9 @@ class AlarmEngine:
         """How many entries of robots were not kept, as there were too many."""
         return self._refused
 
+    def now(self) -> Moment:
+        return self._clock()
+
     def topics_changed(self, robot: str, keys: Iterable[str]) -> None:
         """Messages arrived on topics of a robot."""
         for key in keys:

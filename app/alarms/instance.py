@@ -9,6 +9,7 @@ from app.alarms.delays import LIMIT_LEVELS, DelayedCondition, Delays, Limit, Lim
 from app.alarms.entries import Entry
 from app.alarms.states import AlarmKind
 from app.alarms.status import NORMAL, AlarmRules, AlarmStatus
+from app.i18n import TextLike
 from app.panel.alarm import Alarm
 from app.panel.model import Panel
 
@@ -87,6 +88,13 @@ class AlarmInstance:
             return LIMIT_LEVELS[limit.name]
         levels = len(self.definition.rules.priorities)
         return max(1, min(self.entry.level, levels)) if self.entry else 1
+
+    @property
+    def text(self) -> TextLike:
+        """What it says: the robot's own text, or that of the panel file."""
+        if self.entry is not None:
+            return self.entry.text
+        return self.definition.alarm.text or self.definition.id
 
     @property
     def priority(self) -> int:

@@ -15,7 +15,9 @@ from typing import Any, Final, Literal, NamedTuple, Self
 
 from app.i18n import ENGLISH, TextLike, render, text_in
 
-Kind = Literal["began", "pressed", "closed", "corrected", "refused", "control", "removed", "resumed"]
+Kind = Literal[
+    "began", "pressed", "closed", "corrected", "refused", "control", "alarm", "removed", "resumed"
+]
 
 LONGEST_VALUES: Final = 2000
 LONGEST_TEXT: Final = 500

@@ -176,7 +176,7 @@ class Alarm(Description):
         """Whether it is an alarm of this robot; None is the robot without a name."""
         return self.robot in (None, robot)
 
-    def topic_sources(self) -> Iterator[TopicSource]:
+    def sources(self) -> Iterator[TopicSource]:
         """The topic that it listens to."""
         topic, type_name = self.topic_name, self.topic_type
         if topic is not None and type_name is not None:

@@ -265,12 +265,10 @@ class Panel(Description):
         for condition in self.conditions:
             field = (condition.field,)
             yield TopicSource(condition.topic, condition.type, condition.qos, field)
-        for alarm in self.alarms:
-            yield from alarm.topic_sources()
-        for display in self.displays:
-            yield from display.sources()
-        for command in self.commands:
-            yield from command.sources()
+        listeners: tuple[Alarm | DisplayWidget | Command, ...]
+        listeners = (*self.alarms, *self.displays, *self.commands)
+        for listener in listeners:
+            yield from listener.sources()
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""

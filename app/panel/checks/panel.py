@@ -255,7 +255,7 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", interlock) for i, interlock in enumerate(panel.interlocks)]
     for i, alarm in enumerate(panel.alarms):
-        places.extend((f"alarm[{i}]", source) for source in alarm.topic_sources())
+        places.extend((f"alarm[{i}]", source) for source in alarm.sources())
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())

@@ -1,0 +1,116 @@
+"""Acts on alarms: the rows of acknowledge, shelve, unshelve, out of service, in service and reset.
+
+`ActRequest.object` is the alarm's id. `values` has the `occurrence` that the screen showed, the
+`reason` of a shelf or of out of service, and `until`, when a shelf ends (RFC 3339).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from app.alarms.engine import AlarmEngine
+from app.alarms.instance import Definition
+from app.alarms.status import (
+    ActResult,
+    AlarmStatus,
+    Moment,
+    TakenOut,
+    acknowledge,
+    remove_from_service,
+    reset,
+    return_to_service,
+    shelve,
+    unshelve,
+)
+from app.commands.acts import Act, ActRequest, Applied, server_permits
+from app.errors import InputError
+from app.i18n import Text, TextLike, say
+
+LONGEST_REASON: Final = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmChange(Applied):
+    """What an act did to the alarm with this text."""
+
+    name: TextLike = ""
+
+
+StatusChange = Callable[[AlarmStatus, Definition, ActRequest, Moment], ActResult]
+
+
+def _changes(change: StatusChange) -> Callable[[AlarmEngine, ActRequest], AlarmChange]:
+    """`Act.apply` from a function that changes the status of one alarm."""
+
+    def apply(engine: AlarmEngine, request: ActRequest) -> AlarmChange:
+        alarm, now = engine.alarms.get(request.object), engine.now()
+        if alarm is None:
+            return AlarmChange(say("alarm_gone"))
+
+        def changed(status: AlarmStatus, definition: Definition) -> ActResult:
+            return change(status, definition, request, now)
+
+        result = engine.act(request.object, request.act, changed, str(request.who))
+        return AlarmChange(result.refusal if result else None, name=alarm.text)
+
+    return apply
+
+
+def _acknowledge(
+    status: AlarmStatus, definition: Definition, request: ActRequest, _: Moment
+) -> ActResult:
+    occurrence = request.values.get("occurrence")
+    if not isinstance(occurrence, int) or isinstance(occurrence, bool):
+        raise InputError("occurrence must be the number that the screen showed")
+    return acknowledge(status, definition.rules, occurrence)
+
+
+def _shelve(status: AlarmStatus, definition: Definition, request: ActRequest, now: Moment) -> ActResult:
+    until = now.monotonic + _until(request) - now.wall
+    return shelve(status, definition.rules, TakenOut(now, _reason(request), str(request.who), until))
+
+
+def _remove(status: AlarmStatus, _: Definition, request: ActRequest, now: Moment) -> ActResult:
+    return remove_from_service(status, TakenOut(now, _reason(request), str(request.who)))
+
+
+def _reason(request: ActRequest) -> str:
+    return str(request.values.get("reason", ""))[:LONGEST_REASON]
+
+
+def _until(request: ActRequest) -> float:
+    """In seconds since the epoch; InputError if it is no time with an offset."""
+    try:
+        until = datetime.fromisoformat(str(request.values.get("until")))
+    except ValueError:
+        until = datetime.min
+    if until.tzinfo is None:
+        raise InputError("until must be a time of RFC 3339, like 2026-05-04T14:00:00+02:00")
+    return until.timestamp()
+
+
+def _entry(code: str) -> Callable[[AlarmChange], Text]:
+    return lambda change: say(code, name=change.name)
+
+
+ALARM_ACTS: Final[Mapping[str, Act[AlarmEngine, AlarmChange]]] = {
+    "acknowledge": Act(server_permits, _changes(_acknowledge), _entry("log_done_acknowledge")),
+    "shelve": Act(server_permits, _changes(_shelve), _entry("log_done_shelve")),
+    "unshelve": Act(
+        server_permits,
+        _changes(lambda status, definition, _, now: unshelve(status, definition.rules, now)),
+        _entry("log_done_unshelve"),
+    ),
+    "out_of_service": Act(server_permits, _changes(_remove), _entry("log_done_out_of_service")),
+    "in_service": Act(
+        server_permits,
+        _changes(lambda status, definition, _, now: return_to_service(status, definition.rules, now)),
+        _entry("log_done_in_service"),
+    ),
+    "reset": Act(
+        server_permits,
+        _changes(lambda status, definition, _, __: reset(status, definition.rules)),
+        _entry("log_done_reset"),
+    ),
+}
