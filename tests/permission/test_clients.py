@@ -21,7 +21,7 @@ def token(number: int) -> str:
 def test_a_token_is_random_and_long() -> None:
     tokens = {new_token() for _ in range(100)}
     assert len(tokens) == 100
-    assert all(TOKEN.fullmatch(one) for one in tokens)
+    assert all(TOKEN.fullmatch(token) for token in tokens)
 
 
 def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> None:

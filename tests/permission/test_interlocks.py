@@ -102,8 +102,8 @@ def test_without_a_way_to_the_robot_everything_is_locked(
     robot: RobotState, broken: Callable[[RobotState], None], verdict: Verdict
 ) -> None:
     broken(robot)
-    for found in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
-        assert found == verdict
+    for judgement in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
+        assert judgement == verdict
 
 
 def test_with_a_way_commands_can_reach_the_robot(robot: RobotState) -> None:

@@ -67,7 +67,9 @@ def test_each_verdict_and_what_is_shown_is_that_of_the_button_alone(
         permits(robot, permitted)
     now = NOW + later
     link = link_verdict(robot, now)
-    interlocks = {one.id: interlock_verdict(one, robot, now, link) for one in panel.interlocks}
+    interlocks = {
+        interlock.id: interlock_verdict(interlock, robot, now, link) for interlock in panel.interlocks
+    }
     grounds = ServerConditions(control, log, ending)
     verdicts = permissions(panel, robot, now, link, interlocks, grounds)
     for widget in panel.commands:
@@ -83,10 +85,12 @@ def test_a_check_that_differs_between_buttons_is_made_for_each(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     alarm = Verdict(False, "alarm", "An alarm locks this.")
-    row = Check("alarm", lambda of: alarm if of.widget.id == "b3" else None)
+    row = Check("alarm", lambda request: alarm if request.widget.id == "b3" else None)
     monkeypatch.setattr(press_permission, "CHECKS", (*CHECKS, row))
     panel = panel_of(MESSAGE, *buttons(6), further=[SECOND])
     robot = robot_there(panel)
     permits(robot)
     shown = build_view(panel, robot, NOW).view["widgets"]
-    assert [name for name, one in shown.items() if one.get("reason") == alarm.reason] == ["b3"]
+    assert [name for name, attributes in shown.items() if attributes.get("reason") == alarm.reason] == [
+        "b3"
+    ]

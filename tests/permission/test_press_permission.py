@@ -43,7 +43,7 @@ def question(**more: Any) -> PermissionRequest:
 @pytest.fixture
 def alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     """One more row: what an alarm that locks will be."""
-    row = Check("alarm", lambda of: ALARM if of.widget.id != "message" else None)
+    row = Check("alarm", lambda request: ALARM if request.widget.id != "message" else None)
     monkeypatch.setattr(press_permission, "CHECKS", (*CHECKS[:3], row, *CHECKS[3:]))
 
 

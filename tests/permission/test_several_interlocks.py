@@ -115,8 +115,8 @@ def test_what_is_against_the_command_itself_is_reported_first() -> None:
 
 
 def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
-    one = {**FREE, "id": "single", "topic": "/single", "interlock": "operation"}
-    panel = cell(MESSAGE, {**GUARDED, "interlock": BOTH}, one)
+    single = {**FREE, "id": "single", "topic": "/single", "interlock": "operation"}
+    panel = cell(MESSAGE, {**GUARDED, "interlock": BOTH}, single)
     robot = robot_there(panel)
     closes(robot, False)
     shown = build_view(panel, robot, NOW).view["widgets"]

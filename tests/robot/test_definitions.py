@@ -102,9 +102,9 @@ def test_a_publisher_without_a_token_counts_when_the_nodes_are_read(robot: Robot
     announce(robot, "/heard", TEXT, SAME[TEXT])
     first = publisher("/heard", TEXT, SAME[TEXT], node="/first")
     read(robot, first, publisher("/heard", TEXT, OTHER, node="/second"))
-    found = robot.difference("MP", "heard")
-    assert found is not None
-    assert (found.node, found.theirs, found.ours) == ("/second", OTHER, SAME[TEXT])
+    difference = robot.difference("MP", "heard")
+    assert difference is not None
+    assert (difference.node, difference.theirs, difference.ours) == ("/second", OTHER, SAME[TEXT])
     read(robot, first)
     assert robot.difference("MP", "heard") is None
 

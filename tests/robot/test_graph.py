@@ -303,7 +303,7 @@ def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Liv
 
 def test_of_nodes_that_came_and_went_nothing_is_kept(graph: LiveGraph) -> None:
     def sizes() -> dict[str, int]:
-        return {name: len(one) for name, one in vars(graph).items() if isinstance(one, Sized)}
+        return {name: len(part) for name, part in vars(graph).items() if isinstance(part, Sized)}
 
     before = sizes()
     for number in range(100):
@@ -318,8 +318,8 @@ def test_ten_thousand_nodes_that_the_panel_does_not_name_cost_next_to_nothing() 
     graph = LiveGraph(DIALECT, KIOSK, keys=["a"])
     others = [topic_token(BRIDGE, "MP", f"some/topic{number}", TEXT) for number in range(10_000)]
     began = time.thread_time()
-    for one in others:
-        graph.apply_token(one, True)
+    for other in others:
+        graph.apply_token(other, True)
     assert time.thread_time() - began < 0.05
     graph.apply_token(bridge_token(BRIDGE), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)

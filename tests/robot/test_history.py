@@ -53,14 +53,16 @@ def test_no_peak_is_lost_at_any_zoom(
     reach = max(width, next((w for w, _ in bucket_counts(DAY) if w > width), width))
     for at, value in known:
         if end - span <= at < end:
-            near = [one for one in columns if abs((one.number + 0.5) * width - at) <= width + reach]
-            assert any(one.low <= value <= one.high for one in near), (at, value, columns)
-    numbers = [one.number for one in columns]
+            near = [
+                column for column in columns if abs((column.number + 0.5) * width - at) <= width + reach
+            ]
+            assert any(column.low <= value <= column.high for column in near), (at, value, columns)
+    numbers = [column.number for column in columns]
     assert numbers == sorted(set(numbers))
     assert len(columns) <= points + 3
-    for one in columns:
-        assert one.low <= one.last <= one.high
-        assert {one.low, one.high} <= {value for _, value in known}
+    for column in columns:
+        assert column.low <= column.last <= column.high
+        assert {column.low, column.high} <= {value for _, value in known}
 
 
 @given(samples)
@@ -74,14 +76,14 @@ def test_what_is_added_to_columns_is_in_those_that_are_asked_for_next(
     for step, value in steps:
         at += step / 10
         history.add(at, value)
-        found = list(history.columns(max(at - span, since * width), at + 0.001, width))
-        kept = {number: one for number, one in kept.items() if number < since}
-        kept |= {one.number: one for one in found if one.number >= since}
+        columns = list(history.columns(max(at - span, since * width), at + 0.001, width))
+        kept = {number: column for number, column in kept.items() if number < since}
+        kept |= {column.number: column for column in columns if column.number >= since}
         since = math.floor((at - 1.0) / width) - 1
     begin = math.ceil((at - span) / width) + 1
-    whole = {one.number: one for one in history.columns(at - span, at + 0.001, width)}
-    assert [one for number, one in kept.items() if number >= begin] == [
-        one for number, one in whole.items() if number >= begin
+    whole = {column.number: column for column in history.columns(at - span, at + 0.001, width)}
+    assert [column for number, column in kept.items() if number >= begin] == [
+        column for number, column in whole.items() if number >= begin
     ]
 
 
@@ -95,9 +97,9 @@ def test_one_sample_out_of_a_day_is_seen_in_every_window() -> None:
     end = START + DAY
     for span in (DAY, DAY * 0.95, DAY * 0.9):
         columns = list(history.columns(end - span, end, span / 300))
-        assert max(one.high for one in columns) == 99.0, span
+        assert max(column.high for column in columns) == 99.0, span
     near = list(history.columns(START + 9_000, START + 11_000, 2_000 / 300))
-    assert max(one.high for one in near) == 99.0
+    assert max(column.high for column in near) == 99.0
 
 
 def test_memory_has_an_end() -> None:
@@ -107,8 +109,8 @@ def test_memory_has_an_end() -> None:
         history.add(START + number, float(number))
     for number in range(3 * RAW_SAMPLES):
         history.add(START + 2 * DAY + number / 10_000, 1.0)
-    lists = {id(one): one for level in (history.raw, *history.levels)
-             for one in (level.at, level.low, level.high, level.last, level.gaps)}  # fmt: skip
+    lists = {id(values): values for level in (history.raw, *history.levels)
+             for values in (level.at, level.low, level.high, level.last, level.gaps)}  # fmt: skip
     assert sum(map(sys.getsizeof, lists.values())) <= history_bytes(3_600.0)
     for level in history.levels:
         assert len(level.at) <= level.most * 9 // 8 + 1
@@ -135,25 +137,25 @@ def test_no_line_is_drawn_over_a_silence(silence: float) -> None:
     for points in (50, 500):
         width = (end - START) / points
         columns = list(history.columns(START, end, width))
-        begins = [one.number for one in columns[1:] if one.gap]
+        begins = [column.number for column in columns[1:] if column.gap]
         if width < silence / 2:
             assert [number * width - START for number in begins] == pytest.approx(
                 [60.0 + silence], abs=width + 1
             )
 
 
-@pytest.mark.parametrize("what", ["nan", "interrupted"])
-def test_no_line_is_drawn_over_what_is_unknown(what: str) -> None:
+@pytest.mark.parametrize("gap", ["nan", "interrupted"])
+def test_no_line_is_drawn_over_what_is_unknown(gap: str) -> None:
     history = FieldHistory(DAY, MAX_AGE)
     for number in range(20):
         if number == 10:
-            if what == "nan":
+            if gap == "nan":
                 history.add(START + number - 0.5, math.nan)
             else:
                 history.interrupt()
         history.add(START + number, 1.0)
     columns = list(history.columns(START, START + 20, 0.1))
-    assert [round(one.number * 0.1 - START) for one in columns if one.gap] == [0, 10]
+    assert [round(column.number * 0.1 - START) for column in columns if column.gap] == [0, 10]
 
 
 def test_a_line_comes_in_from_before_the_window() -> None:
@@ -162,7 +164,7 @@ def test_a_line_comes_in_from_before_the_window() -> None:
         history.add(START + 30.0 * number, float(number))
     (before, *inside) = history.columns(START + 100, START + 200, 1.0)
     assert before.last == 3.0
-    assert [one.last for one in inside] == [4.0, 5.0, 6.0]
+    assert [column.last for column in inside] == [4.0, 5.0, 6.0]
 
 
 def test_a_level_drops_the_oldest_only() -> None:
@@ -191,7 +193,7 @@ def history_of(wall: float) -> tuple[History, FieldHistory]:
 
 
 def places(columns: list[Column], width: float) -> list[float]:
-    return [one.number * width for one in columns]
+    return [column.number * width for column in columns]
 
 
 @pytest.mark.parametrize("jump", [-7_200.0, 7_200.0])
@@ -203,10 +205,10 @@ def test_what_was_recorded_goes_with_a_clock_that_is_set(jump: float) -> None:
     whole.set_clock(1_010.0, START + 10.0 + jump)
     for number in range(10, 20):
         field.add(whole.time(1_000.0 + number), float(number))
-    found = list(whole.columns(field, START + jump, START + jump + 20, 1.0))
-    assert [one.last for one in found] == [float(number) for number in range(20)]
-    assert places(found, 1.0) == [START + jump + number for number in range(20)]
-    assert not [one for one in found[1:] if one.gap]
+    columns = list(whole.columns(field, START + jump, START + jump + 20, 1.0))
+    assert [column.last for column in columns] == [float(number) for number in range(20)]
+    assert places(columns, 1.0) == [START + jump + number for number in range(20)]
+    assert not [column for column in columns[1:] if column.gap]
 
 
 def test_a_clock_that_drifts_moves_nothing() -> None:
@@ -220,8 +222,8 @@ def test_what_is_from_earlier_runs_keeps_its_time() -> None:
     field.levels[0].put_before(buckets(START - 20, START - 10))
     field.add(whole.time(1_001.0), 3.0)
     whole.set_clock(1_002.0, START + 2 + 3_600)
-    found = list(whole.columns(field, START - 30, START + 3_700, 1.0))
-    assert places(found, 1.0) == [START - 20, START - 10, START + 3_601]
+    columns = list(whole.columns(field, START - 30, START + 3_700, 1.0))
+    assert places(columns, 1.0) == [START - 20, START - 10, START + 3_601]
 
 
 def test_a_run_with_a_clock_behind_the_one_before_comes_after_it() -> None:
@@ -233,7 +235,7 @@ def test_a_run_with_a_clock_behind_the_one_before_comes_after_it() -> None:
     field.add(whole.time(1_001.0), 3.0)
     assert list(field.levels[0].at) == sorted(field.levels[0].at)
     behind = list(whole.columns(field, START - 10, START + 10, 1.0))
-    assert (places(behind, 1.0), [one.last for one in behind]) == ([START + 1], [3.0])
+    assert (places(behind, 1.0), [column.last for column in behind]) == ([START + 1], [3.0])
     whole.set_clock(1_002.0, START + 1_002.0)
     put_right = list(whole.columns(field, START + 300, START + 1_010, 1.0))
     assert places(put_right, 1.0) == [START + 400, START + 500, START + 1_001]

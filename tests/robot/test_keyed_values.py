@@ -179,10 +179,10 @@ def test_where_the_newest_message_has_all_the_others_are_not_decoded(
 
     for seq in range(50):
         says(seq, lift=0.25, finger=seq / 100)
-    assert [cell.shown(NOW, one)["text"] for one in ("heard", "other")] == ["0.25", "0.49"]
+    assert [cell.shown(NOW, name)["text"] for name in ("heard", "other")] == ["0.25", "0.49"]
     assert len(decoded) == 2
     decoded.clear()
     for seq in range(50):
         says(seq, **({"lift": 0.5} if seq % 2 else {"finger": 0.25}))
-    assert [cell.shown(NOW, one)["text"] for one in ("heard", "other")] == ["0.5", "0.25"]
+    assert [cell.shown(NOW, name)["text"] for name in ("heard", "other")] == ["0.5", "0.25"]
     assert len(decoded) == 51

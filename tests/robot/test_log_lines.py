@@ -28,33 +28,33 @@ def find(lines: LogLines, wanted: Wanted | None = None, after: int = 0, most: in
     return asyncio.run(lines.find(wanted or Wanted(), after, most))
 
 
-def numbers(found: Found) -> list[int]:
-    return [number for number, _ in found.lines]
+def numbers(result: Found) -> list[int]:
+    return [number for number, _ in result.lines]
 
 
 def test_only_the_newest_are_kept() -> None:
     lines = filled([line(n) for n in range(1, 151)])
-    found = find(lines, most=200)
-    assert (numbers(found), found.last) == (list(range(51, 151)), 150)
+    result = find(lines, most=200)
+    assert (numbers(result), result.last) == (list(range(51, 151)), 150)
 
 
 def test_their_bytes_are_bounded_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    one = line(1, text="x" * 900)
-    monkeypatch.setattr(log_lines, "KEPT_BYTES", 3 * len(one))
-    lines = filled([one] * 10)
+    payload = line(1, text="x" * 900)
+    monkeypatch.setattr(log_lines, "KEPT_BYTES", 3 * len(payload))
+    lines = filled([payload] * 10)
     assert numbers(find(lines)) == [8, 9, 10]
 
 
 def test_a_line_that_is_too_long_is_counted_and_not_kept() -> None:
     lines = filled([line(1), line(2, text="x" * 100_000), line(3)])
-    found = find(lines)
-    assert (numbers(found), found.last) == ([1, 3], 3)
+    result = find(lines)
+    assert (numbers(result), result.last) == ([1, 3], 3)
 
 
 def test_of_too_many_the_newest_are_found_and_the_others_counted() -> None:
     lines = filled([line(n) for n in range(1, 101)])
-    found = find(lines, most=10)
-    assert (numbers(found), found.left_out) == (list(range(91, 101)), 90)
+    result = find(lines, most=10)
+    assert (numbers(result), result.left_out) == (list(range(91, 101)), 90)
     later = find(lines, after=95, most=3)
     assert (numbers(later), later.left_out) == ([98, 99, 100], 2)
 
@@ -95,14 +95,14 @@ def test_lines_are_chosen(wanted: Wanted, fitting: list[int]) -> None:
 def test_colours_of_a_terminal_are_no_text() -> None:
     long = "\x1b[31m" + "x" * (LONGEST_TEXT - 2) + "\x1b[0m"
     lines = filled([line(1, text="\x1b[1;33m[WARN]\x1b[0m hot"), line(2, text=long)])
-    shown = [one.text for _, one in find(lines).lines]
+    shown = [log_line.text for _, log_line in find(lines).lines]
     assert shown == ["[WARN] hot 1", "x" * (LONGEST_TEXT - 2) + " 2"]
 
 
 def test_what_is_no_line_is_passed_over_and_text_can_not_hide() -> None:
     payloads = [b"\0\1\0\0nonsense", line(2, text="a\u202eb")]
-    ((number, found),) = find(filled(payloads)).lines
-    assert (number, found.text) == (2, "a\\u202eb 2")
+    ((number, log_line),) = find(filled(payloads)).lines
+    assert (number, log_line.text) == (2, "a\\u202eb 2")
 
 
 @pytest.mark.parametrize(
@@ -110,8 +110,8 @@ def test_what_is_no_line_is_passed_over_and_text_can_not_hide() -> None:
     [(0, "debug"), (10, "debug"), (20, "info"), (30, "warn"), (40, "error"), (50, "fatal")],
 )
 def test_a_severity_has_its_word(level: int, word: str) -> None:
-    ((_, found),) = find(filled([line(1, level)])).lines
-    assert found.level == word
+    ((_, log_line),) = find(filled([line(1, level)])).lines
+    assert log_line.level == word
 
 
 def test_nothing_is_decoded_until_somebody_reads(monkeypatch: pytest.MonkeyPatch) -> None:

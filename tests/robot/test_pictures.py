@@ -30,20 +30,20 @@ def file(form: str, size: tuple[int, int] = (4, 3), mode: str = "RGB") -> bytes:
 JPEG, PNG, WEBP = (file(form) for form in ("JPEG", "PNG", "WEBP"))
 
 
-def of(type_name: str, **fields: Any) -> Picture:
+def picture_of(type_name: str, **fields: Any) -> Picture:
     return picture(INTERFACES, type_name, INTERFACES.encode(type_name, fields), MOST)
 
 
 def raw(encoding: str, width: int, height: int, data: bytes, step: int | None = None) -> Picture:
     size = {"width": width, "height": height, "encoding": encoding}
     pixel = {"r": 3, "b": 3}.get(encoding[0], 1) + ("a8" in encoding) if "bayer" not in encoding else 1
-    return of(RAW, **size, step=width * pixel if step is None else step, data=data)
+    return picture_of(RAW, **size, step=width * pixel if step is None else step, data=data)
 
 
-def shown(found: Picture) -> Image.Image:
+def shown(image: Picture) -> Image.Image:
     """The picture as a browser decodes it."""
-    assert found.media_type == "image/jpeg"
-    return Image.open(io.BytesIO(found.data))
+    assert image.media_type == "image/jpeg"
+    return Image.open(io.BytesIO(image.data))
 
 
 def code_of(error: NoPicture) -> str:
@@ -55,13 +55,13 @@ def code_of(error: NoPicture) -> str:
     ("data", "media_type"), [(JPEG, "image/jpeg"), (PNG, "image/png"), (WEBP, "image/webp")]
 )
 def test_a_compressed_picture_passes_untouched_by_its_first_bytes(data: bytes, media_type: str) -> None:
-    assert of(COMPRESSED, format="whatever it says", data=data) == (media_type, data)
+    assert picture_of(COMPRESSED, format="whatever it says", data=data) == (media_type, data)
 
 
 @pytest.mark.parametrize("data", [b"", b"<svg xmlns='x'/>", b"GIF89a", b"RIFF1234WAVE", b"\xff\xd8"])
 def test_another_file_is_no_picture(data: bytes) -> None:
     with pytest.raises(NoPicture) as error:
-        of(COMPRESSED, format="jpeg", data=data)
+        picture_of(COMPRESSED, format="jpeg", data=data)
     assert code_of(error.value) == "camera_format"
 
 
@@ -86,14 +86,14 @@ def test_a_raw_picture_has_its_colours(encoding: str, pixel: bytes, colour: tupl
     """Rows are longer than their pixels, and the last one ends with its last pixel."""
     step = len(pixel) * 17 + 3
     data = (pixel * 17).ljust(step, b"\xff") * 9
-    found = shown(raw(encoding, 17, 9, data[:-3], step=step))
-    assert found.size == (17, 9)
+    image = shown(raw(encoding, 17, 9, data[:-3], step=step))
+    assert image.size == (17, 9)
     for at in ((0, 0), (16, 0), (0, 8), (16, 8)):
-        shown_pixel = found.convert("RGB").getpixel(at)
+        shown_pixel = image.convert("RGB").getpixel(at)
         assert isinstance(shown_pixel, tuple)
-        assert all(abs(one - other) <= 8 for one, other in zip(shown_pixel, colour, strict=True)), (
-            shown_pixel
-        )
+        assert all(
+            abs(actual - other) <= 8 for actual, other in zip(shown_pixel, colour, strict=True)
+        ), shown_pixel
 
 
 @pytest.mark.parametrize(
@@ -127,8 +127,8 @@ def test_a_claimed_size_takes_no_memory(step: int, height: int) -> None:
     """Two pixels in a message of a few bytes."""
     tracemalloc.start()
     with contextlib.suppress(NoPicture):
-        found = raw("mono8", 2, height, bytes(2), step=step)
-        assert shown(found).size == (2, height) == (2, 1)
+        image = raw("mono8", 2, height, bytes(2), step=step)
+        assert shown(image).size == (2, height) == (2, 1)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1_000_000
@@ -155,7 +155,7 @@ def test_a_file_with_more_pixels_than_a_browser_should_draw_is_not_shown(
     head = file(form, size, "1") if form == "PNG" else with_size(form, size)
     tracemalloc.start()
     with pytest.raises(NoPicture) as error:
-        of(COMPRESSED, format="any", data=head)
+        picture_of(COMPRESSED, format="any", data=head)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert code_of(error.value) == "camera_pixels"
@@ -166,11 +166,11 @@ def test_a_file_with_more_pixels_than_a_browser_should_draw_is_not_shown(
 def test_a_damaged_head_is_no_picture(data: bytes) -> None:
     for length in range(12, 30):
         with contextlib.suppress(NoPicture):
-            of(COMPRESSED, format="any", data=data[:length])
+            picture_of(COMPRESSED, format="any", data=data[:length])
     for at in range(len(data)):
         damaged = data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :]
         with contextlib.suppress(NoPicture):
-            assert of(COMPRESSED, format="any", data=damaged).data == damaged
+            assert picture_of(COMPRESSED, format="any", data=damaged).data == damaged
 
 
 DEPTHS = [0] * 20 + [800 + number for number in range(400)] + [65_535] * 2  # millimetres
@@ -182,8 +182,8 @@ def test_sixteen_bits_are_scaled_for_the_eye(encoding: str, big: bool) -> None:
     """A depth camera's picture has 1 % of all 16 bits: as it is, it would be black."""
     data = struct.pack(f"{'>' if big else '<'}{len(DEPTHS)}H", *DEPTHS)
     size = {"width": len(DEPTHS), "height": 1, "step": len(data)}
-    found = of(RAW, **size, encoding=encoding, is_bigendian=int(big), data=data)
-    assert_scaled(shown(found))
+    image = picture_of(RAW, **size, encoding=encoding, is_bigendian=int(big), data=data)
+    assert_scaled(shown(image))
 
 
 def test_a_compressed_depth_is_scaled_for_the_eye() -> None:
@@ -191,15 +191,19 @@ def test_a_compressed_depth_is_scaled_for_the_eye() -> None:
     packed = io.BytesIO()
     depths.save(packed, "PNG")
     for head in (bytes(12), b""):
-        found = of(COMPRESSED, format="16UC1; compressedDepth png", data=head + packed.getvalue())
-        assert_scaled(shown(found))
+        image = picture_of(
+            COMPRESSED, format="16UC1; compressedDepth png", data=head + packed.getvalue()
+        )
+        assert_scaled(shown(image))
     with pytest.raises(NoPicture) as error:
-        of(COMPRESSED, format="16UC1; compressedDepth png", data=bytes(12) + packed.getvalue()[:-30])
+        picture_of(
+            COMPRESSED, format="16UC1; compressedDepth png", data=bytes(12) + packed.getvalue()[:-30]
+        )
     assert code_of(error.value) == "camera_incomplete"
 
 
-def assert_scaled(found: Image.Image) -> None:
-    greys = list(found.convert("L").tobytes())[20:-2]
+def assert_scaled(image: Image.Image) -> None:
+    greys = list(image.convert("L").tobytes())[20:-2]
     assert greys[0] < 40
     assert greys[-1] > 215
     assert all(after > before - 8 for before, after in pairwise(greys))
@@ -214,8 +218,8 @@ def test_yuv_pictures_have_their_colours(encoding: str, order: str) -> None:
     pair = bytes({"y": y, "u": u, "v": v}[letter] for letter in order)
     size = {"width": 16, "height": 9, "step": 37}
     data = (pair * 8).ljust(37, b"\xff") * 9
-    found = shown(of(RAW, **size, encoding=encoding, data=data[:-5])).convert("RGB")
+    image = shown(picture_of(RAW, **size, encoding=encoding, data=data[:-5])).convert("RGB")
     for at in ((0, 0), (15, 0), (0, 8), (15, 8)):
-        pixel = found.getpixel(at)
+        pixel = image.getpixel(at)
         assert isinstance(pixel, tuple)
         assert all(abs(a - b) <= 8 for a, b in zip(pixel, ORANGE, strict=True)), pixel

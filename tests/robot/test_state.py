@@ -143,9 +143,9 @@ def robot_of_several(namespace: str) -> RobotState:
     panel = panel_of({**HEARD, "topic": "//cell/heard"}, LOG)
     entry = RobotEntry(id="r1", name="Robot 1", namespace=namespace)
     robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, entry)
-    for zid, of in ((BRIDGE, namespace), (OTHER, "/cell")):
+    for zid, robot_namespace in ((BRIDGE, namespace), (OTHER, "/cell")):
         robot.graph.apply_token(bridge_token(zid), True)
-        robot.graph.update_namespaces({zid: of})
+        robot.graph.update_namespaces({zid: robot_namespace})
     return robot
 
 

@@ -53,11 +53,11 @@ def test_a_second_publisher_locks_where_one_is_allowed_and_else_is_named_in_the_
         robot, (interlock,) = robot_there(panel), panel.interlocks
         endpoint(robot, "MP", ENABLED, BOOL)
         says(robot, ENABLED, True, BOOL)
-        found = []
+        verdict_codes = []
         for known in ([DOOR], [DOOR, ARM]):
             robot.topic_publishers.update(KEY, known)
-            found.append(interlock_verdict(interlock, robot, NOW).code)
-        assert found == codes
+            verdict_codes.append(interlock_verdict(interlock, robot, NOW).code)
+        assert verdict_codes == codes
         says(robot, ENABLED, False, BOOL)
         reason = str(interlock_verdict(interlock, robot, NOW).reason)
         assert reason.endswith("/operation_enabled is published by /arm, /door.")

@@ -222,8 +222,8 @@ def test_of_a_lossless_topic_each_is_read_in_its_order() -> None:
             cell.says(level, "/heard")
             cell.robot.reading("/heard")
         await cell.all_read("/heard")
-        found = [value for _, value in cell.read][5:]
-        assert found == [0, *range(2 * MAX_UNREAD, 3 * MAX_UNREAD)]
+        values = [value for _, value in cell.read][5:]
+        assert values == [0, *range(2 * MAX_UNREAD, 3 * MAX_UNREAD)]
 
     run(test)
 
@@ -341,8 +341,8 @@ def test_a_whole_message_of_many_elements_is_not_built() -> None:
 
 def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> None:
     event = "rcl_interfaces/msg/ParameterEvent"
-    one = {"value": {"type": 4, "string_value": "x" * 20}}
-    changed = [{"name": f"parameter_{number}", **one} for number in range(1990)]
+    parameter = {"value": {"type": 4, "string_value": "x" * 20}}
+    changed = [{"name": f"parameter_{number}", **parameter} for number in range(1990)]
     data = INTERFACES.encode(event, {"node": "/arm", "changed_parameters": changed})
     took = []
     for _ in range(5):  # the least: another program shares the processor

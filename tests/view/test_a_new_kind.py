@@ -150,9 +150,9 @@ def test_app_check_finds_the_faults_of_a_new_kind(project: Path) -> None:
     for name, (old, new, _) in zip(names, MISTAKES, strict=True):
         assert panel.count(old) == 1
         (project / name).write_text(panel.replace(old, new))
-    found = check(project, *names)
-    assert (found.returncode, found.stdout) == (1, "")
-    _, *said = re.split(r"^mistake\d\.toml can't be used:$", found.stderr, flags=re.MULTILINE)
+    result = check(project, *names)
+    assert (result.returncode, result.stdout) == (1, "")
+    _, *said = re.split(r"^mistake\d\.toml can't be used:$", result.stderr, flags=re.MULTILINE)
     for of_one, (_, new, faults) in zip(said, MISTAKES, strict=True):
         for fault in faults:
             assert fault in of_one, new

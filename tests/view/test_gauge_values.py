@@ -116,8 +116,8 @@ def test_a_constant_set_point() -> None:
 
 
 def test_a_set_point_of_a_topic_is_scaled_and_gets_old() -> None:
-    of = {"topic": "/air_set", "type": FLOAT, "max_age_s": 2.0}
-    panel, robot = robot_with(55.0, setpoint=of, scale=0.1)
+    setpoint = {"topic": "/air_set", "type": FLOAT, "max_age_s": 2.0}
+    panel, robot = robot_with(55.0, setpoint=setpoint, scale=0.1)
 
     def view(now: float = NOW) -> Any:
         return english(build_view(panel, robot, now).view["widgets"]["air"])

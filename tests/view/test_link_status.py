@@ -86,8 +86,10 @@ def codes_of(module: str) -> set[str]:
     tree = ast.parse((PACKAGE / f"{module}.py").read_text())
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     made = [c for c in calls if isinstance(c.func, ast.Name) and c.func.id in ("locked", "Verdict")]
-    found = {n.value for c in made for a in c.args for n in ast.walk(a) if isinstance(n, ast.Constant)}
-    return {code for code in found if isinstance(code, str)}
+    constants = {
+        n.value for c in made for a in c.args for n in ast.walk(a) if isinstance(n, ast.Constant)
+    }
+    return {code for code in constants if isinstance(code, str)}
 
 
 # By the operator's own side or the robot's word: no link is to blame.

@@ -72,10 +72,10 @@ def test_a_value_of_a_parameter_is_shown_with_the_sign_and_unit_of_its_reader() 
     assert render(gain.value_text(1.25), "de") == "1,25 Stück"
     assert render(gain.entry_text(1.25), "de") == "1,25"
     known = ParameterState("live", 1.0)
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as caught:
         check_value(gain, known, 7.5)
-    assert render(found.value.text, "de").startswith("Verstärkung")
-    assert "0 bis 1,5 Stück" in render(found.value.text, "de")
+    assert render(caught.value.text, "de").startswith("Verstärkung")
+    assert "0 bis 1,5 Stück" in render(caught.value.text, "de")
     several = Parameter.model_validate({**ENTRY, "type": "double[]"})
     assert render(several.value_text((1.5, 2.5)), "de") == "1,5; 2,5"  # as it is entered
 
@@ -84,8 +84,8 @@ def test_the_words_of_a_list_of_bools_are_those_of_any_language() -> None:
     words = {"on": {"en": "open", "de": "auf"}, "off": {"en": "shut", "de": "zu"}}
     doors = Parameter.model_validate({**ENTRY, "type": "bool[]", **words})
     known = ParameterState("live", (True,))
-    for given in ("open, shut", "auf, zu", "true, false"):
-        assert check_value(doors, known, given) == (True, False)
+    for text in ("open, shut", "auf, zu", "true, false"):
+        assert check_value(doors, known, text) == (True, False)
 
 
 def test_a_robots_name_is_in_the_language_of_who_reads_it() -> None:

@@ -37,9 +37,9 @@ def view_of(robot: RobotState, **context: Any) -> View:
 
 def events(chunk: bytes) -> dict[str, Any]:
     """Event name → data; the events of one chunk have different names."""
-    found = events_in(chunk.decode())
-    assert len({name for name, _, _ in found}) == len(found)
-    return {name: json.loads(data) for name, data, _ in found}
+    received = events_in(chunk.decode())
+    assert len({name for name, _, _ in received}) == len(received)
+    return {name: json.loads(data) for name, data, _ in received}
 
 
 def run(work: Coroutine[Any, Any, None]) -> None:
@@ -95,14 +95,16 @@ def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
     pages = {"one": {"guarded"}, "two": {"heard"}}
     publisher = ViewPublisher(view_of(robot), "r1", pages=pages)
     readers = {page: publisher.reader(ENGLISH, page) for page in ("one", "two", "")}
-    snapshots = {page: events(publisher.snapshot(of))["snapshot"] for page, of in readers.items()}
+    snapshots = {
+        page: events(publisher.snapshot(reader))["snapshot"] for page, reader in readers.items()
+    }
     assert {page: set(snapshots[page]["widgets"]) for page in pages} == pages
     assert set(snapshots[""]["widgets"]) == set(publisher.view["widgets"])
     assert publisher.reader(ENGLISH, "gone") == readers[""]
     old = publisher.view
     says(robot, "/heard", "one")
     publisher.post(view_of(robot))
-    sent = {page: events(publisher.events_since(1, old, of)) for page, of in readers.items()}
+    sent = {page: events(publisher.events_since(1, old, reader)) for page, reader in readers.items()}
     assert sent["one"] == {}
     assert set(sent["two"]["update"]) == set(sent[""]["update"]) == {"heard"}
     permits(robot)
@@ -211,9 +213,11 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
 
     monkeypatch.setattr("app.view.publisher.encoded", encode)
     sent = [events(publisher.events_since(version, view)) for version, view in enumerate(views, 1)]
-    assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
-    assert all(one["link"] == english(publisher.view["link"]) for one in sent)
-    assert [one["update"] for one in sent] == encoded[1:2] + encoded[3:]
+    assert all(
+        event["operation-enabled-updated"] == {"enabled": True, "reason": None} for event in sent
+    )
+    assert all(event["link"] == english(publisher.view["link"]) for event in sent)
+    assert [event["update"] for event in sent] == encoded[1:2] + encoded[3:]
     assert len(encoded) == 5  # the permission and the links once, the widgets for each
 
 
@@ -314,12 +318,12 @@ def test_a_lock_of_many_buttons_is_sent_once_to_a_page() -> None:
         lock = {"enabled": True, "reason": None}
         sent = events(chunk)
         assert sent["updates"] == {
-            "groups": [{"widgets": [one["id"] for one in buttons], "attributes": lock}]
+            "groups": [{"widgets": [button["id"] for button in buttons], "attributes": lock}]
         }
         assert "update" not in sent
         everything = events(mine.events_since(1, old))
-        assert everything["update"] == {one["id"]: lock for one in buttons}
+        assert everything["update"] == {button["id"]: lock for button in buttons}
         assert "updates" not in everything
-        assert all(mine.lock_changed_at(one["id"]) == 2 for one in buttons)
+        assert all(mine.lock_changed_at(button["id"]) == 2 for button in buttons)
         sizes[count] = len(chunk)
     assert sizes[300] < sizes[3] + 300 * len('"b299",')

@@ -55,8 +55,8 @@ def test_a_time_is_a_date_and_a_time_of_day_without_a_format() -> None:
     ],
 )
 def test_an_age_counts_on(ago: float, text: str, until: float) -> None:
-    found = shown(STAMPED, stamp(WALL - ago), field="stamp", format="age")
-    assert found == (text, NOW + until)
+    attributes = shown(STAMPED, stamp(WALL - ago), field="stamp", format="age")
+    assert attributes == (text, NOW + until)
 
 
 def test_an_age_counts_from_the_clock_at_the_last_message() -> None:
