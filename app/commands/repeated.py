@@ -11,7 +11,7 @@ from app.errors import Cause, FieldError, InputError
 from app.i18n import say
 from app.panel.widgets.families import PressCommand
 from app.permission.press_permission import cause_of
-from app.permission.verdict import PERMITTED
+from app.permission.verdict import PERMITTED_CODES
 from app.ros_logging import RobotLog
 
 
@@ -44,7 +44,7 @@ class RepeatedPresses:
             return ""
         if last.outcome == "timed_out":
             return "time"
-        if last.verdict != PERMITTED.code:
+        if last.verdict not in PERMITTED_CODES:
             return cause_of(last.verdict or "log")
         try:
             self._dispatcher.refusal(widget, inputs)

@@ -193,13 +193,15 @@ class Panel(Description):
         return tuple(w for w in self.commands if isinstance(w, KeyCommand) and w.role == "stop")
 
     @cached_property
-    def uniform_buttons(self) -> Mapping[tuple[str, ...], tuple[PublishPress, ...]]:
-        """Buttons that publish, by their interlocks: these and the graph decide whether they lock, and
-        the lock is all that is shown of them. So many of them are judged and shown as one."""
-        groups: dict[tuple[str, ...], tuple[PublishPress, ...]] = {}
+    def uniform_buttons(self) -> Mapping[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]:
+        """Buttons that publish, by their interlocks and whether they need control: these and the graph
+        decide whether they lock, and the lock is all that is shown of them. So many of them are judged
+        and shown as one."""
+        groups: dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]] = {}
         for widget in self.commands:
             if isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time):
-                groups[widget.interlocks] = (*groups.get(widget.interlocks, ()), widget)
+                key = widget.interlocks, widget.needs_control
+                groups[key] = (*groups.get(key, ()), widget)
         return groups
 
     @cached_property

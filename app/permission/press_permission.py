@@ -23,7 +23,7 @@ from app.permission.interlocks import (
     link_verdict,
 )
 from app.permission.principal import Principal
-from app.permission.verdict import PERMITTED, Verdict, locked, with_advice
+from app.permission.verdict import PERMITTED, WITHOUT_CONTROL, Verdict, locked, with_advice
 from app.robot.state import RobotState
 
 
@@ -76,11 +76,16 @@ def _log(request: PermissionRequest) -> Verdict | None:
     return Verdict(False, "log", lock) if lock else None
 
 
+def _control(request: PermissionRequest) -> Verdict:
+    verdict = request.grounds.control
+    return verdict if verdict.permitted or request.widget.needs_control else WITHOUT_CONTROL
+
+
 CHECKS: Final = (
     Check("link", lambda request: request.link, alike=True),
     Check("ending", _ending, alike=True),
     Check("log", _log, alike=True),
-    Check("control", lambda request: request.grounds.control, alike=True),
+    Check("control", _control, alike=True),
     Check(
         "command",
         lambda request: command_blocked(request.widget, request.robot, request.now),
@@ -171,7 +176,8 @@ def combined(verdicts: Sequence[Verdict]) -> Verdict:
     locking = [lock for verdict in verdicts for lock in _each(verdict) if not lock.permitted]
     until = min((verdict.until for verdict in verdicts), default=math.inf)
     if not locking:
-        return PERMITTED if until == math.inf else Verdict(True, until=until)
+        permitted = WITHOUT_CONTROL if WITHOUT_CONTROL in verdicts else PERMITTED
+        return permitted if until == math.inf else replace(permitted, until=until)
     return replace(locking[0], until=until, others=tuple(locking[1:]))
 
 

@@ -27,6 +27,9 @@ class Verdict:
 
 
 PERMITTED: Final = Verdict(True)
+# Of a stop that a client without control presses: the operator's log says so.
+WITHOUT_CONTROL: Final = Verdict(True, "permitted_without_control")
+PERMITTED_CODES: Final = frozenset({PERMITTED.code, WITHOUT_CONTROL.code})
 
 
 @lru_cache(maxsize=256)

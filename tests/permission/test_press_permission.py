@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 
 from app.commands.holds.receipts import ActiveHold
+from app.panel.model import Panel
 from app.permission import press_permission
+from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import (
     CHECKS,
     Check,
@@ -16,10 +18,13 @@ from app.permission.press_permission import (
     combined,
     judged,
     permission,
+    permissions,
 )
-from app.permission.verdict import PERMITTED, Verdict
+from app.permission.verdict import PERMITTED, WITHOUT_CONTROL, Verdict
+from app.robot.state import RobotState
 from app.view.view import build_view
 from tests.commands.test_calls_and_goals import CALL
+from tests.commands.test_holds import JOG, SPEED
 from tests.commands.test_holds import Bench as HoldBench
 from tests.commands.test_presses import Bench as PressBench
 from tests.commands.test_presses import refused
@@ -131,3 +136,43 @@ def test_a_check_more_shows_in_the_view() -> None:
     for widget in ("free", "guarded", CALL["id"]):
         assert (shown[widget]["enabled"], shown[widget]["reason"]) == (False, WHY)
     assert judged(next(iter(panel.commands)), (), robot, NOW) is ALARM
+
+
+def test_a_stop_needs_no_control_but_everything_else() -> None:
+    panel = panel_of(
+        {**FREE, "id": "go", "message": {"data": "go"}, "role": "start"},
+        {**GUARDED, "id": "halt", "message": {"data": "halt"}, "role": "stop"},
+        {**GUARDED, "id": "same_interlock", "message": {"data": "go"}, "topic": "/go"},
+    )
+    robot = robot_there(panel)
+    permits(robot)
+    no_control = ServerConditions(control=locked("control"))
+    assert codes_of(panel, robot, no_control) == {
+        "go": "control",
+        "halt": WITHOUT_CONTROL.code,
+        "same_interlock": "control",
+    }
+    assert set(codes_of(panel, robot, ServerConditions()).values()) == {PERMITTED.code}
+    no_log = ServerConditions(locked("control"), "The disk is full.")
+    assert codes_of(panel, robot, no_log)["halt"] == "log"
+    permits(robot, False)
+    assert not codes_of(panel, robot, no_control)["halt"].startswith("permitted")
+
+
+def codes_of(panel: Panel, robot: RobotState, grounds: ServerConditions) -> dict[str, str]:
+    """The codes of all verdicts; each widget is judged alone and with the others to the same code."""
+    link = link_verdict(robot, NOW)
+    interlocks = {i.id: interlock_verdict(i, robot, NOW, link) for i in panel.interlocks}
+    together = permissions(panel, robot, NOW, link, interlocks, grounds)
+    for widget in panel.commands:
+        alone = judged(widget, panel.interlocks_of(widget), robot, NOW, grounds)
+        assert alone.code == together[widget.id].code
+    return {name: verdict.code for name, verdict in together.items()}
+
+
+def test_a_hold_needs_control_whatever_its_role() -> None:
+    panel = panel_of(SPEED, {**JOG, "role": "stop"})
+    robot = robot_there(panel)
+    (hold,) = panel.commands
+    no_control = ServerConditions(control=locked("control"))
+    assert judged(hold, (), robot, NOW, no_control).code == "control"

@@ -3,6 +3,7 @@ the cell come as through a proxy, which says where from."""
 
 import csv
 import io
+import json
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -128,6 +129,32 @@ def test_a_press_needs_control(own_client: Callable[..., Client], own_kiosk: Ser
             assert answer.status_code == status, answer.json()
     names = ("Panel 1 (192.0.2.1)", "Panel 2 (192.0.2.2)", "a program (127.0.0.1)")
     until(lambda: all(f"by {n} with" in own_kiosk.process.text for n in names), "the log names each")
+
+
+def test_every_client_may_stop_and_the_log_says_that_it_had_no_control(
+    own_client: Callable[..., Client],
+) -> None:
+    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
+    ann.take()
+    stopped, started = (
+        bob.http.post(f"/widgets/{name}", json={"inputs": {}}) for name in ("stop", "start")
+    )
+    assert (stopped.status_code, stopped.json()["outcome"]) == (200, "published")
+    assert (started.status_code, started.json()["code"]) == (409, "control_held")
+    snapshot = re.search(r"event: snapshot\ndata: (.*)\n", bob.http.get("/events?once=1").text)
+    assert snapshot
+    widgets = json.loads(snapshot[1])["widgets"]
+    assert (widgets["stop"]["enabled"], widgets["start"]["enabled"]) == (True, False)
+    assert ann.http.post("/widgets/stop", json={"inputs": {}}).status_code == 200
+    assert ann.press().status_code == 200  # the stop took no control
+    rows = list(csv.DictReader(io.StringIO(ann.http.get("/log.csv").text.removeprefix("\ufeff"))))
+    closed = [row for row in reversed(rows) if row["kind"] == "closed" and row["widget"] == "stop"]
+    assert [(row["browser"], row["verdict"]) for row in closed] == [
+        (bob.id, "permitted_without_control"),
+        (ann.id, "permitted"),
+    ]
+    html = ann.http.get("/log").text
+    assert html.count("<small>without control</small>") == 1
 
 
 def test_only_one_of_many_clients_gets_control(client: Callable[..., Client]) -> None:

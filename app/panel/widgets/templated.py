@@ -17,6 +17,11 @@ class TemplateCommand(KeyCommand, PressCommand):
     template_key: ClassVar[str]  # the key that holds the template
 
     @property
+    def needs_control(self) -> bool:
+        """Stopping never needs control."""
+        return self.role != "stop"
+
+    @property
     @abstractmethod
     def action_text(self) -> str:
         """What a press does, for a preview: "publishes /a (a/msg/B)"."""

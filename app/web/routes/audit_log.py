@@ -20,6 +20,7 @@ from app.errors import InputError, LogError, NotFound
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command, EntryWidget
+from app.permission.verdict import WITHOUT_CONTROL
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.language import language_of
@@ -158,6 +159,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         outcome_of=outcome_of,
         who_of=who_of,
         word=word,
+        without_control=WITHOUT_CONTROL.code,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
