@@ -215,7 +215,7 @@ def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def demo() -> Iterator[Server]:
-    """A server with the shipped panel and its simulated robot."""
+    """A server with the reference system's panel and its simulated robot."""
     with ready(Server(ROOT)) as mine:
         yield mine
 

@@ -89,8 +89,7 @@ class RobotEntry(Description):
 
 Kind = TypeVar("Kind", bound=BaseWidget)
 
-# rmw_qos_profile_parameter_events. An explicit durability: the subscription does not wait for the
-# publisher's.
+# rmw_qos_profile_parameter_events, with a durability: the subscription waits for no publisher.
 EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 
@@ -136,8 +135,7 @@ class Panel(Description):
 
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:
-        """The languages that a reader can choose: those of the file; else those that have a catalogue
-        and, where the panel has texts in several languages, these too."""
+        """The languages that a reader can choose: the file's; else those with a catalogue or texts."""
         if self.languages:
             return self.languages
         texts = [set(text.texts) for _, text in panel_texts(self)]

@@ -47,7 +47,7 @@ Fields = dict[str, Any]
 def own_parameters() -> dict[str, Parameter]:
     """The parameters of the `system_controller`, as at its start."""
     return {
-        "speed": Parameter(DOUBLE, 120.0, "of the feed", Range(0.0, 500.0, 10.0)),
+        "speed": Parameter(DOUBLE, 120.0, limits=Range(0.0, 500.0, 10.0)),
         "parts": Parameter(INTEGER, 24, "in a batch", Range(1, 200, 1)),
         "work_light": Parameter(BOOL, False, "follows the door"),
         "batch": Parameter(STRING, "A-17", "printed on the label", empty="a batch needs a name"),

@@ -22,7 +22,7 @@ from app.audit.verify import verify
 from app.permission.clients import new_token, public_id
 from app.web.client_cookie import COOKIE
 from tests.support.holds import PANEL as HOLDING
-from tests.support.parts import ROOT, Process, Server, free_port, sends, until
+from tests.support.parts import REFERENCE, ROOT, Process, Server, free_port, sends, until
 from tests.support.servers import demo_server
 
 FULL = "The operator's log cannot be written: no space left on device."
@@ -34,7 +34,7 @@ MOUNT = 'mount -t tmpfs -o size=2m tmpfs "$KIOSK_DATA" && exec "$@"'
 def panel_with(folder: Path, tables: str) -> str:
     """The shipped panel with more in it."""
     path = folder / "panel.toml"
-    text = (ROOT / "app/panel.toml").read_text()
+    text = REFERENCE.read_text()
     path.write_text(text.replace("[[interlock]]", f"{tables}\n[[interlock]]", 1))
     return str(path)
 

@@ -13,7 +13,7 @@ from mcap.stream_reader import StreamReader
 
 from tests.interfaces.test_cdr_on_ros import RosCodec
 from tests.support.holds import PANEL, PATIENT
-from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.support.parts import REFERENCE, Bridge, RosNode, Server, live, until
 from tests.support.servers import demo_server
 from tests.web.test_hold_socket import held, opened
 
@@ -46,7 +46,7 @@ def record(after_s: float) -> str:
 
 def recording(bridge: Bridge, folder: Path, after_s: float = 6) -> Server:
     """A kiosk with the shipped panel and a readout, that records."""
-    shipped = (ROOT / "app/panel.toml").read_text()
+    shipped = REFERENCE.read_text()
     panel = folder / "panel.toml"
     panel.write_text(shipped.replace("[[interlock]]", f"{record(after_s)}[[interlock]]", 1) + READOUT)
     return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel), KIOSK_DATA=str(folder / "data"))

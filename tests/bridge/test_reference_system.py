@@ -1,4 +1,5 @@
-"""The reference system on the real parts: bridge, rclpy nodes, the server as users start it."""
+"""The reference system on the real parts: bridge, rclpy nodes, the server as users start it, with the
+shipped panel."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -11,11 +12,19 @@ import pytest
 import zenoh
 
 from tests.support.form import several
-from tests.support.parts import ROOT, Bridge, RosNode, Server, arrives, has_heard, live, until
+from tests.support.parts import SHIPPED, Bridge, RosNode, Server, arrives, has_heard, live, until
 from tests.support.samples import TEXTS
 
 STARTS = several(6, 100)
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+
+
+@pytest.fixture
+def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
+    """A server for one test, on the shared bridge."""
+    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED))
+    yield mine
+    mine.end()
 
 
 def permit(server: Server, node: RosNode, value: bool = True) -> None:
@@ -47,7 +56,7 @@ def test_a_press_reaches_the_robot_with_its_text_intact(
 @contextmanager
 def known(bridge: Bridge, node: RosNode, folder: Path) -> Iterator[Server]:
     """A kiosk on a bridge that knows what the node listens to."""
-    mine = live(bridge.endpoint, folder)
+    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(SHIPPED))
     try:
         until(mine.ready, "ready")
         until(partial(arrives, mine, node), "the bridge knows what the node listens to", every_s=0.1)
@@ -122,9 +131,9 @@ def test_a_value_published_once_counts_after_its_publisher_is_gone(
 def test_a_page_loaded_later_shows_the_true_state_in_its_html(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
     locked = re.compile(r'formaction="/widgets/operation1"[^>]* disabled')
-    assert locked.search(server.http.get("/").text)
+    assert locked.search(server.http.get("/pages/operation").text)
     permit(server, node, True)
-    assert not locked.search(server.http.get("/").text)
+    assert not locked.search(server.http.get("/pages/operation").text)
     permit(server, node, False)
     html = server.http.get("/pages/operation").text
     assert locked.search(html)
@@ -146,7 +155,7 @@ def test_a_transient_local_value_arrives_in_either_order_of_start(
 
     if robot_first:
         robot_speaks()
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
     until(kiosk.ready, "ready")
     if not robot_first:
         robot_speaks()
@@ -162,7 +171,7 @@ def test_the_first_press_after_each_start_is_received(
         pass
     before = len(own_node.heard("/operation"))
     for number, text in enumerate(texts):
-        kiosk = live(own_bridge.endpoint, tmp_path)
+        kiosk = live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED))
         try:
             until(kiosk.ready, "ready", every_s=0.001)
             assert kiosk.press("operation", text).json()["outcome"] == "published"
@@ -175,7 +184,7 @@ def test_the_first_press_after_each_start_is_received(
 def test_a_press_without_a_subscriber_is_unknown_and_says_so(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
     until(kiosk.ready, "ready")
     answer = kiosk.press("operation", "anybody?")
     assert answer.status_code == 200
@@ -226,7 +235,7 @@ def test_what_was_typed_and_what_uvicorn_says_is_not_on_rosout(server: Server, n
 def test_debug_is_hidden_unless_asked_for(
     bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    quiet = servers(live(bridge.endpoint, tmp_path))
+    quiet = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
     loud = servers(live(bridge.endpoint, tmp_path, KIOSK_LOG_LEVEL="debug"))
     for kiosk in (quiet, loud):
         kiosk.http.get("/")
@@ -248,7 +257,7 @@ def test_another_type_on_the_robot_locks_and_says_which(
 
     if robot_first:
         robot_joins()
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
     until(kiosk.answers, "answers")
     if not robot_first:
         until(kiosk.ready, "ready: the bridge's routes have the kiosk's types")
@@ -271,8 +280,8 @@ def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Serv
     try:
         robot.subscribe("/operation", "std_msgs/msg/String")
         panel = tmp_path / "panel.toml"
-        shipped = (ROOT / "app/panel.toml").read_text()
-        panel.write_text(shipped.replace('namespace = ""', 'namespace = "/robot1"'))
+        text = SHIPPED.read_text()
+        panel.write_text(text.replace('namespace = ""', 'namespace = "/robot1"'))
         kiosk = servers(live(named.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
         until(kiosk.ready, "ready")
         until(partial(arrives, kiosk, robot), "robot1 hears a press")
@@ -292,7 +301,7 @@ def test_a_route_that_another_program_made_with_a_wrong_type_locks(
         token = other.liveliness().declare_token(key)
         routes = "@/*/ros2/route/topic/sub/operation"
         until(lambda: list(other.get(routes, timeout=1)), "the wrong route is there")
-        kiosk = servers(live(own_bridge.endpoint, tmp_path))
+        kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
         until(
             lambda: "std_msgs/msg/Bool on the robot" in (kiosk.widget("operation")["reason"] or ""),
             "locked for the route's type",

@@ -301,7 +301,7 @@ def shifts(pages: Sequence[Page], url: str, states: Sequence[str]) -> list[list[
             if state == "online":
                 expect(page.locator("#state")).to_have_attribute("data-state", state)
             else:
-                button = page.locator("[data-widget=operation1] > button")
+                button = page.locator("[data-widget=start] > button")
                 expect(button).to_be_enabled(enabled=state == "permitted")
     return [] if any(page.evaluate("lost") for page in pages) else [p.evaluate("shifts") for p in pages]
 

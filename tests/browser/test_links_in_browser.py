@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.support.browser.pages import place
-from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, live, until
+from tests.support.parts import ENOUGH_S, REFERENCE, Bridge, RosNode, Server, live, until
 from tests.support.servers import ready
 
 Keep = Callable[[Server], Server]
@@ -25,12 +25,10 @@ SIZES = [(1280, 800), (1024, 600)]
 
 
 def first_page(folder: Path, rule: str = "") -> str:
-    """The shipped panel with its first page alone, which needs only its node; `rule` is a further
-    key of its interlock."""
-    text, cut, _ = (ROOT / "app/panel.toml").read_text().partition("# A cell as a plant has it")
-    assert cut
+    """The reference system's panel, which needs only its node; `rule` is a further key of its
+    interlock."""
     path = folder / "first.toml"
-    path.write_text(text.replace("[[interlock]]\n", f"[[interlock]]\n{rule}\n"))
+    path.write_text(REFERENCE.read_text().replace("[[interlock]]\n", f"[[interlock]]\n{rule}\n"))
     return str(path)
 
 

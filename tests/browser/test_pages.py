@@ -18,6 +18,9 @@ from app.printable import printable
 from tests.support import holds
 from tests.support.browser.pages import HIDE, place
 from tests.support.parts import (
+    REFERENCE,
+    ROOT,
+    SHIPPED,
     TAP_AGAIN_MS,
     Bridge,
     RosNode,
@@ -29,6 +32,7 @@ from tests.support.parts import (
     until,
 )
 from tests.support.samples import TEXTS
+from tests.support.servers import ready
 
 SIZES = [(1280, 800), (1024, 600)]
 NO_SERVER = "No connection to the panel server"
@@ -61,11 +65,19 @@ def permit(server: Server, node: RosNode, value: bool) -> None:
     holds.permit(server, node, value, widget="operation1")
 
 
-def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
-    page.goto(server.url)
+@pytest.fixture
+def shipped(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
+    """A server with the shipped panel, on the shared bridge."""
+    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED))
+    yield mine
+    mine.end()
+
+
+def test_the_main_job(shipped: Server, node: RosNode, page: Page) -> None:
+    page.goto(f"{shipped.url}/pages/operation")
     expect(button(page, "Publish1")).to_be_disabled()
     expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
-    permit(server, node, True)
+    permit(shipped, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
     expect(button(page, "Publish2")).to_be_enabled()
     before = len(node.heard("/operation1"))
@@ -73,7 +85,7 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
     button(page, "Publish1").click()
     expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1 at")
     until(lambda: node.heard_data("/operation1")[before:] == ["pick up"], "the robot has it")
-    permit(server, node, False)
+    permit(shipped, node, False)
     for name, widget in (("Publish1", "operation1"), ("Publish2", "operation2")):
         expect(button(page, name)).to_be_disabled()
         expect(button(page, name)).to_have_css("background-color", "rgb(169, 169, 169)")
@@ -83,7 +95,7 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
         described = button(page, name).get_attribute("aria-describedby") or ""
         assert f"why-{widget}" in described.split()
     expect(button(page, "Publish")).to_be_enabled()
-    permit(server, node, True)
+    permit(shipped, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
 
 
@@ -411,7 +423,19 @@ def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) ->
     assert page.locator("main img").count() == 0
 
 
-def test_the_first_page_is_small_and_asks_no_other_host(demo: Server, chromium: Browser) -> None:
+@pytest.mark.parametrize(
+    ("panel", "widget", "most_files", "most_bytes"),
+    [(REFERENCE, "operation", 11, 30_000), (SHIPPED, "stop", 20, 45_000)],
+    ids=["reference", "shipped"],
+)
+def test_the_first_page_is_small_and_asks_no_other_host(
+    panel: Path, widget: str, most_files: int, most_bytes: int, chromium: Browser
+) -> None:
+    with ready(Server(ROOT, KIOSK_PANEL=str(panel))) as demo:
+        is_small(demo, chromium, widget, most_files, most_bytes)
+
+
+def is_small(demo: Server, chromium: Browser, widget: str, most_files: int, most_bytes: int) -> None:
     context = chromium.new_context()
     page = context.new_page()
     requests: list[Request] = []
@@ -432,7 +456,7 @@ def test_the_first_page_is_small_and_asks_no_other_host(demo: Server, chromium: 
         lambda event: received.__setitem__(event["requestId"], event["encodedDataLength"]),
     )
     page.goto(demo.url)
-    expect(button(page, "Publish")).to_be_enabled()
+    expect(page.locator(f"[data-widget={widget}] [type=submit]")).to_be_enabled()
     page.wait_for_timeout(500)
 
     def requested_urls() -> list[str]:
@@ -444,10 +468,10 @@ def test_the_first_page_is_small_and_asks_no_other_host(demo: Server, chromium: 
 
     until(all_came, "all has come")
     urls = requested_urls()
-    assert len(set(urls)) <= 11, urls  # a stream that is lost is opened again
+    assert len(set(urls)) <= most_files, urls  # a stream that is lost is opened again
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)
-    assert received.total() < 30_000
+    assert received.total() < most_bytes
     context.close()
 
 

@@ -13,7 +13,8 @@ from app.i18n.catalogue import files
 from app.web.language import COOKIE
 from tests.support.browser.browsers import opened
 from tests.support.browser.pages import HIDE
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, SHIPPED, Server, until
+from tests.support.servers import ready
 
 THROWS: Final = 'get() { throw new DOMException("denied", "SecurityError"); }, configurable: true'
 NO_STORAGE: Final = "".join(
@@ -59,7 +60,7 @@ SCRIPTS: Final = {
     "inputs": "recipe",
     "number-text": "recipe",
     "kinds/hold": "cell",
-    "kinds/parameter": "cell",
+    "kinds/parameter": "recipe",
     "kinds/gauge": "robot",
     "kinds/joints": "robot",
     "kinds/step": "robot",
@@ -71,6 +72,7 @@ SCRIPTS: Final = {
     "trend/plot": "watch",
     "floor/floor": "operation",
 }
+OPERATION: Final = "/pages/operation"
 PAUSES_S: Final = (1, 2, 4, 8, 16, 30, 30)  # before the reloads of a page that stays incomplete
 STARTS_WITHIN_S: Final = 10
 SETTLED_S: Final = 60
@@ -82,6 +84,13 @@ KEEP_TIMERS: Final = """
         ? timers.push({ act: () => act(...values), ms })
         : begin(act, ms, ...values);
 """
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[Server]:
+    """A server with the shipped panel and its simulated robot."""
+    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED))) as mine:
+        yield mine
 
 
 @pytest.fixture
@@ -177,7 +186,7 @@ def test_whatever_a_browser_says_or_lacks_the_page_works(
 ) -> None:
     own_page.add_init_script(ODDITIES[oddity])
     own_page.route("**/press-socket.js", lambda route: route.abort())  # a press is a POST
-    for path in ("/pages/cell", "/pages/recipe", "/"):
+    for path in ("/pages/cell", "/pages/recipe", OPERATION):
         own_page.goto(demo.url + path)
         expect(own_page.locator("html[data-floor]")).to_be_attached()
     expect(own_page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
@@ -211,7 +220,7 @@ def test_each_script_is_needed(demo: Server, tab: Page, script: str) -> None:
 def test_a_page_is_locked_in_the_readers_language(demo: Server, tab: Page, language: str) -> None:
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
     answer(tab, "main", "500")
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     expect(tab.locator("#fault")).to_have_text(sentence("page_incomplete", language))
     expect(tab.locator("#why-operation")).to_contain_text(sentence("page_incomplete", language))
 
@@ -234,7 +243,7 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
 ) -> None:
     tab.add_init_script(KEEP_TIMERS + storage)
     answer(tab, "full-text", "500")
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     for pause_s in PAUSES_S:
         is_locked(tab)
         assert kept_timers(tab) == [pause_s]
@@ -257,7 +266,7 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
 def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     answer(tab, "full-text", "500")
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     is_locked(tab)
     tab.route("**/static/*/main.js", lambda route: route.abort())
     for pause_s, longer_s in pairwise(PAUSES_S[:4]):
@@ -269,7 +278,7 @@ def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, ta
 def test_a_script_that_never_arrives_locks_the_page(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     tab.route("**/static/*/press.js", lambda route: None)
-    go(tab, demo.url, wait_until="domcontentloaded")
+    go(tab, demo.url + OPERATION, wait_until="domcontentloaded")
     end_timer(tab, STARTS_WITHIN_S)
     is_locked(tab)
 
@@ -277,7 +286,7 @@ def test_a_script_that_never_arrives_locks_the_page(demo: Server, tab: Page) -> 
 def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     answer(tab, "floor/floor", "500")
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     is_locked(tab)
     streams = noted(tab, "/events")
     for hidden in (True, False):
@@ -289,7 +298,7 @@ def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Pa
 
 def test_a_press_that_fails_before_it_is_sent_says_that_it_was_not(demo: Server, tab: Page) -> None:
     tab.route("**/press-socket.js", lambda route: route.abort())
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     expect(tab.locator("html[data-floor]")).to_be_attached()
     button = tab.get_by_role("button", name="Publish", exact=True)
     expect(button).to_be_enabled()
@@ -309,7 +318,7 @@ def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
     tab.add_init_script(NEEDS[need])
     streams = noted(tab, "/events")
-    go(tab, demo.url)
+    go(tab, demo.url + OPERATION)
     expect(tab.locator("body")).to_have_text(sentence("browser_too_old", language))
     expect(tab.locator(".too-old")).to_be_visible()
     assert tab.locator("button, input, select, form").count() == 0
@@ -318,7 +327,7 @@ def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
 
 def test_what_lies_over_a_page_is_hidden_without_the_popover_api(demo: Server) -> None:
     """In the markup, for a browser without scripts."""
-    html = demo.http.get("/").text
+    html = demo.http.get(OPERATION).text
     popovers = html.count(" popover")
     assert popovers == html.count(" popovertarget") + html.count('" popover hidden') + html.count(
         '"manual" hidden'

@@ -85,7 +85,7 @@ def test_faults_of_a_panel_file_are_reported_with_their_places(tmp_path: Path) -
     line = panel.read_text().splitlines().index('kind = "txt"') + 1
     text = said(str(panel), "--port", str(free_port()), status=1)
     assert text.splitlines()[0] == f"{panel} can't be used:"
-    assert f'page[0].group[0].widget[2].kind "message", line {line}: unknown kind "txt"' in text
+    assert f'page[1].group[0].widget[2].kind "message", line {line}: unknown kind "txt"' in text
     missing = said(str(tmp_path / "none.toml"), "--port", str(free_port()), status=1)
     assert missing == f"{tmp_path / 'none.toml'} can't be used:\n  No such file or directory\n"
 

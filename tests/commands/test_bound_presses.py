@@ -25,7 +25,7 @@ from app.view.refresh import NoOtherRobots, ViewRefresher, ViewSources
 from app.view.view import build_view
 from tests.support.builders import NOW, Table, permits, robot_there, small_panel
 from tests.support.parts import (
-    ROOT,
+    REFERENCE,
     TAP_AGAIN_MS,
     Bridge,
     RosNode,
@@ -56,7 +56,7 @@ def kiosk_60_s(
     """A kiosk whose panel lets a press expire after 60 s: a busy machine is faster."""
     folder = tmp_path_factory.mktemp("minute")
     panel = folder / "panel.toml"
-    panel.write_text(f"press_expires_s = 60.0\n{(ROOT / 'app/panel.toml').read_text()}")
+    panel.write_text(f"press_expires_s = 60.0\n{REFERENCE.read_text()}")
     with live(bridge.endpoint, folder, KIOSK_PANEL=str(panel)) as mine:
         until(mine.ready, "ready")
         until(lambda: mine.widget("operation")["enabled"], "it can be pressed")

@@ -159,7 +159,7 @@ def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: P
     mine = Server(tmp_path, python=machine.python)
     try:
         until(mine.ready, "ready")
-        html = mine.http.get("/").text
+        html = mine.http.get("/pages/operation").text
         assert "Publish1" in html
         files = [part for part in html.split('"') if re.match("/static/.", part)]
         assert len(files) >= 4
@@ -204,7 +204,7 @@ def test_a_panel_is_served_by_its_command_and_its_data_is_backed_up(machine: Mac
     try:
         until(lambda: "the panel is at" in served.text, "it listens", within_s=30)
         with http_client(f"http://127.0.0.1:{port}") as http:
-            assert "Pick up" in http.get("/").text
+            assert "Pick up" in http.get("/pages/operation").text
         for command in backups:
             done = machine.run(command)
             assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"

@@ -14,7 +14,16 @@ import pytest
 
 from app.dialect.peer_traits import BRIDGE_TRAITS
 from tests.support.cyclone import Client
-from tests.support.parts import ROOT, Bridge, RosNode, Server, Stream, live, publish_until, until
+from tests.support.parts import (
+    REFERENCE,
+    Bridge,
+    RosNode,
+    Server,
+    Stream,
+    live,
+    publish_until,
+    until,
+)
 
 ENABLED = "operation-enabled-updated"
 FREEZES = 5
@@ -31,7 +40,7 @@ def speaking(node: RosNode, value: bool = True) -> None:
 def strict(bridge: Bridge, folder: Path, condition: str, **more: Any) -> Server:
     """A kiosk whose interlock has one more condition."""
     panel = folder / "panel.toml"
-    shipped = (ROOT / "app/panel.toml").read_text()
+    shipped = REFERENCE.read_text()
     panel.write_text(shipped.replace('field = "data"', f'field = "data"\n{condition}', 1))
     return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel), **more)
 

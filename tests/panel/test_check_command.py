@@ -9,11 +9,12 @@ from app.cli.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE
-from tests.support.parts import TESTS
+from tests.support.parts import REFERENCE, TESTS
 from tests.support.processes import command
 
 SHIPPED = PACKAGE / "panel.toml"
-NO_TITLE = re.sub(r"^title = .*\n", "", SHIPPED.read_text(), count=1, flags=re.MULTILINE)
+REFERENCE_TEXT = REFERENCE.read_text()
+NO_TITLE = re.sub(r"^title = .*\n", "", REFERENCE_TEXT, count=1, flags=re.MULTILINE)
 
 
 @pytest.fixture
@@ -27,8 +28,8 @@ def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     first, note, *fits = said.out.splitlines()
-    assert first == f'{SHIPPED}: good: "Robot cell 1", 5 page(s), 37 widget(s)'
-    assert note.startswith('  note: interlock[0] "operation", line 11: the last value on ')
+    assert first == f'{SHIPPED}: good: "Robot cell 1", 5 page(s), 47 widget(s)'
+    assert note.startswith('  note: interlock[0] "operation", line 12: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
     assert [line.partition("fits ")[2] for line in fits] == ["", screens, screens, screens]
     assert "keeps 24h" in fits[0]
@@ -40,7 +41,7 @@ def test_a_permission_that_is_kept_fresh_needs_no_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], rule: str
 ) -> None:
     path = tmp_path / "cell.toml"
-    path.write_text(SHIPPED.read_text().replace('field = "data"\n', f'field = "data"\n{rule}\n', 1))
+    path.write_text(REFERENCE_TEXT.replace('field = "data"\n', f'field = "data"\n{rule}\n', 1))
     assert main([str(path)]) == 0
     assert "interlock[0]" not in capsys.readouterr().out
 
@@ -55,7 +56,7 @@ def test_every_fault_is_printed_with_its_place(
     assert first == f"{faulty} can't be used:"
     assert [line.split(": ")[0] for line in lines] == [
         "  title",
-        '  page[0].group[0].widget[1].topic "last_heard", line 45',
+        '  page[0].group[0].widget[1].topic "last_heard", line 43',
     ]
 
 
@@ -121,15 +122,15 @@ def test_a_note_is_no_fault_and_has_its_place(
 ) -> None:
     noted = [
         Note("interlock[0]", "is worth a look"),
-        Note("page[0].group[0].widget[1].span", "is large"),
+        Note("page[1].group[0].widget[1].span", "is large"),
     ]
     monkeypatch.setattr("app.panel.checks.notes.find_notes", lambda *_: noted)
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     assert said.err == ""
     assert said.out.splitlines()[1:] == [
-        '  note: interlock[0] "operation", line 11: is worth a look',
-        '  note: page[0].group[0].widget[1].span "last_heard", line 48: is large',
+        '  note: interlock[0] "operation", line 12: is worth a look',
+        '  note: page[1].group[0].widget[1].span "last_heard", line 366: is large',
     ]
     load_panel(SHIPPED)
 
@@ -164,7 +165,7 @@ def test_an_interlock_that_locks_nothing_is_noted(
 ) -> None:
     path = tmp_path / "cell.toml"
     spare = '\n[[interlock]]\nid = "spare"\ntopic = "/spare"\nmax_age_s = 1.0\n'
-    path.write_text(SHIPPED.read_text() + spare)
+    path.write_text(REFERENCE_TEXT + spare)
     assert main([str(path)]) == 0
     line = len(path.read_text().splitlines()) - 3
     notes = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]

@@ -76,11 +76,18 @@ def faults(load: Load, given: dict[str, Any]) -> dict[str, str]:
 def test_the_shipped_panel_is_good_and_a_demo() -> None:
     panel = load_panel(PACKAGE / "panel.toml")
     assert panel.mode == "demo"
-    assert [w.id for w in panel.pages[0].widgets] == [
+    assert panel.demo_story == "palletizing"
+    cell, reference = panel.pages[:2]
+    assert [w.id for w in panel.frame.widgets] == ["stop"]
+    assert {"boxes", "pallet", "start", "pause", "reset"} <= {w.id for w in cell.widgets}
+    assert [w.id for w in reference.widgets] == [
         "enabled", "last_heard", "message", "operation", "operation1", "operation2",
     ]  # fmt: skip
     assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image"}  # it has no picture
-    assert [i.id for i in panel.interlocks] == ["operation"]
+    assert panel.interlocks[0].id == "operation"
+    assert [w.id for w in panel.commands if w.interlocks == ("operation",)][:2] == [
+        "operation1", "operation2",
+    ]  # fmt: skip
 
 
 def test_a_file_becomes_descriptions(load: Load) -> None:

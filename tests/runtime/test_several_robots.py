@@ -16,6 +16,7 @@ from app.panel import load_panel
 from tests.support.builders import faults_text
 from tests.support.parts import (
     ENOUGH_S,
+    REFERENCE,
     ROOT,
     Bridge,
     Process,
@@ -29,7 +30,7 @@ from tests.support.parts import (
 from tests.support.servers import ready
 
 MANY = 10
-PANEL = (ROOT / "app/panel.toml").read_text()
+PANEL = REFERENCE.read_text()
 TEXT = "std_msgs/msg/String"
 
 

@@ -24,7 +24,7 @@ from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
 from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_peer import ANY_PORT, Simulator
 from tests.support.builders import INTERFACES
-from tests.support.parts import TESTS
+from tests.support.parts import REFERENCE, TESTS
 from tests.support.stepped import STEP_S, Stepped
 
 ROUND_S: Final = PERMITTED_S + FORBIDDEN_S
@@ -552,7 +552,7 @@ def test_names_of_the_reference_system_with_other_types_are_the_panels(loaded: L
 
 
 def test_the_reference_system_is_as_it_was() -> None:
-    robot = Stepped(load_panel(TESTS.parent / "app/panel.toml")).run(1)
+    robot = Stepped(load_panel(REFERENCE)).run(1)
     assert "/last_heard" not in robot.said
     robot.hear("/operation1", data="hello")
     robot.run(PERMITTED_S)

@@ -32,6 +32,9 @@ from tests.support.processes.signals import send_signal
 TAP_AGAIN_MS = 1000
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = ROOT / "tests"
+SHIPPED = ROOT / "app/panel.toml"
+# The page of the reference system alone: its robot permits and forbids in turns.
+REFERENCE = TESTS / "reference.toml"
 BRIDGE = Path(
     os.environ.get("TEST_BRIDGE") or Path.home() / ".cache/operator-panel/bridge/release/test-bridge"
 )
@@ -365,7 +368,10 @@ class Server:
         **environment: str,
     ) -> None:
         """`before` is a command that starts the server, such as `unshare`. Without KIOSK_DATA it has
-        its own data folder, which is removed with it."""
+        its own data folder, which is removed with it; without KIOSK_PANEL the reference system's panel
+        in this checkout, else the panel of its folder."""
+        if folder == ROOT:
+            environment.setdefault("KIOSK_PANEL", str(REFERENCE))
         self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
         self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
         self.base = ""
@@ -529,6 +535,7 @@ def zenoh_file(folder: Path, endpoint: str) -> Path:
 
 
 def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
-    """A server with the shipped panel, in live mode behind a bridge."""
+    """A server in live mode behind a bridge, with the reference system's panel unless the environment
+    names another."""
     zenoh = str(zenoh_file(folder, endpoint))
     return Server(ROOT, port, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

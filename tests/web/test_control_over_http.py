@@ -16,7 +16,7 @@ import pytest
 
 from app.web.client_cookie import COOKIE
 from tests.runtime.test_several_robots import entry, panel_file
-from tests.support.parts import ROOT, Server, http_client, until
+from tests.support.parts import REFERENCE, ROOT, Server, http_client, until
 from tests.support.servers import ready
 
 FAST_S = 2.0
@@ -25,7 +25,7 @@ PROXY = "127.0.0.1"  # through which those who are not at the cell come
 
 def control_panel(folder: Path, more: str = "", panel: str | None = None) -> Path:
     """The shipped panel, which needs control to press."""
-    text = panel or (ROOT / "app/panel.toml").read_text()
+    text = panel or REFERENCE.read_text()
     path = folder / "control.toml"
     path.write_text(
         text.replace("[[interlock]]", f"[control]\nrequired = true\n{more}\n[[interlock]]", 1)

@@ -7,7 +7,7 @@ from typing import Final
 import pytest
 
 from app.web.rendering.display_choice import KEPT_S
-from tests.support.parts import ROOT, Server
+from tests.support.parts import REFERENCE, ROOT, Server
 from tests.support.servers import ready
 
 HTML: Final = {"accept": "text/html"}
@@ -21,9 +21,7 @@ PAGES: Final = ("/", "/pages/operation", "/log", "/nothing")
 def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Its panel is dark."""
     panel = tmp_path_factory.mktemp("panel") / "panel.toml"
-    panel.write_text(
-        (ROOT / "app/panel.toml").read_text().replace("\ntitle =", '\ntheme = "dark"\ntitle =', 1)
-    )
+    panel.write_text(REFERENCE.read_text().replace("\ntitle =", '\ntheme = "dark"\ntitle =', 1))
     with ready(Server(ROOT, KIOSK_PANEL=str(panel))) as mine:
         yield mine
 

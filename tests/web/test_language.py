@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.web.language import COOKIE, negotiated
-from tests.support.parts import ROOT, Server, events_in
+from tests.support.parts import REFERENCE, ROOT, Server, events_in
 from tests.support.servers import ready
 
 AVAILABLE = ("de", "en", "pt-BR")
@@ -45,7 +45,7 @@ def test_the_language_is_the_best_that_has_a_catalogue(
 def translated_panel(folder: Path) -> Path:
     """The shipped panel, for readers of English and of the other language."""
     panel = folder / "panel.toml"
-    text = (ROOT / "app/panel.toml").read_text()
+    text = REFERENCE.read_text()
     panel.write_text(f'languages = ["en", "{LANGUAGE}"]\n{text}')
     return panel
 

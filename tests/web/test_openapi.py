@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.support.form import LONG, several
-from tests.support.parts import ROOT, Server
+from tests.support.parts import REFERENCE, ROOT, Server
 from tests.support.servers import ready
 
 CONTROL = "\n[control]\nrequired = true\n"
@@ -23,7 +23,7 @@ SEED = "20261122"
 def panel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shipped one, where browsers take control."""
     path = tmp_path_factory.mktemp("panel") / "panel.toml"
-    path.write_text((ROOT / "app/panel.toml").read_text() + CONTROL)
+    path.write_text(REFERENCE.read_text() + CONTROL)
     return path
 
 

@@ -14,7 +14,7 @@ from playwright.sync_api import Page, expect
 from uvicorn import Config
 from uvicorn.supervisors.watchfilesreload import FileFilter
 
-from tests.support.parts import ENOUGH_S, ROOT, Server
+from tests.support.parts import ENOUGH_S, REFERENCE, ROOT, Server
 
 FOLDERS = ("app", "templates", "static")
 PATTERNS = (
@@ -60,7 +60,7 @@ class Checkout:
         shutil.copy(ROOT / "zenoh.json5", folder)
         cell = folder / "cell"
         cell.mkdir()
-        shutil.copy(ROOT / "app/panel.toml", cell)
+        shutil.copy(REFERENCE, cell / "panel.toml")
         self.edit("cell/panel.toml", *FAULT)
         options = [*RELOAD, f"--reload-dir={cell}"]
         self.server = Server(
@@ -143,7 +143,7 @@ def test_an_open_browser_shows_what_is_saved_or_its_fault(checkout: Checkout, pa
 
 def check_panels_fault(checkout: Checkout, page: Page) -> None:
     """The fault is a page that says where, and is asked for again until it is mended."""
-    fault = 'page[0].group[0].widget[1].kind "last_heard", line 44: unknown kind "readuot"'
+    fault = 'page[0].group[0].widget[1].kind "last_heard", line 42: unknown kind "readuot"'
     expect(page.locator("li").first).to_contain_text(fault)
     expect(page.locator("h1")).to_contain_text("panel.toml can't be used:")
     answer = checkout.server.http.get("/pages/operation")
@@ -153,7 +153,7 @@ def check_panels_fault(checkout: Checkout, page: Page) -> None:
 
 def test_in_production_nothing_is_watched(tmp_path: Path) -> None:
     panel = tmp_path / "panel.toml"
-    shutil.copy(ROOT / "app/panel.toml", panel)
+    shutil.copy(REFERENCE, panel)
     mine = Server(ROOT, KIOSK_PANEL=str(panel))
     try:
         opened = []

@@ -22,6 +22,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from app.web.page_guard import script_hash
 from tests.support.parts import (
     ENOUGH_S,
+    REFERENCE,
     ROOT,
     Bridge,
     Process,
@@ -35,7 +36,7 @@ from tests.support.parts import (
 )
 from tests.support.servers import ready
 
-SHIPPED = (ROOT / "app/panel.toml").read_text()
+PANEL = REFERENCE.read_text()
 FORM = {"content-type": "application/x-www-form-urlencoded"}
 
 
@@ -72,7 +73,7 @@ def test_every_connection_starts_with_a_snapshot_and_then_beats(demo: Server) ->
     with demo.stream() as stream:
         name, data, event_id = stream.next("snapshot", "update", "link", "beat")
         assert name == "snapshot"
-        assert set(data["widgets"]) == set(re.findall(r'^id = "(\w+)"\nkind', SHIPPED, re.MULTILINE))
+        assert set(data["widgets"]) == set(re.findall(r'^id = "(\w+)"\nkind', PANEL, re.MULTILINE))
         assert re.fullmatch(r"[0-9a-f]+-\d+", event_id)
         assert data["id"] == event_id
         first = time.monotonic()
@@ -412,7 +413,7 @@ def test_a_client_that_reads_nothing_delays_no_other(demo: Server) -> None:
 
 def test_a_faulty_panel_stops_the_start_with_its_places(tmp_path: Path) -> None:
     panel = tmp_path / "bad.toml"
-    panel.write_text((ROOT / "app/panel.toml").read_text().replace('kind = "text"', 'kind = "txt"'))
+    panel.write_text(REFERENCE.read_text().replace('kind = "text"', 'kind = "txt"'))
     done = subprocess.run(
         [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port())],
         cwd=ROOT,
@@ -423,7 +424,7 @@ def test_a_faulty_panel_stops_the_start_with_its_places(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode != 0
-    assert 'page[0].group[0].widget[2].kind "message", line 52: unknown kind "txt"' in done.stderr
+    assert 'page[0].group[0].widget[2].kind "message", line 50: unknown kind "txt"' in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -25,7 +25,7 @@ from app.web.connections import FILES_WANTED
 from app.web.proxies import Proxies
 from app.web.serving import bounded, urls
 from tests.support.apps.small import CONNECTIONS
-from tests.support.parts import ENOUGH_S, ROOT, Server, free_port, http_client, until
+from tests.support.parts import ENOUGH_S, REFERENCE, ROOT, Server, free_port, http_client, until
 from tests.support.servers import ready
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -380,7 +380,7 @@ def test_a_port_in_use_is_one_sentence(plain: Server, tmp_path: Path) -> None:
 
 
 def test_the_start_says_what_it_uses_and_where_it_is(servers: Callable[[Server], Server]) -> None:
-    panel = ROOT / "app/panel.toml"
+    panel = REFERENCE
     mine = servers(Server(ROOT, KIOSK_MODE="live"))
     until(
         lambda: f"the panel is at http://127.0.0.1:{mine.port}\n" in mine.process.text + "\n", "where"

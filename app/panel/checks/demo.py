@@ -12,7 +12,6 @@ from app.panel.demo import DemoEntry
 from app.panel.faults.places import place_of
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.model import Panel
-from app.panel.stories import STORIES
 from app.panel.used_names import used_names
 from app.panel.values import join_list, number_text
 from app.panel.widgets.parameter import Parameter, is_valid_value
@@ -50,32 +49,9 @@ class _Names:
 
 
 def demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """The faults of the story and all entries. By their cause they are consequences of faults of
-    subscriptions."""
-    names = _names(panel)
-    for fault in (*_story_faults(panel, names), *_entry_faults(panel, names, interfaces)):
+    """The faults of all entries. By their cause they are consequences of faults of subscriptions."""
+    for fault in _entry_faults(panel, _names(panel), interfaces):
         yield replace(fault, cause=f"listens {fault.cause or fault.place}")
-
-
-def _story_faults(panel: Panel, names: _Names) -> Iterator[Fault]:
-    """Faults of a story: names with other types than it plays, or none that the panel uses."""
-    if panel.demo_story is None:
-        return
-    played = list(STORIES[panel.demo_story].types)
-    used = False
-    for use, name, wanted in played:
-        panel_type = names.types[use].get(name)
-        if panel_type is None or name in panel.demo:
-            continue
-        used = True
-        if panel_type != wanted:
-            message = (
-                f"plays {name} as {wanted}, and the panel has {panel_type}; rename it or use that type"
-            )
-            yield Fault("demo_story", message, cause=name)
-    if not used:
-        some = list_names(sorted(name for _, name, _ in played))
-        yield Fault("demo_story", f"the panel uses no name of the story; there is {some}")
 
 
 def _entry_faults(panel: Panel, names: _Names, interfaces: Interfaces) -> Iterator[Fault]:

@@ -12,6 +12,7 @@ from app.panel.checks.conditions import condition_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
+from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.faults.wording import list_names
@@ -197,8 +198,9 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """Imported only where a panel has the table or a story, for a faster start."""
-    if panel.demo or panel.demo_story:
+    """Imported only where a panel has the table, for a faster start."""
+    yield from story_faults(panel)
+    if panel.demo:
         from app.panel.checks.demo import demo_faults
 
         yield from demo_faults(panel, interfaces)
