@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -123,8 +123,14 @@ class TinyPeer:
 async def observe_tiny(
     link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
 ) -> GraphSnapshot:
-    """One robot, of all nodes on the link."""
-    tokens = await link.tokens()
+    """One robot, of all nodes on the link. Their tokens arrive some time after the connection."""
+    end = time.monotonic() + 3.0
+    while not (graph := tiny_graph(await link.tokens(), zid)).robots and time.monotonic() < end:
+        await asyncio.sleep(0.02)
+    return graph
+
+
+def tiny_graph(tokens: Sequence[str], zid: str) -> GraphSnapshot:
     endpoints = [e for e in map(TinyDialect().endpoint, tokens) if e is not None and e.zid != zid]
     names = [token.rpartition("/")[2] for token in tokens if "/node/" in token]
     nodes = [Node(name=f"/{name}", bridge="") for name in sorted(names)]
