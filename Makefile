@@ -59,7 +59,7 @@ BIOME_OPTIONS := --config-path=tests/frontend
 check: .venv/test $(FRONTEND)/ready
 	.venv/bin/ruff check $(PYTHON_FOLDERS)
 	.venv/bin/ruff format --check $(PYTHON_FOLDERS)
-	$(BIOME) ci $(BIOME_OPTIONS) $(FRONTEND_FOLDERS)
+	$(BIOME) ci --error-on-warnings $(BIOME_OPTIONS) $(FRONTEND_FOLDERS)
 	.venv/bin/mypy
 	.venv/bin/python -m app.i18n
 	.venv/bin/python -m docs._generate --check

@@ -10,7 +10,7 @@ LOOK: Final = f"""(async () => {{
         requestAnimationFrame(() => done(true));
         setTimeout(() => done(false), {DRAWS_WITHIN_MS});
     }});
-    const streams = document.body !== null && "page" in document.body.dataset;
+    const streams = document.getElementById("page") !== null;
     const ageMs = window.operatorPanel ? window.operatorPanel.eventAgeMs() : performance.now();
     return {{
         url: location.href,

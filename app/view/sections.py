@@ -13,13 +13,14 @@ class Section(NamedTuple):
     """`name` is its key in a view and in a snapshot. `events` returns the events that update a page
     from the old to the new content. `template` is its part of a page, in the header or below it
     (`place`), "" if the page itself has it; `shown` returns whether a content is
-    shown there."""
+    shown there. `on_page`: the scripts of a page show it; the others are for programs."""
 
     name: str
     events: Callable[[str, Any, Any], Events]
     template: str = ""
     shown: Callable[[Any], bool] = bool
     place: Literal["below", "header"] = "below"
+    on_page: bool = True
 
 
 def whole(name: str, old: Any, new: Any) -> Events:
@@ -55,7 +56,7 @@ def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
 
 
 SECTIONS: Final = (
-    Section("interlocks", _interlocks),
+    Section("interlocks", _interlocks, on_page=False),
     Section("widgets", _widgets),
     Section("link", whole, "sections/link.html"),
     Section("notice", whole, "sections/notice.html"),

@@ -25,8 +25,14 @@ OWN_PAGES: Final = ("log",)
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
-    ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
-    ".js": re.compile(rb"^[ \t]*(//.*)?", re.MULTILINE),
+    ".css": re.compile(
+        rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|;?\s*(?=\})|\s+(?=\{)", re.DOTALL | re.MULTILINE
+    ),
+    # A comment beside code goes if no quote follows, which a text would have.
+    ".js": re.compile(
+        rb"^[ \t]*(//.*|/\*\*$|\*( .*|/)?$)?|/\*\* [^*\n]*\*/ ?|(?<=[;{},)]) // [^\"'`\n]*$",
+        re.MULTILINE,
+    ),
 }
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 PICTURES: Final = "pictures"

@@ -4,6 +4,7 @@ import { TAP_AGAIN_MS } from "./press.js";
 
 let closing = 0;
 
+/** @param {HTMLElement} root @param {HTMLFormElement} form @param {(event: Event) => void} onYes */
 export function confirm(root, form, onYes) {
   const dialog = root.querySelector("dialog.ask");
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
@@ -32,6 +33,7 @@ export function confirm(root, form, onYes) {
 }
 
 // The value as the page shows it.
+/** @param {Entry | RadioNodeList} input @returns {string | null} */
 function shownText(input) {
   const entry = input instanceof RadioNodeList ? [...input].find((one) => one.type !== "hidden") : input;
   if (entry.type === "checkbox") {

@@ -1,7 +1,6 @@
 // Control of the robot: the bar that shows its holder, and the holder's keep-alive. The server locks the
 // buttons of a client without control. Loaded only where the panel requires control.
-import { newId, post } from "./connection.js";
-import { TAP_AGAIN_MS } from "./press.js";
+import { newId, post, TAP_AGAIN_MS } from "./press.js";
 import { setText } from "./show.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
@@ -10,14 +9,17 @@ const TOUCH_INTERVAL_MS = 1000;
 const IN_CONTROL = ["holding", "asked"];
 
 export class Control {
+  /** @type {HTMLFormElement} */
   #bar;
   #beats = 0;
   #touchedAt = -Infinity;
   #asker = ""; // who requested control when the finger went down
   #busy = false;
+  /** @type {(event: Event) => string} */
   #timeOf;
 
   // `timeOf` returns the server's time of an event.
+  /** @param {HTMLFormElement} bar @param {(event: Event) => string} timeOf */
   constructor(bar, timeOf) {
     this.#bar = bar;
     this.#timeOf = timeOf;
@@ -28,6 +30,7 @@ export class Control {
     });
   }
 
+  /** @param {{ role: string, shown: string, asker: string }} content */
   show({ role, shown, asker }) {
     this.#bar.dataset.role = role;
     this.#bar.elements.to.value = asker;
@@ -41,7 +44,7 @@ export class Control {
 
   lost() {
     this.#bar.dataset.role = "";
-    this.#bar.querySelector(".who").textContent = document.body.dataset.unknown;
+    this.#bar.querySelector(".who").textContent = pageGuard.page.sentences.unknown;
     for (const button of this.#bar.querySelectorAll("button")) button.disabled = true;
   }
 
@@ -59,12 +62,14 @@ export class Control {
     this.#keepAlive(true);
   }
 
+  /** @param {boolean} touched */
   #keepAlive(touched) {
     this.#beats = 0;
     this.#post("here", { touched }, true).catch(() => {}); // the next one may get through
   }
 
   // A second tap is the same act: it must not meet the button that came in its place.
+  /** @param {HTMLButtonElement} button @param {string} at */
   async #act(button, at) {
     if (this.#busy || button.disabled) return;
     this.#busy = true;
@@ -76,14 +81,15 @@ export class Control {
       const answer = await (await this.#post(act, { to: this.#asker, at, id: newId() })).json();
       refusal.textContent = answer.reason ?? answer.error;
     } catch {
-      refusal.textContent = document.body.dataset.unsure;
+      refusal.textContent = pageGuard.page.sentences.unsure;
     }
     await pause;
     this.#busy = false;
     this.#bar.removeAttribute("aria-busy");
   }
 
+  /** @param {string} act @param {object} body @param {boolean} keepalive */
   #post(act, body, keepalive = false) {
-    return post(`${document.body.dataset.base}/control/${act}`, body, RESPONSE_TIMEOUT_MS, { keepalive });
+    return post(`${pageGuard.page.base}/control/${act}`, body, RESPONSE_TIMEOUT_MS, { keepalive });
   }
 }

@@ -3,6 +3,7 @@
 const NEAR = 1_000_000_000n; // within a billionth of a step
 
 // The numbers as integers of one scale. The last value is the scale's exponent.
+/** @template {string[]} T @param {T} plains @returns {[...{ [I in keyof T]: bigint }, number]} */
 export function scaled(...plains) {
   const parts = plains.map((plain) => {
     const [digits, exponent = "0"] = plain.split("e");
@@ -13,6 +14,7 @@ export function scaled(...plains) {
   return [...parts.map(({ digits, exponent }) => digits * 10n ** BigInt(exponent - least)), least];
 }
 
+/** @param {string} one @param {string} other */
 export function isLess(one, other) {
   const [first, second] = scaled(one, other);
   return first < second;
@@ -20,6 +22,7 @@ export function isLess(one, other) {
 
 // A number is on a step if it is a whole number of steps from the lowest value, within a billionth of a step; a whole
 // number, if it is exactly.
+/** @param {string} plain @param {string} low @param {string} step @param {boolean} isWhole */
 export function isOnStep(plain, low, step, isWhole) {
   const [value, from, size] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
@@ -27,6 +30,7 @@ export function isOnStep(plain, low, step, isWhole) {
 }
 
 // The step that is `times` steps from a number; between two steps, the next one counts as the first.
+/** @param {string} plain @param {number} times @param {string} low @param {string} step @param {boolean} isWhole */
 export function stepped(plain, times, low, step, isWhole) {
   const [value, from, size, exponent] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
@@ -36,6 +40,7 @@ export function stepped(plain, times, low, step, isWhole) {
   return written(below + BigInt(times) * size, exponent);
 }
 
+/** @param {bigint} digits @param {number} exponent */
 function written(digits, exponent) {
   if (exponent >= 0) return String(digits * 10n ** BigInt(exponent));
   const sign = digits < 0n ? "-" : "";
@@ -43,10 +48,13 @@ function written(digits, exponent) {
   return `${sign}${text.slice(0, exponent)}.${text.slice(exponent)}`.replace(/\.?0+$/, "");
 }
 
+/** @param {bigint} value @param {bigint} size */
 function modulo(value, size) {
   return ((value % size) + size) % size;
 }
 
+/** @param {bigint} one @param {bigint} other */
 function least(one, other) {
+  // biome-ignore lint/complexity/useMathMinMax: Math.min takes no integers of any size
   return one < other ? one : other;
 }

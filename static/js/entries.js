@@ -5,33 +5,40 @@ const NUMBERS = "[data-number], [data-list]";
 const { mark, sentNumber, setLimits } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
 
 // The value with its type. What is not a number is sent as text: the server says what is wrong.
-function valueOf(input) {
+/** @param {Entry} input */
+function sentValue(input) {
   if (input.type === "checkbox") return input.checked;
   return input.matches(NUMBERS) ? sentNumber(input) : input.value;
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
+/** @type {Entry[]} */
 export const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)[name]")];
 
 // All values on the page, by the names of the inputs.
 export function enteredValues() {
-  return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
+  return Object.fromEntries(entries.map((input) => [input.name, sentValue(input)]));
 }
 
 // The input of a parameter shows the robot's value until it is touched. Then it keeps what was entered
 // until that is set.
+/** @type {WeakSet<Entry>} */
 const touched = new WeakSet();
 // Whether what was entered is kept; else the input follows the robot's value.
+/** @param {Entry} input */
 export function isTouched(input) {
   return !input.matches("[data-entry]") || touched.has(input);
 }
 
+/** @type {WeakMap<Entry, string | boolean>} */
 const robotValues = new WeakMap(); // the robot's values since the last press
 
+/** @param {HTMLElement} root @returns {Entry | null} */
 function entryOf(root) {
   return root.querySelector("[data-entry]");
 }
 
+/** @param {HTMLElement} root @param {string | boolean} value */
 export function showEntry(root, value) {
   const input = entryOf(root);
   robotValues.set(input, value);
@@ -43,12 +50,14 @@ export function showEntry(root, value) {
   }
 }
 
+/** @param {HTMLElement} root @param {Limits} bounds */
 export function showBounds(root, bounds) {
   const input = entryOf(root);
   if (input.matches(NUMBERS)) setLimits(input, bounds);
 }
 
 // The value was set: the input shows the robot's value again.
+/** @param {HTMLElement} root */
 export function releaseEntry(root) {
   const input = entryOf(root);
   if (input) touched.delete(input);
@@ -56,29 +65,37 @@ export function releaseEntry(root) {
 }
 
 // A press begins: only values from now on count as its result.
+/** @param {HTMLElement} root */
 export function forgetRobotValue(root) {
   robotValues.delete(entryOf(root));
 }
 
 // The inputs that were changed here, by hand or by a script.
+/** @type {Set<EventTarget | null>} */
 export const changed = new Set();
-addEventListener("input", ({ target }) => {
-  changed.add(target);
-  if (target.matches?.("[data-entry]")) touched.add(target);
-});
 
 // What was entered here before is entered again, and what is entered now is kept: by a script that a page without
 // entries does not need. Where the browser keeps nothing, a page begins with the panel's values.
-export const KEPT = `operator-panel.entries ${document.body.dataset.base}/${document.body.dataset.page}`;
+export function keptName() {
+  const { base, page } = pageGuard.page;
+  return `operator-panel.entries ${base}/${page}`;
+}
 
 function hasKept() {
   try {
-    return sessionStorage.getItem(KEPT) !== null;
+    return sessionStorage.getItem(keptName()) !== null;
   } catch {
     return false;
   }
 }
 
-const keep = () => import("./kept-entries.js").catch(() => {});
-if (hasKept()) keep();
-else addEventListener("input", keep, { once: true });
+// The page starts.
+export function followEntries() {
+  addEventListener("input", ({ target }) => {
+    changed.add(target);
+    if (target.matches?.("[data-entry]")) touched.add(target);
+  });
+  const keep = () => import("./kept-entries.js").catch(() => {});
+  if (hasKept()) keep();
+  else addEventListener("input", keep, { once: true });
+}

@@ -5,8 +5,10 @@ import { setText } from "./show.js";
 
 const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
 const popover = document.getElementById("whole");
+/** @type {HTMLElement | null} */
 let shown = null; // the key whose text the popover shows
 
+/** @param {HTMLElement} key */
 function visibleTexts(key) {
   const locked = key.querySelector("button")?.disabled;
   const reasons = key.querySelector(".reasons")?.textContent;
@@ -23,24 +25,29 @@ function fillPopover() {
   return texts.length > 0;
 }
 
+/** @param {HTMLElement} key */
 function showFullText(key) {
   shown = key;
   setText(popover.querySelector("h2"), key.querySelector(".name").textContent);
   if (fillPopover()) popover.showPopover();
 }
 
+/** @param {HTMLElement} text */
 function isCut(text) {
   return text.scrollHeight > text.clientHeight + 1;
 }
 
+/** @param {HTMLElement} key @param {boolean} cut */
 function showCut(key, cut) {
   const isComplete = !cut && !key.querySelector('[data-text="more"]')?.textContent;
   key.querySelector(".more").toggleAttribute("hidden", isComplete);
   if (key === shown && popover.matches(":popover-open") && !fillPopover()) popover.hidePopover();
 }
 
+/** @type {Set<HTMLElement>} */
 const changed = new Set(); // keys whose face or size is another since the last frame
 
+/** @param {HTMLElement} key */
 function mark(key) {
   if (!changed.size) requestAnimationFrame(markAll);
   changed.add(key);
@@ -53,6 +60,7 @@ function markAll() {
   for (const [key, cut] of keys) showCut(key, cut);
 }
 
+/** @param {HTMLElement} key */
 function equip(key) {
   const more = document.getElementById("more").content.firstElementChild.cloneNode(true);
   const face = key.querySelector(".face");

@@ -9,7 +9,9 @@
   var main = document.querySelector("script[data-src]").getAttribute("data-src");
   var started = false;
   var reloading = false;
+  var page = JSON.parse(document.getElementById("page").textContent);
   var guard = (window.pageGuard = {
+    page: page,
     isBroken: false,
     fail: fail,
     started: onStarted,
@@ -37,7 +39,7 @@
   function replacePage() {
     var text = document.createElement("p");
     text.className = "too-old";
-    text.textContent = document.body.getAttribute("data-too-old");
+    text.textContent = page.sentences.tooOld;
     document.body.textContent = "";
     document.body.appendChild(text);
     document.documentElement.hidden = false;
@@ -90,7 +92,7 @@
   }
 
   function lock() {
-    var words = document.body.dataset;
+    var words = page.sentences;
     show("form.page [type=submit], form.control [type=submit], .hold", "disabled", true);
     document.querySelectorAll("dialog[open]").forEach(function (dialog) {
       dialog.close();

@@ -1,6 +1,7 @@
 // The events that end a hold.
 
 // Calls `end(why)`. `pointer` and `key` return the pointer id and the key that hold the button, or null.
+/** @param {HTMLButtonElement} button @param {() => number | null} pointer @param {() => string | null} key @param {(why: string) => void} end */
 export function listenForEnd(button, pointer, key, end) {
   const on = (target, name, listener) => target.addEventListener(name, listener, { capture: true });
   button.addEventListener("pointerleave", (event) => event.pointerId === pointer() && end("sliding"));

@@ -12,17 +12,23 @@ const LAST_RESPONSE_MS = 3000;
 export class Holding {
   root;
   button;
+  /** @type {import("./source.js").Source} */
   #source;
+  /** @type {WebSocket | null} */
   #socket = null; // of the current hold; null without one
   #lease = "";
   #stamp = 0; // the server's last stamp, and when it arrived
   #stampedAt = 0;
   #number = 0;
   #timer = 0;
+  /** @type {number | null} */
   pointer = null; // the pointer or the key that holds it
+  /** @type {string | null} */
   key = null;
+  /** @type {Map<WebSocket, string>} */
   #ending = new Map(); // socket → reason, of ended holds without their last response
 
+  /** @param {HTMLElement} root @param {import("./source.js").Source} source */
   constructor(root, source) {
     this.root = root;
     this.button = root.querySelector(".hold");
@@ -39,11 +45,13 @@ export class Holding {
   }
 
   // What each heartbeat has in it; a joystick has its deflection.
+  /** @returns {object} */
   heartbeatData() {
     return {};
   }
 
   // The server's response to a heartbeat: the texts of what it has sent to the robot.
+  /** @param {Record<string, string>} _moves */
   onResponse() {}
 
   // The hold has ended.
@@ -62,7 +70,7 @@ export class Holding {
     this.#show("", "");
     this.#lease = "";
     this.#number = 0;
-    const { base, embed } = document.body.dataset;
+    const { base, embed } = pageGuard.page;
     const path = `${base}/widgets/${this.root.dataset.widget}/hold${embed}`;
     const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
     this.#socket = socket;
@@ -84,6 +92,7 @@ export class Holding {
     this.#timer = setInterval(() => this.beat(socket), BEAT_MS);
   }
 
+  /** @param {WebSocket | null} socket @param {object} message */
   #send(socket, message) {
     if (socket.readyState !== WebSocket.OPEN) return;
     socket.send(JSON.stringify({ ...message, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
@@ -96,6 +105,7 @@ export class Holding {
       this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.heartbeatData() });
   }
 
+  /** @param {WebSocket} socket @param {{ lease?: string, moves?: Record<string, string> }} message */
   #held(socket, { lease, moves }) {
     if (moves) this.onResponse(moves);
     if (!lease) return;
@@ -106,6 +116,7 @@ export class Holding {
   }
 
   // Ends the hold on this page at once; the server's response is shown after.
+  /** @param {string} why */
   end(why) {
     const socket = this.#socket;
     if (!socket) return;
@@ -120,6 +131,7 @@ export class Holding {
     }
   }
 
+  /** @param {WebSocket} socket @param {Receipt} message */
   #ended(socket, { outcome, reason }) {
     this.#ending.delete(socket);
     if (socket === this.#socket) this.#reset();
@@ -128,6 +140,7 @@ export class Holding {
     socket.close();
   }
 
+  /** @param {WebSocket} socket */
   #lost(socket) {
     const unanswered = this.#ending.delete(socket);
     if (socket === this.#socket) this.#reset();
@@ -143,6 +156,7 @@ export class Holding {
     this.onEnd();
   }
 
+  /** @param {string} outcome @param {string | undefined} reason */
   #show(outcome, reason) {
     const receipt = this.root.querySelector(".receipt");
     receipt.dataset.outcome = outcome;

@@ -5,6 +5,7 @@ import { numberText, plainText, readPlain } from "./number-text.js";
 
 // The step of a slider and its buttons where the input has none: 1, 2 or 5 of a decimal place, and a hundredth
 // of the range at most.
+/** @param {{ min: string, max: string }} limits */
 function stepSize({ min, max }) {
   const most = (max - min) / 100;
   const place = 10 ** Math.floor(Math.log10(most));
@@ -12,6 +13,7 @@ function stepSize({ min, max }) {
 }
 
 // The nearest step of a finger on a slider, or the nearer limit.
+/** @param {HTMLInputElement} input */
 function nearestStep(input) {
   const size = stepSize(input);
   const rounded = Number((Math.round(input.value / size) * size).toPrecision(12));
@@ -19,6 +21,7 @@ function nearestStep(input) {
 }
 
 // Makes the output as wide as its longest value, so that nothing moves under a finger.
+/** @param {HTMLOutputElement} output @param {Limits} limits */
 function setWidth(output, { min, max, step }) {
   const grain = step || stepSize({ min, max });
   const places = Math.max(0, -Math.floor(Math.log10(grain)));
@@ -26,6 +29,7 @@ function setWidth(output, { min, max, step }) {
   output.style.minWidth = `max(3.2em, ${longest}ch)`;
 }
 
+/** @param {HTMLInputElement} input @param {HTMLOutputElement} output */
 function slide(input, output) {
   const { min, max, step: size, isWhole } = limitsOf(input);
   const plain = readPlain(input.value, isWhole) ?? min;
@@ -41,16 +45,19 @@ function slide(input, output) {
 }
 
 // A number that was read is shown as the panel writes it: what is seen is what is sent.
+/** @param {HTMLInputElement} input */
 function settle(input) {
   const plain = readPlain(input.value, limitsOf(input).isWhole);
   if (plain !== null && numberText(plain) !== input.value) enter(input, plain);
 }
 
+/** @param {HTMLInputElement} input */
 function buttonStep(input) {
   const { min, max, step: size } = limitsOf(input);
   return size || (min && max ? plainText(stepSize({ min, max })) : "");
 }
 
+/** @param {HTMLInputElement} input */
 function equip(input) {
   const root = input.closest("[data-widget]");
   const output = root.querySelector("output");

@@ -1,27 +1,30 @@
 // What is entered on a page is there again when the operator comes back to it in this tab: kept in the tab's storage,
 // for one start of the server and one panel file. It only fills inputs; nothing is pressed again.
-import { changed, entries, isTouched, KEPT } from "./entries.js";
+import { changed, entries, isTouched, keptName } from "./entries.js";
 
 const NUMBERS = "[data-number], [data-list]";
 const { enterPortable, portable } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
 if (document.querySelector("[data-step]")) await import("./inputs.js"); // sliders are there after it
 
-const { revision, seen } = document.body.dataset;
+const { revision, seen } = pageGuard.page;
 const STAMP = `${revision} ${seen.slice(0, seen.lastIndexOf("-"))}`; // the server's files and its start
 
 // null for what must not be restored.
-function valueOf(input) {
+/** @param {Entry} input */
+function keptValue(input) {
   if (input.type === "checkbox") return input.checked;
   return input.matches(NUMBERS) ? portable(input) : input.value;
 }
 
 // The storage is no part of the panel, whose limits may have changed too.
+/** @param {Entry} input @param {unknown} value */
 function fits(input, value) {
   if (input.type === "checkbox") return typeof value === "boolean";
   if (input.options) return [...input.options].some((option) => !option.hidden && option.value === value);
   return typeof value === "string" && (input.maxLength < 0 || [...value].length <= input.maxLength);
 }
 
+/** @param {Entry} input @param {unknown} value */
 function fill(input, value) {
   if (input.matches(NUMBERS)) return enterPortable(input, value);
   if (!fits(input, value)) return false;
@@ -34,11 +37,11 @@ function fill(input, value) {
 // next page may be there before this one is hidden.
 function keep() {
   const typed = entries.filter((input) => changed.has(input) && isTouched(input));
-  const values = typed.map((input) => [input.name, valueOf(input)]).filter(([, value]) => value !== null);
-  sessionStorage.setItem(KEPT, JSON.stringify({ stamp: STAMP, values: Object.fromEntries(values) }));
+  const values = typed.map((input) => [input.name, keptValue(input)]).filter(([, value]) => value !== null);
+  sessionStorage.setItem(keptName(), JSON.stringify({ stamp: STAMP, values: Object.fromEntries(values) }));
 }
 
-const { stamp, values = {} } = JSON.parse(sessionStorage.getItem(KEPT) ?? "{}");
+const { stamp, values = {} } = JSON.parse(sessionStorage.getItem(keptName()) ?? "{}");
 for (const [name, value] of stamp === STAMP ? Object.entries(values) : []) {
   const input = entries.find((one) => one.name === name);
   if (!input || changed.has(input) || input.closest("[inert]") || !fill(input, value)) continue;

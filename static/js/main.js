@@ -1,140 +1,200 @@
 // Connects the event stream to the page: each event updates its section of the markup.
-import { showLamp, showLink, showRobots } from "./connection.js";
+import { followEntries } from "./entries.js";
 import { Presser } from "./press.js";
-import { addShow, lockWidget, setText, showAttribute, showFailed } from "./show.js";
+import { addHooks, find, lockWidget, setText, showAttribute, showFailed } from "./show.js";
 import { Source } from "./source.js";
 
-const body = document.body;
-const clock = document.getElementById("clock"); // shows the time of the last heartbeat
-let reconnected = false; // a snapshot has arrived after a loss, and no heartbeat after it yet
-const widgets = new Map(
-  [...document.querySelectorAll("[data-widget]:not([data-failed])")].map((root) => [root.dataset.widget, root]),
-);
+const noop = () => {};
+
+// What is shown of a section that is the same on every page.
+const COMMON = { link: showLink, notice: showNotice, state: showState, robots: showRobots };
+
+class Screen {
+  #data = pageGuard.page;
+  #clock = /** @type {HTMLTimeElement} */ (document.getElementById("clock")); // shows the time of the last heartbeat
+  #reconnected = false; // a snapshot has arrived after a loss, and no heartbeat after it yet
+  #widgets = new Map(
+    [...document.querySelectorAll("[data-widget]:not([data-failed])")].map((root) => [root.dataset.widget ?? "", root]),
+  );
+  #source;
+  #presser;
+  /** @type {{ show(state: Data): void, lost(): void, beat(): void }} */
+  #control = { show: noop, lost: noop, beat: noop }; // a page without the bar does not require control
+
+  constructor() {
+    /** @type {Handlers} */
+    const shown = {
+      ...COMMON,
+      widgets: (changes) => this.#showWidgets(changes),
+      control: (state) => this.#control.show(state),
+    };
+    // The sections of a snapshot, by the server's table. Each is an event by itself when it changes.
+    const sections = Object.fromEntries(this.#data.sections.map((name) => [name, shown[name]]));
+    this.#source = new Source({
+      snapshot: (all) => this.#showAll(all, sections),
+      update: sections.widgets,
+      // What changed in several widgets at once, such as the lock of an interlock.
+      updates: ({ groups }) => {
+        for (const { widgets, attributes } of groups) for (const id of widgets) this.#showWidget(id, attributes);
+      },
+      ...sections,
+      browser: noop, // this client's id: for programs
+      beat: (now) => this.#beat(now),
+      lost: () => this.#lockAll(),
+    });
+    this.#presser = new Presser(this.#widgets, this.#source);
+  }
+
+  async start() {
+    const bar = document.getElementById("control");
+    if (bar) {
+      const { Control } = await import("./control.js");
+      this.#control = new Control(/** @type {HTMLFormElement} */ (bar), (event) => this.#source.timeOf(event));
+    }
+    this.#load();
+    window.operatorPanel = { eventAgeMs: () => this.#source.ageMs }; // for the watcher of a kiosk's screen
+    pageGuard.onFail = () => this.#source.stop();
+    if (!pageGuard.isBroken) this.#source.start();
+  }
+
+  // What this page needs besides. The stream waits for what shows a part of a snapshot.
+  #load() {
+    const source = this.#source;
+    if (document.querySelector("[data-step]")) source.load("./inputs.js", noop);
+    for (const kind of this.#data.kinds) {
+      source.load(`./kinds/${kind}.js`, (hooks) => {
+        addHooks(kind, hooks);
+        for (const root of document.querySelectorAll(`[data-kind="${kind}"]`)) {
+          attempt(root, () => hooks.equip?.(root, source));
+        }
+      });
+    }
+    if (document.querySelector(".group-tab")) source.load("./tabs.js", noop);
+    source.load("./full-text.js", noop);
+    if (document.querySelector("template:is(#keypad, #keyboard)")) loadTouchEntry(this.#data.keyboard);
+    if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(pageGuard.fail);
+    if (this.#data.sounds) import("./sound.js").catch(pageGuard.fail);
+    import("./floor/floor.js").catch(pageGuard.fail);
+  }
+
+  /** @param {Data} all @param {Handlers} sections */
+  #showAll(all, sections) {
+    if (all.revision !== this.#data.revision) {
+      this.#lockAll();
+      this.#source.stop();
+      return pageGuard.reload(true);
+    }
+    this.#reconnected = "cut" in document.body.dataset;
+    delete document.body.dataset.cut;
+    for (const [name, show] of Object.entries(sections)) show(all[name]);
+  }
+
+  /** @param {Record<string, Attributes>} changes */
+  #showWidgets(changes) {
+    for (const [id, attributes] of Object.entries(changes)) this.#showWidget(id, attributes);
+  }
+
+  /** @param {string} id @param {Attributes} attributes */
+  #showWidget(id, attributes) {
+    const root = this.#widgets.get(id);
+    if (!root) return;
+    attempt(root, () => {
+      for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
+    });
+  }
+
+  /** @param {{ clock: string, at: string }} now */
+  #beat(now) {
+    setText(this.#clock, now.clock);
+    this.#clock.dateTime = now.at;
+    if (this.#reconnected) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
+    this.#reconnected = false;
+    this.#control.beat();
+  }
+
+  // The connection to the server is lost: no permission is known any more.
+  #lockAll() {
+    this.#presser.close();
+    document.body.dataset.cut = "";
+    this.#control.lost();
+    const { lostShort: text, locksAll: locks, lost, unknown } = this.#data.sentences;
+    showState({ state: "lost", text });
+    showLamp("server", { state: "bad", text, since: this.#clock.textContent, locks, reason: lost });
+    for (const name of ["bridge", "node"]) {
+      showLamp(name, { state: "wait", text: unknown, since: "", locks: "", reason: "" });
+    }
+    for (const tab of document.querySelectorAll("[data-robot]")) {
+      tab.dataset.state = "wait";
+      setText(tab.querySelector("b"), unknown);
+    }
+    for (const root of this.#widgets.values()) attempt(root, () => lockWidget(root, lost, unknown));
+  }
+}
+
+export function start() {
+  followEntries();
+  return new Screen().start();
+}
 
 // What fails in one widget shows there, and leaves the others as they are.
+/** @param {HTMLElement} root @param {() => void} work */
 function attempt(root, work) {
   if ("failed" in root.dataset) return;
   try {
     work();
   } catch (error) {
     root.dataset.failed = "";
-    showFailed(root, body.dataset.broken);
+    showFailed(root, pageGuard.page.sentences.broken);
     console.error(`widget "${root.dataset.widget}" can not be shown`, error);
   }
 }
 
-function showWidget(id, attributes) {
-  const root = widgets.get(id);
-  if (!root) return;
-  attempt(root, () => {
-    for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
-  });
+/** @param {string} keyboard */
+function loadTouchEntry(keyboard) {
+  const coarse = matchMedia("(pointer: coarse)");
+  const open = () => void import("./entry/touch-entry.js").catch(pageGuard.fail);
+  if (keyboard === "on" || coarse.matches) open();
+  else coarse.addEventListener("change", open, { once: true });
 }
 
-// A page without the bar does not require control.
-const bar = document.getElementById("control");
-const noop = () => {};
-const control = bar
-  ? new (await import("./control.js")).Control(bar, (event) => source.timeOf(event))
-  : { show: noop, lost: noop, beat: noop };
-
-function showWidgets(changes) {
-  for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
+/** @param {Record<string, Lamp>} lamps */
+function showLink(lamps) {
+  for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
+    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to the server
+  }
 }
 
+/** @param {string} name @param {Lamp} lamp */
+function showLamp(name, lamp) {
+  const light = document.querySelector(`[data-lamp="${name}"]`);
+  const row = document.querySelector(`[data-link="${name}"]`);
+  light.dataset.state = row.dataset.state = lamp.state;
+  setText(light.querySelector("b"), lamp.text);
+  for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
+}
+
+// The link status of each robot, on its tab.
+/** @param {Record<string, Lamp>} robots */
+function showRobots(robots) {
+  for (const [id, lamp] of Object.entries(robots)) {
+    const tab = document.querySelector(`[data-robot="${id}"]`);
+    tab.dataset.state = lamp.state;
+    setText(tab.querySelector("b"), lamp.text);
+  }
+}
+
+/** @param {{ state: string, text: string }} lamp */
 function showState({ state, text }) {
-  const box = document.getElementById("state");
+  const box = find(document, "#state");
   box.dataset.state = state;
   setText(box.querySelector("b"), text);
 }
 
+/** @param {Record<string, string>} notice */
 function showNotice(notice) {
   for (const [id, text] of Object.entries(notice)) {
-    const element = document.getElementById(id);
+    const element = find(document, `#${id}`);
     setText(element, text);
     element.hidden = !text;
   }
 }
-
-// The connection to the server is lost: no permission is known any more.
-function lockAll() {
-  presser.close();
-  body.dataset.cut = "";
-  control.lost();
-  const { lostShort, locksAll, lost, unknown } = body.dataset;
-  showState({ state: "lost", text: lostShort });
-  showLamp("server", { state: "bad", text: lostShort, since: clock.textContent, locks: locksAll, reason: lost });
-  for (const name of ["bridge", "node"]) {
-    showLamp(name, { state: "wait", text: unknown, since: "", locks: "", reason: "" });
-  }
-  for (const tab of document.querySelectorAll("[data-robot]")) {
-    tab.dataset.state = "wait";
-    setText(tab.querySelector("b"), unknown);
-  }
-  for (const root of widgets.values()) attempt(root, () => lockWidget(root, lost, unknown));
-}
-
-// The sections of a snapshot, in the order in which they are shown. Each is an event by itself when it changes.
-const SECTIONS = {
-  control: (state) => control.show(state),
-  widgets: showWidgets,
-  link: showLink,
-  notice: showNotice,
-  state: showState,
-  robots: showRobots,
-};
-
-const source = new Source({
-  snapshot(all) {
-    if (all.revision !== body.dataset.revision) {
-      lockAll();
-      source.stop();
-      pageGuard.reload(true);
-      return;
-    }
-    reconnected = "cut" in body.dataset;
-    delete body.dataset.cut;
-    for (const [name, show] of Object.entries(SECTIONS)) show(all[name]);
-  },
-  update: showWidgets,
-  // What changed in several widgets at once, such as the lock of an interlock.
-  updates({ groups }) {
-    for (const { widgets: alike, attributes } of groups) for (const id of alike) showWidget(id, attributes);
-  },
-  ...SECTIONS,
-  browser: noop, // this client's id: for programs
-  beat(now) {
-    setText(clock, now.clock);
-    clock.dateTime = now.at;
-    if (reconnected) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
-    reconnected = false;
-    control.beat();
-  },
-  lost: lockAll,
-});
-
-if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
-// Widget kinds with a script: it equips each widget of the kind, and may add functions that show attributes.
-for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
-  const roots = document.querySelectorAll(`[data-kind="${kind}"]`);
-  source.load(`./kinds/${kind}.js`, ({ equip, show }) => {
-    addShow(show);
-    for (const root of roots) attempt(root, () => equip?.(root, source));
-  });
-}
-if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});
-source.load("./full-text.js", () => {});
-// The stream does not wait for these.
-const coarse = matchMedia("(pointer: coarse)");
-const openEntry = () => import("./entry/touch-entry.js").catch(pageGuard.fail);
-if (document.querySelector("template:is(#keypad, #keyboard)")) {
-  if (body.dataset.keyboard === "on" || coarse.matches) openEntry();
-  else coarse.addEventListener("change", openEntry, { once: true });
-}
-if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(pageGuard.fail);
-if (body.dataset.sounds === "on") import("./sound.js").catch(pageGuard.fail);
-import("./floor/floor.js").catch(pageGuard.fail);
-const presser = new Presser(widgets, source, body.dataset);
-window.operatorPanel = { eventAgeMs: () => source.ageMs }; // for the watcher of a kiosk's screen
-pageGuard.onFail = () => source.stop();
-if (!pageGuard.isBroken) source.start();

@@ -33,11 +33,13 @@ function signs() {
   return all;
 }
 
+/** @param {string} plain */
 export function numberText(plain) {
   return plain.replaceAll("-", MINUS).replace(".", DECIMAL);
 }
 
 // A number as plain text, as Python writes it.
+/** @param {number} value */
 export function plainText(value) {
   const [digits, exponent] = value.toExponential().split("e");
   if (value === 0 || (exponent >= -4 && exponent < 16)) return String(value);
@@ -45,6 +47,7 @@ export function plainText(value) {
 }
 
 // The typed number as plain text, null if it is not one. A whole number may have any size.
+/** @param {string} text @param {boolean} isWhole */
 export function readPlain(text, isWhole) {
   const plain = plainOf(text);
   if (plain === null) return null;
@@ -58,6 +61,7 @@ export function readPlain(text, isWhole) {
   return (plain.includes("e") ? plain === shown : isEqual(plain, shown)) ? shown : null;
 }
 
+/** @param {string} text */
 function plainOf(text) {
   const typed = text.replace(AROUND, "");
   if (typed.length > LONGEST) return null;
@@ -65,12 +69,14 @@ function plainOf(text) {
   return match && match[1].replace("+", "") + match[2].replaceAll(",", "");
 }
 
+/** @param {string} one @param {string} other */
 function isEqual(one, other) {
   const [first, second] = scaled(one, other);
   return first === second;
 }
 
 // What a press sends for a typed number: a number, or text if it is not exact here; null if it is not a number.
+/** @param {string} text @param {boolean} isWhole */
 export function readNumber(text, isWhole) {
   const plain = readPlain(text, isWhole);
   if (plain === null) return null;
@@ -79,6 +85,7 @@ export function readNumber(text, isWhole) {
 }
 
 // The elements of a list of numbers, as they are typed; null where it is not clear what a comma separates.
+/** @param {string} text */
 export function elementsOf(text) {
   if (!text.replace(AROUND, "")) return [];
   if (SEPARATOR === "," && UNCLEAR.test(text)) return null;
@@ -86,10 +93,12 @@ export function elementsOf(text) {
 }
 
 // The numbers of a list; an element that is not a number is its text, which the server refuses.
+/** @param {string} text @param {boolean} isWhole */
 export function readNumbers(text, isWhole) {
   return elementsOf(text)?.map((element) => readNumber(element, isWhole) ?? element) ?? [text];
 }
 
+/** @param {string[]} plains */
 export function listText(plains) {
   return plains.map(numberText).join(`${SEPARATOR} `);
 }

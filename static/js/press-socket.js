@@ -1,11 +1,14 @@
 // A WebSocket for presses: faster than a POST in most browsers. Loaded with the first touch of a page.
 export class PressSocket {
+  /** @type {WebSocket} */
   #socket;
+  /** @type {Map<string, { resolve: (response: Data) => void, reject: () => void }>} */
   #pending = new Map(); // press id → its promise
   #leaving = false;
 
+  /** @param {(socket: PressSocket) => void} onClose */
   constructor(onClose) {
-    const { base, embed } = document.body.dataset;
+    const { base, embed } = pageGuard.page;
     const url = new URL(`${base}/presses${embed}`, location);
     this.#socket = new WebSocket(url.href.replace(/^http/, "ws"));
     this.#socket.onmessage = ({ data }) => {
@@ -24,6 +27,7 @@ export class PressSocket {
   }
 
   // Sends the press at once. No response arrives before this returns.
+  /** @param {{ id: string }} press @param {number} timeoutMs */
   send(press, timeoutMs) {
     this.#socket.send(JSON.stringify(press));
     return new Promise((resolve, reject) => {

@@ -1,32 +1,57 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
-import { newId, post } from "./connection.js";
 import { enteredValues, forgetRobotValue } from "./entries.js";
-import { showReceipt } from "./show.js";
+import { hooksOf, isEquipped, showReceipt } from "./show.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
 // A second tap within this time is the same press.
 export const TAP_AGAIN_MS = 700;
 // The socket of a page that is not touched for so long is closed.
 const UNTOUCHED_MS = 60_000;
+/** @param {Response} response */
 const read = async (response) => ({ ...(await response.json()), status: response.status });
 
+// Posts JSON; given up after a time, by a timer, as some browsers have no `AbortSignal.timeout`.
+/** @param {string} url @param {object} body @param {number} timeoutMs @param {RequestInit} [options] */
+export function post(url, body, timeoutMs, options) {
+  const request = new AbortController();
+  setTimeout(() => request.abort(), timeoutMs);
+  return fetch(url, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+    signal: request.signal,
+    ...options,
+  });
+}
+
+export function newId() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
 export class Presser {
+  /** @type {import("./press-socket.js").PressSocket | null} */
   #socket = null;
   #untouchedTimer = 0;
+  /** @type {Map<string, HTMLElement>} */
   #widgets;
-  #sentences;
+  /** @type {import("./source.js").Source} */
   #source;
+  /** @type {Set<string>} */
   #pending = new Set(); // URLs of presses without a response yet
+  /** @type {HTMLButtonElement | null} */
   #downButton = null; // the enabled button under the pointer when it went down
-  #downValue = ""; // of that button then: the goal that it cancels, or the value that a key of a step sends
+  #downValue = ""; // of that button then: the goal that it cancels, or the value that it sends
+  /** @type {typeof import("./ask.js").confirm} */
   #confirm = () => {}; // of ask.js, which is loaded with the page: nothing is pressed before that
+  /** @type {string | undefined} */
   #seen = null;
   #id = newId(); // of the next press
+  /** @type {Map<HTMLElement | null, HTMLElement>} */
   #buttons = new Map(); // submit button → its widget
 
-  constructor(widgets, source, sentences) {
+  /** @param {Map<string, HTMLElement>} widgets @param {import("./source.js").Source} source */
+  constructor(widgets, source) {
     this.#widgets = widgets;
-    this.#sentences = sentences;
     this.#source = source;
     if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
@@ -37,7 +62,7 @@ export class Presser {
       true,
     );
     for (const root of widgets.values()) {
-      for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
+      for (const button of root.querySelectorAll("[type=submit]:not([data-own])")) this.#buttons.set(button, root);
     }
     const form = document.querySelector("form.page");
     // A click presses at once: a browser takes its time to submit a form.
@@ -46,6 +71,7 @@ export class Presser {
     form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
   }
 
+  /** @param {EventTarget | null} target */
   #down(target) {
     this.#downButton = target.closest?.("button:enabled");
     this.#downValue = this.#downButton?.value;
@@ -53,6 +79,7 @@ export class Presser {
     this.#open();
   }
 
+  /** @param {MouseEvent} event */
   #clicked(event) {
     const button = event.target.closest("button");
     // A button that was enabled under a resting finger was not pressed.
@@ -61,10 +88,11 @@ export class Presser {
   }
 
   // What fails before a press is sent is said.
+  /** @param {MouseEvent | SubmitEvent} event @param {HTMLElement | null} pressed */
   #pressed(event, button) {
     event.preventDefault();
     const root = this.#buttons.get(button);
-    if (!root || button.disabled) return;
+    if (!root || button.disabled || !isEquipped(root)) return;
     try {
       this.#begin(event, root, button);
     } catch (error) {
@@ -72,28 +100,27 @@ export class Presser {
     }
   }
 
+  /** @param {unknown} error @returns {Receipt} */
   #unsent(error) {
     console.error(error);
-    return { outcome: "refused", reason: this.#sentences.unsent };
+    return { outcome: "refused", reason: pageGuard.page.sentences.unsent };
   }
 
   // By a pointer, a key or a program. Only a pointer has a "down" before.
+  /** @param {MouseEvent | SubmitEvent} event @param {HTMLElement} root @param {HTMLButtonElement} button */
   #begin(event, root, button) {
-    // The robot's response arrives as an event.
-    if (button.matches(".read"))
-      return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
     const byPointer = event.detail > 0;
     const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
     const isCancel = button.matches(".cancel");
     if (isCancel) click.press = byPointer ? this.#downValue : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
-    // The key of a step has the value that was shown when the finger went down.
-    if (button.matches(".step-key")) inputs[button.name] = Number(byPointer ? this.#downValue : button.value);
+    Object.assign(inputs, hooksOf(root).values?.(button, byPointer ? this.#downValue : button.value));
     if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
     else this.#confirm(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }
 
   // The view at an event, and the event's time by the server's clock.
+  /** @param {Event} event @returns {{ seen: string | undefined, at: string, press?: string }} */
   #moment(event, seen = this.#source.seen) {
     return { seen, at: this.#source.timeOf(event) };
   }
@@ -110,6 +137,7 @@ export class Presser {
       );
   }
 
+  /** @param {typeof import("./press-socket.js").PressSocket} PressSocket */
   #connect(PressSocket) {
     this.#socket ??= new PressSocket((socket) => socket === this.#socket && this.close());
   }
@@ -121,6 +149,7 @@ export class Presser {
   }
 
   // A second tap while the first is pending is the same press: it sends nothing.
+  /** @param {HTMLElement} root @param {HTMLButtonElement} button @param {Record<string, Data>} inputs @param {object} click */
   async #press(root, button, inputs, click) {
     const url = button.getAttribute("formaction");
     if (this.#pending.has(url)) return;
@@ -143,6 +172,7 @@ export class Presser {
   }
 
   // Sent once, never repeated: without a response the outcome is unknown.
+  /** @param {string | undefined} widget @param {import("./press-socket.js").PressSocket | null} socket @param {string} url @param {{ id: string }} press @param {number} timeoutMs @returns {Promise<Receipt>} */
   async #send(widget, socket, url, press, timeoutMs) {
     let response = null;
     try {
@@ -154,6 +184,6 @@ export class Presser {
       if (!response) return this.#unsent(error);
       if (socket && socket === this.#socket) this.close();
     }
-    return { outcome: "unknown", reason: this.#sentences.unsure };
+    return { outcome: "unknown", reason: pageGuard.page.sentences.unsure };
   }
 }

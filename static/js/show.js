@@ -1,6 +1,35 @@
 // Shows the attributes and receipts of widgets: texts and element properties, in place. Composes no sentence.
 import { releaseEntry } from "./entries.js";
 
+// What the scripts of widget kinds register, by the kind.
+/** @type {Map<string | undefined, Hooks>} */
+const registered = new Map();
+
+/** @param {string} kind @param {Hooks} hooks */
+export function addHooks(kind, hooks) {
+  registered.set(kind, hooks);
+}
+
+/** @param {HTMLElement} root @returns {Hooks} */
+export function hooksOf(root) {
+  return registered.get(root.dataset.kind) ?? {};
+}
+
+// Whether the script of its kind is there, if there is one: nothing is pressed before that.
+/** @param {HTMLElement} root */
+export function isEquipped({ dataset: { kind = "" } }) {
+  return registered.has(kind) || !pageGuard.page.kinds.includes(kind);
+}
+
+// An element that the markup must have.
+/** @type {<S extends string>(root: ParentNode, selector: S) => PageElement<S>} */
+export function find(root, selector) {
+  const element = root.querySelector(selector);
+  if (!element) throw new Error(selector);
+  return element;
+}
+
+/** @param {Element | null} element @param {string} text */
 export function setText(element, text) {
   if (!element) return;
   if (element.dataset.unit) setValue(element, text);
@@ -8,6 +37,7 @@ export function setText(element, text) {
 }
 
 // A number and, smaller, its unit; another text, such as that there is no value, has none.
+/** @param {HTMLElement} element @param {string} text */
 function setValue(element, text) {
   const [number, unit] = element.firstElementChild.children;
   const ending = ` ${element.dataset.unit}`;
@@ -17,6 +47,7 @@ function setValue(element, text) {
 }
 
 // A text node that is there stays: a new one would cost the page its style and layout as well.
+/** @param {Element} element @param {string} text */
 function setOnlyText(element, text) {
   const node = element.firstChild;
   if (node?.nodeType === Node.TEXT_NODE && !node.nextSibling) {
@@ -24,21 +55,25 @@ function setOnlyText(element, text) {
   } else if (node || text) element.textContent = text;
 }
 
-// What is locked with a widget: its key, or both of a step. It can always be canceled, and read again. Looked for once:
+// What is locked with a widget: its buttons. It can always be canceled, and a button of its kind's script (`data-own`) has a lock of its own. Looked for once:
 // a permission that changes does not wait for it.
+/** @type {WeakMap<HTMLElement, HTMLButtonElement[]>} */
 const keys = new WeakMap();
 
+/** @param {HTMLElement} root @returns {HTMLButtonElement[]} */
 function keysOf(root) {
-  if (!keys.has(root)) keys.set(root, [...root.querySelectorAll("button[type=submit]:not(.cancel, .read), .hold")]);
+  if (!keys.has(root))
+    keys.set(root, [...root.querySelectorAll("button[type=submit]:not(.cancel, [data-own]), .hold")]);
   return keys.get(root);
 }
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
 // `data-value` for the value of an element such as a meter, or an attribute of the widget's root.
+/** @type {Record<string, Show>} */
 const SHOW = {
   enabled: (root, value) => {
-    if (root.dataset.enabled) root.dataset.enabled = value;
-    for (const key of keysOf(root)) key.disabled = !value || key.hasAttribute("data-end");
+    for (const key of keysOf(root)) key.disabled = !value;
+    hooksOf(root).lock?.(root, !value);
     if (!value) root.querySelector("dialog.ask")?.close();
   },
   stoppable: (root, value) => {
@@ -50,7 +85,9 @@ const SHOW = {
     if (cancel) cancel.value = value;
   },
   held: (root, value) => root.toggleAttribute("data-held", value),
-  outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
+  outcome: (root, value) => {
+    find(root, ".result").dataset.outcome = value;
+  },
   busy: (root, value) => {
     root.toggleAttribute("data-busy", value);
     const bar = root.querySelector("progress");
@@ -63,18 +100,19 @@ const SHOW = {
   },
 };
 
-// Adds the functions of a widget kind's own script.
-export function addShow(functions) {
-  Object.assign(SHOW, functions);
-}
-
 // Widgets that this page itself locks, while something lies over it: how often, and what the server says of the lock.
+/** @type {WeakMap<HTMLElement, { fromServer: Attributes, times: number }>} */
 const localLocks = new WeakMap();
 const LOCK = ["enabled", "reason", "reasons", "more"];
 
 // Locks the key of a widget for a reason of this page's own.
+/** @param {HTMLElement} root @param {string | undefined} reason */
 export function lockLocally(root, reason) {
-  if (localLocks.has(root)) return void (localLocks.get(root).times += 1);
+  const locked = localLocks.get(root);
+  if (locked) {
+    locked.times += 1;
+    return;
+  }
   const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
   const texts = { reason: text("reason"), reasons: text("reasons"), more: text("more") };
   const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), ...texts };
@@ -84,6 +122,7 @@ export function lockLocally(root, reason) {
 }
 
 // Once for each time that it was locked: after the last one the server's lock shows again, as it is by now.
+/** @param {HTMLElement} root */
 export function unlockLocally(root) {
   const lock = localLocks.get(root);
   if (!lock || --lock.times) return;
@@ -91,15 +130,18 @@ export function unlockLocally(root) {
   for (const [name, value] of Object.entries(lock.fromServer)) showAttribute(root, name, value);
 }
 
+/** @param {HTMLElement} root @param {string} name @param {Data} value */
 export function showAttribute(root, name, value) {
   if (localLocks.has(root) && LOCK.includes(name)) {
     localLocks.get(root).fromServer[name] = value;
     return;
   }
-  if (name in SHOW) SHOW[name](root, value);
+  const show = hooksOf(root).show?.[name] ?? SHOW[name];
+  if (show) show(root, value);
   else showInPlace(root, name, value);
 }
 
+/** @param {HTMLElement} root @param {string} name @param {Data} value */
 function showInPlace(root, name, value) {
   setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
   const meter = root.querySelector(`[data-value="${name}"]`);
@@ -108,6 +150,7 @@ function showInPlace(root, name, value) {
 }
 
 // Locks a widget that can't be shown, for good: what it shows is no longer updated.
+/** @param {HTMLElement} root @param {string} text */
 export function showFailed(root, text) {
   for (const button of root.querySelectorAll("button")) button.disabled = true;
   if (root.dataset.state) root.dataset.state = "unreadable";
@@ -115,6 +158,7 @@ export function showFailed(root, text) {
 }
 
 // Without a connection no permission is known and each value is old. Its note keeps the time of the value.
+/** @param {HTMLElement} root @param {string} lost @param {string} unknown */
 export function lockWidget(root, lost, unknown) {
   if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="doing"]'), unknown);
   const buttons = root.querySelectorAll("button[type=submit], .hold");
@@ -131,6 +175,7 @@ export function lockWidget(root, lost, unknown) {
 }
 
 // Shows the receipt of a press at its widget, and none at the others.
+/** @param {Iterable<HTMLElement>} widgets @param {HTMLElement} root @param {Receipt} receipt */
 export function showReceipt(widgets, root, { id, outcome, reason }) {
   if (outcome === "succeeded") releaseEntry(root);
   for (const widget of widgets) {

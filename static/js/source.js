@@ -1,28 +1,77 @@
-// The source of the page's state. `lost` is called within 2 s of the last event.
-import { Connection } from "./connection.js";
-
+// The source of the page's state: the server's events, by one EventSource. A browser opens six connections to one server
+// over HTTP/1.1, so a hidden page closes its own. `lost` is called within 2 s of the last event.
+const OPEN_LATER_MS = 700;
 const SILENCE_MS = 1750;
 const CHECK_MS = 125;
 // A connection that does not respond is replaced after this time.
 const REOPEN_MS = 3000;
 const DRIFT_MS = 0.1; // how much two clocks may differ from one heartbeat to the next
 
+class Connection {
+  /** @type {string[]} */
+  #names;
+  /** @type {{ event(name: string, text: string, id: string): void, lost(): void }} */
+  #on;
+  /** @type {EventSource | null} */
+  #stream = null;
+  #timer = 0;
+  openedAt = 0; // by performance.now()
+
+  // `names` are those of the events; `on` has `event`, which takes (name, data as text, id), and `lost`.
+  /** @param {string[]} names @param {{ event(name: string, text: string, id: string): void, lost(): void }} on */
+  constructor(names, on) {
+    this.#names = names;
+    this.#on = on;
+  }
+
+  open() {
+    this.close();
+    this.openedAt = performance.now();
+    const { base, page } = pageGuard.page;
+    const stream = new EventSource(`${base}/events?page=${page}`);
+    for (const name of this.#names) {
+      stream.addEventListener(name, ({ data, lastEventId }) => this.#on.event(name, data, lastEventId));
+    }
+    stream.onerror = () => {
+      this.#on.lost();
+      // The browser does not retry after a response that is no stream.
+      if (this.#stream?.readyState === EventSource.CLOSED) this.openLater();
+    };
+    this.#stream = stream;
+  }
+
+  openLater() {
+    this.close();
+    this.#timer = setTimeout(() => this.open(), OPEN_LATER_MS);
+  }
+
+  close() {
+    this.#stream?.close();
+    this.#stream = null;
+    clearTimeout(this.#timer);
+  }
+}
+
 export class Source {
+  /** @type {Handlers} */
   #handlers;
+  /** @type {Connection} */
   #connection;
   // The page is as old as the server's response, not as its script.
   #aliveAt = performance.getEntriesByType("navigation")[0]?.responseStart ?? 0;
   #fresh = true; // the page itself is a snapshot, for as long as any other
   #isStopped = false;
+  /** @type {Promise<void>[]} */
   #loads = []; // of further modules
   #loading = 0; // those that are not there yet
-  #seen = document.body.dataset.seen;
+  #seen = pageGuard.page.seen;
   // The server's time is at least performance.now() plus this. A delay makes a measured offset smaller, so
   // the largest counts.
-  #offset = Number(document.body.dataset.now) - this.#aliveAt;
+  #offset = pageGuard.page.now - this.#aliveAt;
   #synced = true; // false from a snapshot to the heartbeat after it, which starts again
 
   // `handlers` has a function for each event, and `lost`.
+  /** @param {Handlers} handlers */
   constructor(handlers) {
     this.#handlers = handlers;
     this.#connection = new Connection(Object.keys(handlers), {
@@ -42,6 +91,7 @@ export class Source {
   }
 
   // The server's time of an event here, in RFC 3339.
+  /** @param {Event} event */
   timeOf(event) {
     return new Date(this.#offset + event.timeStamp).toISOString();
   }
@@ -57,6 +107,7 @@ export class Source {
   }
 
   // Loads a further module. The stream opens after that, since the module may show attributes of the snapshot.
+  /** @param {string} name @param {(module: any) => void} use */
   load(name, use) {
     this.#loading += 1;
     const begin = (module) => {
@@ -85,6 +136,7 @@ export class Source {
   }
 
   // An event that was delayed in a buffer is not shown, nor any after it: a new stream starts with a snapshot.
+  /** @param {string} name @param {string} text @param {string} id */
   #receive(name, text, id) {
     try {
       const data = JSON.parse(text);
@@ -97,6 +149,7 @@ export class Source {
     }
   }
 
+  /** @param {number} stamp */
   #isLate(stamp) {
     const now = performance.now();
     const silence = now - Math.max(this.#aliveAt, this.#connection.openedAt);
@@ -104,6 +157,7 @@ export class Source {
     return this.#synced && this.#offset + now - stamp > SILENCE_MS;
   }
 
+  /** @param {string} name @param {Data} data @param {string} id */
   #show(name, data, id) {
     if (name === "snapshot") {
       this.#fresh = true;
@@ -116,6 +170,7 @@ export class Source {
     this.#handlers[name](data);
   }
 
+  /** @param {number} offset */
   #sync(offset) {
     this.#offset = this.#synced ? Math.max(this.#offset - DRIFT_MS, offset) : offset;
     this.#synced = true;

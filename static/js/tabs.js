@@ -2,6 +2,7 @@
 const groups = document.querySelectorAll("[data-group]");
 const tabs = document.querySelectorAll(".group-tab");
 
+/** @param {string | undefined} number */
 function show(number) {
   for (const group of groups) group.classList.toggle("shown", group.dataset.group === number);
   for (const tab of tabs) tab.setAttribute("aria-pressed", tab.dataset.shows === number);

@@ -48,7 +48,7 @@ FAULTS: Final[dict[str, dict[str, Any] | None]] = {
 SCRIPTS: Final = {
     "main": "operation",
     "source": "operation",
-    "connection": "operation",
+    "start": "operation",
     "show": "operation",
     "press": "operation",
     "entries": "operation",
@@ -268,7 +268,7 @@ def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, ta
     answer(tab, "full-text", "500")
     go(tab, demo.url + OPERATION)
     is_locked(tab)
-    tab.route("**/static/*/main.js", lambda route: route.abort())
+    tab.route("**/static/*/start.js", lambda route: route.abort())
     for pause_s, longer_s in pairwise(PAUSES_S[:4]):
         end_timer(tab, pause_s)
         tab.wait_for_function("(ms) => timers.at(-1).ms === ms", arg=1000 * longer_s)

@@ -376,14 +376,14 @@ AXES = """async ([module, ranges]) => {
 def test_the_browser_draws_the_axes_of_the_server(cell: Server, page: Page) -> None:
     """Also for values at which an axis has no width, or more than a double can say."""
     page.goto(cell.url)
-    script = page.locator('script[src$="main.js"]').get_attribute("src") or ""
+    script = page.locator('script[src$="start.js"]').get_attribute("src") or ""
     ends = [(low, high) for low, high in itertools.product(DOUBLES, DOUBLES) if low <= high]
     ranges = [
         (*pair, *fixed)
         for pair in ends
         for fixed in ((None, None), (0.0, None), (None, 5e-324), (-5.0, 5.0))
     ]
-    module = script.replace("main.js", "trend/axis.js")
+    module = script.replace("start.js", "trend/axis.js")
     for drawn, parameters in zip(page.evaluate(AXES, [module, ranges]), ranges, strict=True):
         low, high = axis_range(*parameters)
         expected = [low, high, *(value for value, _ in value_ticks(low, high))]

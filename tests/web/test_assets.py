@@ -44,7 +44,7 @@ def loaded(static: Path, templates: Path, mm_per_px: float = 0.25, *kinds: str) 
 def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
     static: Path, templates: Path
 ) -> None:
-    layers = "".join(f"\n.{layer} a :is(b,i){{top:0;}}" for layer in LAYERS)
+    layers = "".join(f"\n.{layer} a :is(b,i){{top:0}}" for layer in LAYERS)
     sent = loaded(static, templates).files["kiosk.css"].content.decode()
     assert sent == f"{layers}:root{{--mm:4.0000px}}"
 
@@ -118,15 +118,23 @@ def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
     assert set(files) == {"kiosk.css", "log.css", "keypad.css", "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
-    assert files["log.css"].content == b"\n.log a :is(b,i){top:0;}"
+    assert files["log.css"].content == b"\n.log a :is(b,i){top:0}"
 
 
 def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
     static: Path, templates: Path
 ) -> None:
-    (static / "js/main.js").write_text('// Why.\nf("http://a"); // beside\n  // More.\n  g();\n')
+    written = '// Why.\nf("http://a"); // beside\n  // More.\n  g("; // a text");\n'
+    (static / "js/main.js").write_text(written)
     sent = loaded(static, templates).files["main.js"].content
-    assert sent == b'\nf("http://a"); // beside\n\ng();\n'
+    assert sent == b'\nf("http://a");\n\ng("; // a text");\n'
+
+
+def test_scripts_go_out_without_types(static: Path, templates: Path) -> None:
+    typed = "/** @type {A} */\nconst a = /** @type {B} */ (b);\n/**\n * @param {C} c\n */\n  *#d() {}\n"
+    (static / "js/main.js").write_text(typed)
+    sent = loaded(static, templates).files["main.js"].content
+    assert sent == b"\nconst a = (b);\n\n\n\n*#d() {}\n"
 
 
 def test_no_script_has_a_text_over_several_lines_that_a_comment_could_be_taken_from() -> None:

@@ -62,7 +62,7 @@ def test_a_page_is_in_the_language_of_its_reader(server: Server) -> None:
     english = server.http.get("/").text
     assert '<html lang="qps" ' in pseudo
     assert '<html lang="en" ' in english
-    assert 'data-lost="⟦' in pseudo
+    assert '"lost":"⟦' in pseudo
     assert "⟦Server⟧" in pseudo
     assert "⟦" not in english
     assert re.sub("[⟦⟧]", "", pseudo).count("<") == english.count("<")

@@ -123,7 +123,7 @@ def test_pages_of_several_robots_are_below_the_root_path(tmp_path: Path) -> None
         assert (answer.status_code, answer.headers["location"]) == (303, "/cell1/robots/r1/")
         text = mine.http.get("/cell1/robots/r1/").text
         assert 'href="/cell1/robots/r2/pages/one"' in text
-        assert 'data-base="/cell1/robots/r1"' in text
+        assert '"base":"/cell1/robots/r1"' in text
         assert json.loads(mine.http.get("/openapi.json").text)["servers"] == [{"url": "/cell1"}]
 
 

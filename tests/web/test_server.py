@@ -257,9 +257,10 @@ def test_pages_have_a_policy_for_their_one_inline_script_and_no_inline_style(dem
     assert "default-src 'none'" in policy
     assert "<style" not in answer.text
     assert " style=" not in answer.text
-    inline = re.findall(r"<script(?![^>]* src=)[^>]*>(.*?)</script>", answer.text, re.DOTALL)
+    data, *inline = re.findall(r"<script(?![^>]* src=)([^>]*)>(.*?)</script>", answer.text, re.DOTALL)
+    assert data[0] == ' type="application/json" id="page"'  # not executed
     assert len(inline) == 1
-    assert f"script-src 'self' {script_hash(inline[0])};" in policy
+    assert f"script-src 'self' {script_hash(inline[0][1])};" in policy
     assert not re.search(r"\bon\w+=", answer.text)
     assert answer.headers["cache-control"] == "no-store"
 

@@ -13,7 +13,7 @@ from app import clock
 from app.clock import format_datetime, format_time, iso_time
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.receipts import Receipt
-from app.i18n import Text, TextLike, say
+from app.i18n import Text, TextLike
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.permission.control_authority_view import role
@@ -28,6 +28,7 @@ from app.web.embedding import QUERY as EMBED
 from app.web.embedding import only_shows
 from app.web.language import language_of
 from app.web.rendering.display_choice import Choice, Display, choices, display_of, language_choice
+from app.web.rendering.page_data import page_json, panel_data
 from app.web.rendering.page_words import page_words
 
 RELOADED: Final = "reloaded"  # by itself, without a tap
@@ -48,7 +49,6 @@ class PageContext(TypedDict):
     view: View
     sections: Sequence[Section]
     event_id: str
-    revision: str
     clock: Text
     clock_at: str
     loaded: Text
@@ -56,18 +56,8 @@ class PageContext(TypedDict):
     receipt: Receipt | None
     inputs: dict[str, Any]
     words: dict[str, Any]
-    lost: Text
-    lost_short: Text
-    locks_all: Text
-    unknown: Text
-    unsure: Text
-    broken: Text
-    unsent: Text
-    faulty: Text
-    too_old: Text
-    state_unknown: Text
+    page_json: Markup
     refresh_s: int
-    now: int
     since: float | None
     again: str
     until: float
@@ -96,6 +86,16 @@ def page_context(
     now, wall = clock.server_now(), time.time()
     panel, language = state.fleet.panel, language_of(request)
     display = display_of(request, panel)
+    embed = f"?{EMBED}=1" if embedded else ""
+    data = {
+        **panel_data(panel, page, state.assets.scripts),
+        "base": session.base,
+        "embed": embed,
+        "revision": publisher.revision,
+        "seen": publisher.id,
+        "now": round(now * 1000),
+        "sounds": display.sounds == "on",
+    }
     return PageContext(
         site=state,
         display=display,
@@ -108,29 +108,18 @@ def page_context(
         view=publisher.for_role(now_role),
         sections=SECTIONS,
         event_id=publisher.id,
-        revision=publisher.revision,
         clock=format_time(wall),
         clock_at=iso_time(wall),
         loaded=format_datetime(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words={"embed": f"?{EMBED}=1" if embedded else ""}
+        words={"embed": embed}
         | page_words(
             session, page, f"{state.root}/static/{state.assets.revision}/{PICTURES}", language
         ),
-        lost=say("server_lost"),
-        lost_short=say("lost"),
-        locks_all=say("locks_all"),
-        unknown=say("unknown"),
-        unsure=say("server_no_response"),
-        broken=say("widget_failed"),
-        unsent=say("page_press_not_sent"),
-        faulty=say("page_incomplete"),
-        too_old=say("browser_too_old"),
-        state_unknown=say("state_unknown"),
+        page_json=page_json(data, language),
         refresh_s=refresh_s,
-        now=round(now * 1000),
         since=None if RELOADED in request.query_params else round(now, 3),
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),

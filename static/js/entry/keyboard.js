@@ -9,14 +9,17 @@ const SHIFTS = ["off", "once", "lock"];
 export class Entry {
   input;
   #sheet = new Sheet("keyboard", SHAPES, () => this.cancel());
+  /** @type {() => void} */
   #closed;
   #before;
   #wasTouched;
   #shift = "off";
   #signs = false;
+  /** @type {(event: KeyboardEvent) => void} */
   #typed = (event) => this.#key(event);
   #changed = () => this.#limit();
 
+  /** @param {HTMLInputElement} input @param {() => void} closed */
   constructor(input, closed) {
     this.input = input;
     this.#closed = closed;
@@ -56,6 +59,7 @@ export class Entry {
 
   // A real keyboard types into the field by itself. Its Enter is Done: it presses nothing. Enter and Escape
   // of an input method's conversion are its own.
+  /** @param {KeyboardEvent} event */
   #key(event) {
     if (event.target !== this.input || event.isComposing || !["Enter", "Escape"].includes(event.key)) return;
     event.preventDefault();
@@ -63,6 +67,7 @@ export class Entry {
     else this.cancel();
   }
 
+  /** @param {HTMLButtonElement | null} button */
   #clicked(button) {
     if (!button || button.disabled) return;
     const { key } = button.dataset;
@@ -73,6 +78,7 @@ export class Entry {
     else this.#edit(key);
   }
 
+  /** @param {string} key */
   #edit(key) {
     const { selectionStart: start, selectionEnd: end, value } = this.input;
     if (key === "left" || key === "right") {
@@ -85,10 +91,12 @@ export class Entry {
     if (this.#shift === "once" && key !== "delete") this.#setMode({ shift: "off" });
   }
 
+  /** @param {string} name */
   #dispatch(name) {
     this.input.dispatchEvent(new Event(name, { bubbles: true }));
   }
 
+  /** @param {{ shift?: string, signs?: boolean }} mode */
   #setMode({ shift = this.#shift, signs = this.#signs }) {
     this.#shift = shift;
     this.#signs = signs;
@@ -120,12 +128,14 @@ export class Entry {
   }
 }
 
+/** @param {string} letter */
 function keyOf(letter) {
   const key = Object.assign(document.createElement("button"), { type: "button", textContent: letter });
   key.dataset.key = letter;
   return key;
 }
 
+/** @param {HTMLElement[]} keys */
 function rowOf(keys) {
   const row = document.createElement("div");
   row.className = "row";

@@ -11,20 +11,24 @@ const SHAPES = ["tall", "wide", "narrow"];
 const SCANNED_MS = 50; // a bar code reader types faster: its Enter confirms nothing
 const SHORT = 9; // characters that fit in large digits
 const OF_INPUT_METHOD = 229;
+/** @type {Record<string, string>} */
 const KEYS = { Backspace: "delete", Delete: "clear" };
 
 export class Entry {
   input;
   #sheet = new Sheet("keypad", SHAPES, () => this.cancel());
   #draft;
+  /** @type {() => void} */
   #closed;
   #before;
   #wasTouched;
   #isPasted = false;
   #lastKeyAt = -Infinity;
   #changed = () => this.#pasted();
+  /** @type {(event: KeyboardEvent) => void} */
   #typed = (event) => this.#key(event);
 
+  /** @param {HTMLInputElement} input @param {() => void} closed */
   constructor(input, closed) {
     this.input = input;
     this.#closed = closed;
@@ -53,6 +57,7 @@ export class Entry {
     this.#closed();
   }
 
+  /** @param {string} selector */
   #find(selector) {
     return this.#sheet.root.querySelector(selector);
   }
@@ -79,6 +84,7 @@ export class Entry {
     this.#find(".scale").hidden = min === "" || max === "";
   }
 
+  /** @param {HTMLButtonElement | null} button */
   #clicked(button) {
     if (!button || button.disabled) return;
     if (button.matches(".cancel-entry")) this.cancel();
@@ -86,11 +92,13 @@ export class Entry {
     else this.#press(button.dataset.key);
   }
 
+  /** @param {string} key */
   #press(key) {
     const limit = limitsOf(this.input)[key];
     this.#type(() => (limit === undefined ? this.#draft.press(key) : this.#draft.replace(numberText(limit))));
   }
 
+  /** @param {() => void} change */
   #type(change) {
     change();
     this.#show();
@@ -102,6 +110,7 @@ export class Entry {
   }
 
   // A real keyboard enters here too, except where a key of the page has the focus.
+  /** @param {KeyboardEvent} event */
   #key(event) {
     const { target, key, isComposing, keyCode } = event;
     if (isComposing || keyCode === OF_INPUT_METHOD) return;
@@ -144,6 +153,7 @@ export class Entry {
     this.#close();
   }
 
+  /** @param {string} text */
   #put(text) {
     this.input.removeEventListener("input", this.#changed);
     this.input.value = text;

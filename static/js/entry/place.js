@@ -1,9 +1,12 @@
 // Where a sheet lies: beside its field, never over it, the header or the keys of the frame.
+/** @typedef {{ left: number, right: number, top: number, bottom: number }} Area @typedef {{ left: number, top: number, lift: number, side: string, point: number }} Spot */
 const GAP_PX = 8;
 
+/** @type {(selector: string) => DOMRect | undefined} */
 const rect = (selector) => document.querySelector(selector)?.getBoundingClientRect();
 
 // What is kept free: the field with its name, a slider with its value; where there is less room, the field alone.
+/** @param {HTMLElement} input */
 function fieldsOf(input) {
   const field = input.closest(".entry") ?? input;
   const whole = input.matches("[data-entry]") ? field : input.closest("[data-widget]");
@@ -11,6 +14,7 @@ function fieldsOf(input) {
 }
 
 // The page, and where that is too small what is below it too, beside the keys of the frame.
+/** @returns {Area[]} */
 function areas() {
   const { left, right, top, bottom } = rect("main");
   const page = { left, right, top, bottom };
@@ -21,6 +25,7 @@ function areas() {
   return [page];
 }
 
+/** @param {HTMLElement} sheet @param {string} shape @param {Area} area */
 function measure(sheet, shape, area) {
   sheet.dataset.shape = shape;
   sheet.style.setProperty("--most", `${area.right - area.left - 2 * GAP_PX}px`);
@@ -29,6 +34,7 @@ function measure(sheet, shape, area) {
 }
 
 // Beside the field, as high as the page: null without room.
+/** @param {HTMLElement} sheet @param {DOMRect} field @param {Area} area @returns {Spot | null} */
 function aside(sheet, field, area) {
   const { width, height } = measure(sheet, "tall", area);
   const room = area.bottom - area.top - 2 * GAP_PX;
@@ -42,6 +48,7 @@ function aside(sheet, field, area) {
 }
 
 // Below or above the field over the width of the page; without room there the page is lifted.
+/** @param {HTMLElement} sheet @param {DOMRect} field @param {Area} area @param {string} shape @returns {Spot | null} */
 function across(sheet, field, area, shape) {
   const { width, height } = measure(sheet, shape, area);
   if (width > area.right - area.left) return null;
@@ -61,6 +68,7 @@ function across(sheet, field, area, shape) {
 }
 
 // Places the sheet for an input; returns by how many pixels the page is lifted.
+/** @param {HTMLElement} sheet @param {HTMLElement} input @param {string[]} shapes */
 export function place(sheet, input, shapes) {
   const main = document.querySelector("main");
   main.toggleAttribute("data-lifted", false);
@@ -72,6 +80,7 @@ export function place(sheet, input, shapes) {
   return spot.lift;
 }
 
+/** @param {HTMLElement} sheet @param {DOMRect[]} fields @param {string[]} shapes @returns {Spot} */
 function spotOf(sheet, fields, shapes) {
   for (const area of areas()) {
     for (const field of fields) {
@@ -85,6 +94,7 @@ function spotOf(sheet, fields, shapes) {
 }
 
 // A screen that is too low for both: the end of the field is seen, and the sheet in its last shape.
+/** @param {HTMLElement} sheet @param {DOMRect} field @param {Area} area @returns {Spot} */
 function lowest(sheet, field, area) {
   const { height } = sheet.getBoundingClientRect();
   const top = Math.max(area.top, area.bottom - height);

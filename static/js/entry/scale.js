@@ -2,6 +2,7 @@
 import { numberText } from "../number-text.js";
 import { setText } from "../show.js";
 
+/** @param {HTMLElement} scale @param {string | null} plain @param {Limits} limits */
 export function markScale(scale, plain, { min, max }) {
   const at = 12.5 + (75 * (Number(plain) - min)) / (max - min);
   scale.style.setProperty("--at", `${Math.min(Math.max(at, 0), 100)}%`);

@@ -9,6 +9,7 @@ const message = document.getElementById(field.getAttribute("aria-describedby"));
 let burst = "";
 let lastAt = -Infinity;
 
+/** @param {string} text */
 function deliver(text) {
   const isTooLong = [...text].length > field.maxLength;
   message.textContent = isTooLong ? message.dataset.tooLong : "";
@@ -17,11 +18,13 @@ function deliver(text) {
   for (const name of ["input", "change"]) field.dispatchEvent(new Event(name, { bubbles: true }));
 }
 
+/** @param {Event} event */
 function swallow(event) {
   event.preventDefault();
   event.stopImmediatePropagation();
 }
 
+/** @param {KeyboardEvent} event */
 function typed(event) {
   const { key, target, timeStamp, ctrlKey, altKey, metaKey } = event;
   if (key === "Shift" || ctrlKey || altKey || metaKey) return;

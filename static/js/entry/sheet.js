@@ -21,14 +21,19 @@ function settle() {
 }
 
 export class Sheet {
+  /** @type {HTMLElement} */
   root;
+  /** @type {HTMLElement | null} */
   #input = null;
+  /** @type {string[]} */
   #shapes;
+  /** @type {() => void} */
   #gone; // called when the input is not there any more
   #watch = new ResizeObserver(() => (this.#input.getClientRects().length ? this.#place() : this.#gone()));
   #placed = () => this.#place();
 
   // `shapes`: how it may look, the best one first.
+  /** @param {string} id @param {string[]} shapes @param {() => void} gone */
   constructor(id, shapes, gone) {
     this.root = document.getElementById(id).content.firstElementChild.cloneNode(true);
     this.#shapes = shapes;
@@ -37,6 +42,7 @@ export class Sheet {
     this.root.addEventListener("mousedown", (event) => event.preventDefault());
   }
 
+  /** @param {HTMLElement} input @param {string | null} label */
   open(input, label) {
     this.#input = input;
     this.root.setAttribute("aria-label", label);

@@ -1,10 +1,12 @@
 // Opens the keypad or the keyboard on the screen at a touch in an input. With panel key `keyboard = "auto"` only
 // where a finger is the main pointer.
 const coarse = matchMedia("(pointer: coarse)");
-const always = document.body.dataset.keyboard === "on";
+const always = pageGuard.page.keyboard === "on";
 const TOUCHED = ":is(input[type=text], output)";
+/** @type {Record<"keypad" | "keyboard", () => Promise<{ Entry: new (input: HTMLInputElement, closed: () => void) => { input: HTMLElement, cancel(): void } }>>} */
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
+/** @type {{ input: HTMLElement, cancel(): void } | null} */
 let open = null; // what is open now
 let touches = 0; // counts them: a module that arrives after the next touch opens nothing
 
@@ -18,6 +20,7 @@ function prepare() {
   document.body.toggleAttribute("data-touch-entry", active);
 }
 
+/** @param {HTMLElement} place */
 async function openFor(place) {
   const input = place.matches("output") ? place.parentElement.querySelector("input") : place;
   if (open?.input === input) return;

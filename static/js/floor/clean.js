@@ -23,6 +23,7 @@ export class Cleaning {
     this.#begin(totalMs());
   }
 
+  /** @param {number} ms */
   #begin(ms) {
     this.#endsAt = performance.now() + ms;
     shield.raise();

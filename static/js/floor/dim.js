@@ -6,10 +6,13 @@ const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keyd
 const dark = document.getElementById("dark");
 
 export class Dimming {
+  /** @type {number} */
   #afterMs;
   #timer = 0;
+  /** @type {Set<number>} */
   #pressed = new Set(); // pointers that are down: a page that is held is touched
 
+  /** @param {number} afterMs */
   constructor(afterMs) {
     this.#afterMs = afterMs;
     for (const name of MOVES) addEventListener(name, (event) => this.#touched(event), true);
@@ -29,6 +32,7 @@ export class Dimming {
     this.#wait();
   }
 
+  /** @param {Event} event */
   #touched({ type, pointerId, movementX, movementY }) {
     if (type === "pointermove" && !movementX && !movementY) return; // the page moved, not the mouse
     if (type === "pointerdown") this.#pressed.add(pointerId);

@@ -7,6 +7,7 @@ function isKiosk() {
   return "kiosk" in document.documentElement.dataset && coarse.matches;
 }
 
+/** @param {string} name @param {(event: Data) => boolean} isGesture */
 function refuse(name, isGesture = () => true) {
   const listener = (event) => isKiosk() && isGesture(event) && event.preventDefault();
   addEventListener(name, listener, { capture: true, passive: false });
@@ -18,10 +19,11 @@ refuse("gesturestart"); // a pinch in WebKit
 refuse("wheel", ({ ctrlKey }) => ctrlKey);
 refuse("keydown", ({ key, ctrlKey, metaKey }) => (ctrlKey || metaKey) && ZOOM_KEYS.includes(key));
 
-const afterMs = 1000 * (document.body.dataset.dimAfterS ?? 0);
+const afterMs = 1000 * (pageGuard.page.dimAfterS ?? 0);
 if (afterMs) import("./dim.js").then(({ Dimming }) => new Dimming(afterMs)).catch(pageGuard.fail);
 
 // Loaded with the menu, and where the page was loaded again while it was cleaned.
+/** @type {Promise<import("./clean.js").Cleaning | void> | null} */
 let cleaning = null;
 const begin = () => import("./clean.js").then(({ Cleaning }) => new Cleaning()).catch(pageGuard.fail);
 const loaded = () => (cleaning ??= begin());

@@ -22,8 +22,10 @@ const OTHERS = [
 
 class Shield {
   // Called with each event that is swallowed.
+  /** @type {(event: Event) => void} */
   touched = () => {};
   #up = false;
+  /** @type {Set<number | string>} */
   #down = new Set(); // the pointers and keys that went down under it
   #timer = 0;
 
@@ -45,9 +47,13 @@ class Shield {
   // When what went down has gone up, and a second tap would have come.
   lower() {
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => (this.#down.size ? this.lower() : (this.#up = false)), TAP_AGAIN_MS);
+    this.#timer = setTimeout(() => {
+      if (this.#down.size) this.lower();
+      else this.#up = false;
+    }, TAP_AGAIN_MS);
   }
 
+  /** @param {Event} event */
   #swallow(event) {
     if (!this.#up) return;
     const what = event.pointerId ?? event.code;

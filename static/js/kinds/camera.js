@@ -4,17 +4,23 @@ const RETRY_MS = 1000;
 const WATCH_MS = 100;
 
 // Called for each widget of this kind.
+/** @param {HTMLElement} root */
 export const equip = (root) => new Camera(root);
 
 class Camera {
+  /** @type {HTMLElement} */
   #root;
+  /** @type {HTMLCanvasElement} */
   #canvas;
+  /** @type {WebSocket | null} */
   #socket = null;
   #onScreen = false;
   #retry = 0;
+  /** @type {{ type: string, number: string, time: string } | null} */
   #header = null; // of the bytes that come next
   #drawnAt = 0;
 
+  /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
     this.#canvas = root.querySelector("canvas");
@@ -36,7 +42,7 @@ class Camera {
   #open() {
     if (this.#socket) return;
     clearTimeout(this.#retry);
-    const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/frames`;
+    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/frames`;
     const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
     socket.binaryType = "blob";
     this.#socket = socket;
@@ -59,10 +65,12 @@ class Camera {
     this.#socket = null;
   }
 
+  /** @param {WebSocket} socket */
   #requestPicture(socket) {
     if (socket.readyState === WebSocket.OPEN) socket.send('{"next": true}');
   }
 
+  /** @param {WebSocket} socket @param {Blob} bytes @param {{ type: string, number: string, time: string }} header */
   async #draw(socket, bytes, { type, number, time }) {
     try {
       const picture = await createImageBitmap(new Blob([bytes], { type }));

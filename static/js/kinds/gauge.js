@@ -1,10 +1,12 @@
 // Moves what stands on the scale of a gauge.
+/** @type {Record<string, Show>} */
 export const show = {
   pointer: (root, value) => place(root, ".pointer", value),
   setpoint: (root, value) => place(root, ".setpoint", value),
 };
 
 // `percent` is from the lower end of the scale, null where it is unknown.
+/** @param {HTMLElement} root @param {string} mark @param {number | null} percent */
 function place(root, mark, percent) {
   const element = root.querySelector(mark);
   element.toggleAttribute("hidden", percent === null);

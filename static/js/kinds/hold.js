@@ -4,15 +4,18 @@ import { Holding } from "../holding.js";
 const KEYS = [" ", "Enter"];
 
 // Called for each widget of this kind.
+/** @param {HTMLElement} root @param {import("../source.js").Source} source */
 export const equip = (root, source) => new Hold(root, source);
 
 class Hold extends Holding {
+  /** @param {HTMLElement} root @param {import("../source.js").Source} source */
   constructor(root, source) {
     super(root, source);
     this.button.addEventListener("pointerdown", (event) => this.#down(event));
     this.button.addEventListener("keydown", (event) => this.#keyDown(event));
   }
 
+  /** @param {PointerEvent} event */
   #down(event) {
     if (!event.isPrimary || event.button !== 0 || this.busy) return;
     // A finger's pointer stays with the button by itself: it must be seen to slide off.
@@ -21,6 +24,7 @@ class Hold extends Holding {
     this.begin();
   }
 
+  /** @param {KeyboardEvent} event */
   #keyDown(event) {
     if (!KEYS.includes(event.key)) return;
     event.preventDefault();

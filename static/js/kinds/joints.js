@@ -1,10 +1,12 @@
 // Shows the joints of a widget, a row each.
 import { setText } from "../show.js";
 
+/** @type {<T>(root: HTMLElement, values: T[], show: (row: HTMLElement, value: T) => void) => void} */
 const eachRow = (root, values, show) => {
-  root.querySelectorAll("li").forEach((row, number) => show(row, values[number]));
+  for (const [number, row] of root.querySelectorAll("li").entries()) show(row, values[number]);
 };
 
+/** @type {Record<string, Show>} */
 export const show = {
   joint_values: (root, texts) => eachRow(root, texts, (row, text) => setText(row.querySelector(".now"), text)),
   joint_levels: (root, levels) => eachRow(root, levels, (row, level) => (row.dataset.level = level)),
@@ -12,6 +14,7 @@ export const show = {
 };
 
 // `percent` is from the lower end of the range, null where it is unknown.
+/** @param {HTMLElement} row @param {number | null} percent */
 function place(row, percent) {
   const zero = Number(row.dataset.zero);
   const [amount, pointer] = [".amount", ".pointer"].map((part) => row.querySelector(part));

@@ -3,18 +3,23 @@
 import { Holding } from "../holding.js";
 
 const APART_MS = 40; // between two heartbeats of a finger that moves
+/** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
 // Called for each widget of this kind.
+/** @param {HTMLElement} root @param {import("../source.js").Source} source */
 export const equip = (root, source) => new Joystick(root, source);
 
 class Joystick extends Holding {
+  /** @type {HTMLElement} */
   #knob;
   #x = 0;
   #y = 0;
+  /** @type {Set<string>} */
   #arrows = new Set(); // those that are held
   #beatAt = 0;
 
+  /** @param {HTMLElement} root @param {import("../source.js").Source} source */
   constructor(root, source) {
     super(root, source);
     this.#knob = root.querySelector(".knob");
@@ -28,6 +33,7 @@ class Joystick extends Holding {
     return { x: this.#x, y: this.#y };
   }
 
+  /** @param {Record<string, string>} moves */
   onResponse(moves) {
     for (const [axis, text] of Object.entries(moves))
       this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
@@ -39,6 +45,7 @@ class Joystick extends Holding {
     for (const value of this.root.querySelectorAll("[data-axis]")) value.textContent = "";
   }
 
+  /** @param {PointerEvent} event */
   #down(event) {
     if (!event.isPrimary || event.button !== 0 || this.busy) return;
     this.button.setPointerCapture(event.pointerId);
@@ -48,6 +55,7 @@ class Joystick extends Holding {
   }
 
   // From the middle of the pad, as far as the knob goes.
+  /** @param {PointerEvent} event */
   #moveTo({ clientX, clientY }) {
     const { left, top, width, height } = this.root.querySelector(".pad").getBoundingClientRect();
     const reach = (Math.min(width, height) - this.#knob.offsetWidth) / 2;
@@ -57,6 +65,7 @@ class Joystick extends Holding {
     this.beat();
   }
 
+  /** @param {number} x @param {number} y */
   #deflect(x, y) {
     const inside = (value) => Math.max(-1, Math.min(1, value));
     const far = this.root.dataset.shape === "circle" ? Math.max(1, Math.hypot(x, y)) : 1;
@@ -66,6 +75,7 @@ class Joystick extends Holding {
     this.#knob.style.setProperty("--y", this.#y);
   }
 
+  /** @param {KeyboardEvent} event */
   #keyDown(event) {
     if (!(event.key in ARROWS)) return;
     event.preventDefault();
@@ -78,6 +88,7 @@ class Joystick extends Holding {
     this.#deflectByArrows();
   }
 
+  /** @param {KeyboardEvent} event */
   #keyUp(event) {
     if (!this.#arrows.delete(event.key)) return;
     if (this.#arrows.size) this.#deflectByArrows();
@@ -86,6 +97,7 @@ class Joystick extends Holding {
 
   #deflectByArrows() {
     const held = [...this.#arrows].map((key) => ARROWS[key]);
+    /** @param {0 | 1} axis */
     const sum = (axis) => held.reduce((all, arrow) => all + arrow[axis], 0);
     this.#deflect(sum(0), sum(1));
     this.beat();

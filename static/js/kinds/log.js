@@ -4,11 +4,14 @@ import { setText } from "../show.js";
 const APART_MS = 250;
 const SETTLE_MS = 300; // from the last letter typed
 
+/** @type {WeakMap<HTMLElement, Log>} */
 const logs = new WeakMap();
 
 // Called for each widget of this kind.
+/** @param {HTMLElement} root */
 export const equip = (root) => logs.set(root, new Log(root));
 
+/** @type {Record<string, Show>} */
 export const show = {
   count(root, value) {
     root.dataset.count = value;
@@ -17,15 +20,19 @@ export const show = {
 };
 
 class Log {
+  /** @type {HTMLElement} */
   #root;
+  /** @type {HTMLElement} */
   #lines;
   #last = 0; // the number of the newest line at the last response
   #queriedAt = -Infinity;
   #timer = 0;
+  /** @type {AbortController | null} */
   #request = null; // the request under way
   #onScreen = false;
   #paused = false;
 
+  /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
     this.#lines = root.querySelector(".lines");
@@ -69,7 +76,8 @@ class Log {
   async #query(whole = false) {
     this.#timer = 0;
     this.#queriedAt = performance.now();
-    const request = (this.#request = new AbortController());
+    const request = new AbortController();
+    this.#request = request;
     const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
     const query = new URLSearchParams({
       level: of("level"),
@@ -78,7 +86,7 @@ class Log {
       after: whole ? 0 : this.#last,
     });
     try {
-      const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
+      const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
       const answer = await fetch(path, { signal: request.signal });
       if (answer.ok && request === this.#request) this.#show(await answer.json(), whole);
     } catch {
@@ -89,6 +97,7 @@ class Log {
     this.update();
   }
 
+  /** @param {{ lines: Record<string, string>[], note: string, last: number }} answer @param {boolean} whole */
   #show({ lines, note, last }, whole) {
     const template = this.#root.querySelector("template");
     const top = this.#lines.scrollTop;

@@ -1,19 +1,22 @@
 // Shows the rows of a table. Rows and cells stay in place: only what has changed is written.
 import { setText } from "../show.js";
 
+/** @type {Record<string, Show>} */
 export const show = {
   table_rows: (root, rows) => {
-    root.querySelectorAll("tbody tr").forEach((row, number) => showRow(row, rows[number]));
+    for (const [number, row] of root.querySelectorAll("tbody tr").entries()) showRow(row, rows[number]);
   },
 };
 
+/** @param {HTMLTableRowElement} row @param {{ age?: string, cells: CellValue[] } | undefined} values */
 function showRow(row, values) {
   row.toggleAttribute("data-empty", !values);
   row.toggleAttribute("data-old", Boolean(values?.age));
   setText(row.querySelector(".age"), values?.age ?? "");
-  [...row.cells].forEach((cell, number) => showCell(cell, values?.cells[number]));
+  for (const [number, cell] of [...row.cells].entries()) showCell(cell, values?.cells[number]);
 }
 
+/** @param {HTMLElement} cell @param {CellValue | undefined} value */
 function showCell(cell, value) {
   setText(cell.querySelector(".cell-text"), value?.text ?? "");
   if (cell.dataset.shape === undefined) return;

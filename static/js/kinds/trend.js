@@ -8,24 +8,33 @@ const AGAIN_MS = 2000; // after one that failed
 const LATE_S = 1; // a sample is in the history by then
 const SETTLED_S = 0.5;
 
+/** @param {HTMLElement} root */
 export const equip = (root) => new Trend(root);
 
 class Trend {
+  /** @type {HTMLElement} */
   #root;
+  /** @type {HTMLElement} */
   #area;
   #plot;
   #cursor;
+  /** @type {Column[][]} */
   #columns; // of each pen
+  /** @type {number[]} */
   #windows;
   #keep;
   #span;
+  /** @type {number | null} */
   #end = null; // in seconds since the epoch, by the server's clock; null: live
+  /** @type {View | null} */
   #drawn = null; // {begin, end, width, zone, shift} of the columns
   #clock = 0; // what to add to performance.now() for the server's clock, in seconds
   #visible = false;
   #timer = 0;
+  /** @type {AbortController | null} */
   #request = null; // the request under way
 
+  /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
     this.#area = root.querySelector(".area");
@@ -51,6 +60,7 @@ class Trend {
     return performance.now() / 1000 + this.#clock;
   }
 
+  /** @param {boolean} visible */
   #setVisible(visible) {
     this.#visible = visible;
     this.#update();
@@ -66,7 +76,8 @@ class Trend {
 
   async #query() {
     this.#request?.abort();
-    const request = (this.#request = new AbortController());
+    const request = new AbortController();
+    this.#request = request;
     const points = this.#plot.mostColumns;
     const query = { span_s: this.#span, points };
     const width = this.#span / points;
@@ -74,7 +85,7 @@ class Trend {
     const goesOn = this.#end === null && drawn?.live && drawn.width === width;
     if (this.#end !== null) query.end = this.#end;
     if (goesOn) query.since = Math.max(0, Math.floor((drawn.end - LATE_S) / width) - 1);
-    const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/trend?${new URLSearchParams(query)}`;
+    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/trend?${new URLSearchParams(query)}`;
     let wait = AGAIN_MS;
     try {
       const response = await fetch(path, { signal: request.signal });
@@ -94,6 +105,7 @@ class Trend {
   }
 
   // Columns from `since` on take the place of those that are there.
+  /** @param {Data} answer @param {number} since @param {boolean} live */
   #receive(answer, since, live) {
     const { end, shift, width_s: width, zone_s: zone, offset } = answer;
     const begin = end - this.#span;

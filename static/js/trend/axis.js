@@ -7,9 +7,11 @@ const NARROWEST = 1e-9; // relative: a narrower axis has ticks that doubles can'
 const MARGIN = 0.05;
 const MOST_DIGITS = 12; // after the point
 
+/** @param {number} value */
 const drawable = (value) => Math.min(Math.max(value, -LARGEST), LARGEST);
 
 // [low, high] for values from `low` to `high`, with a margin where an end is not fixed (undefined).
+/** @param {number} lowest @param {number} highest @param {number | undefined} fixedLow @param {number | undefined} fixedHigh @returns {[number, number]} */
 export function axisRange(lowest, highest, fixedLow, fixedHigh) {
   let low = drawable(fixedLow ?? lowest);
   let high = drawable(fixedHigh ?? highest);
@@ -25,6 +27,7 @@ export function axisRange(lowest, highest, fixedLow, fixedHigh) {
 }
 
 // [value, text] of the lines of the grid, about `most`; the text has a hyphen and a point.
+/** @param {number} low @param {number} high @param {number} most @returns {Generator<[number, string]>} */
 export function* valueTicks(low, high, most) {
   const least = (high - low) / most;
   const power = 10 ** Math.floor(Math.log10(least));

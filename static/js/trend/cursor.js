@@ -6,12 +6,18 @@ const STEP = 0.02; // of the plot's width, by a key
 const NOTHING = "—";
 
 export class Cursor {
+  /** @type {HTMLElement} */
   #root;
+  /** @type {import("./plot.js").Plot} */
   #plot;
+  /** @type {View | null} */
   #drawn = null; // {begin, end, width, span} of what the plot shows
+  /** @type {Column[][]} */
   #columns = [];
+  /** @type {number | null} */
   #time = null; // in seconds since the epoch
 
+  /** @param {HTMLElement} root @param {import("./plot.js").Plot} plot */
   constructor(root, plot) {
     this.#root = root;
     this.#plot = plot;
@@ -27,11 +33,13 @@ export class Cursor {
     this.#time = null;
   }
 
+  /** @param {View} drawn @param {Column[][]} columns */
   show(drawn, columns) {
     [this.#drawn, this.#columns] = [drawn, columns];
     this.#show();
   }
 
+  /** @param {number} place */
   #point(place) {
     if (!this.#drawn) return;
     const { begin, end } = this.#drawn;
@@ -39,6 +47,7 @@ export class Cursor {
     this.#show();
   }
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
     const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
     if (!this.#drawn || (!by && event.key !== "Escape")) return;
@@ -71,6 +80,7 @@ export class Cursor {
     );
   }
 
+  /** @param {Pen} pen @param {Column[]} columns */
   #valueAt(pen, columns) {
     const distance = (one) => Math.abs(this.#plot.timeOf(one[0]) - this.#time);
     const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);

@@ -13,14 +13,20 @@ const STEPS = [
 ];
 
 // The name of a limit stands outside of what the limits enclose, if that is drawn.
+/** @type {(letter: string, place: number) => boolean} */
 const isNamedAbove = (letter, place) => (letter === "H" ? place >= NAME_ROOM : place > 100 - NAME_ROOM);
+/** @type {(text: string | undefined) => number | undefined} */
 const numberOr = (text) => (text === undefined ? undefined : Number(text));
 
 export class Plot {
+  /** @type {HTMLElement} */
   #root;
+  /** @type {HTMLElement} */
   #area;
+  /** @type {View} */
   #view; // {begin, end, width, zone, offset}: from when to when, the time of a column, the time zone, in seconds; its text if shown
 
+  /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
     this.#area = root.querySelector(".area");
@@ -42,6 +48,7 @@ export class Plot {
   }
 
   // `columns` of each pen are [number, lowest, highest, last, whether it begins a line].
+  /** @param {View} view @param {Column[][]} columns */
   draw(view, columns) {
     this.#view = view;
     const { begin, end } = view;
@@ -89,6 +96,7 @@ export class Plot {
   }
 
   // Through the lowest and the highest value of each column: no peak is lost.
+  /** @param {Pen} pen @param {Column[]} columns @param {(time: number) => number} x @param {(value: number) => number} y */
   #drawPen(pen, columns, x, y) {
     const path = [];
     let before = 0;
@@ -112,10 +120,12 @@ export class Plot {
   }
 
   // The time in the middle of a column.
+  /** @param {number} number */
   timeOf(number) {
     return (number + 0.5) * this.#view.width;
   }
 
+  /** @param {Column[][]} columns */
   #range(columns) {
     const fixed = this.pens
       .flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])])
@@ -128,6 +138,7 @@ export class Plot {
     return axisRange(lowest, highest, numberOr(min), numberOr(max));
   }
 
+  /** @returns {Generator<[number, string]>} */
   *#timeTicks() {
     const { begin, end, zone } = this.#view;
     const step =
@@ -139,6 +150,7 @@ export class Plot {
     }
   }
 
+  /** @param {number} time */
   #local(time) {
     return new Date((time + this.#view.zone) * 1000).toISOString();
   }
@@ -148,12 +160,14 @@ export class Plot {
     return this.#view.offset ? ` ${this.#view.offset}` : "";
   }
 
+  /** @param {number} time */
   clockOf(time) {
     return this.#local(time).slice(11, 19) + this.#zoneText;
   }
 }
 
 // Seconds as "2 d 03:04:05".
+/** @param {number} s */
 export function duration(s) {
   const two = (number) => String(Math.floor(number)).padStart(2, "0");
   const days = s >= 86400 ? `${Math.floor(s / 86400)} d ` : "";
