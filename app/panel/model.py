@@ -5,13 +5,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, Field
 
 from app.dialect.dialect import DEFAULT_DIALECT, DialectName
 from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
-from app.interfaces.validation import format_value
 from app.panel.alarm import Alarm, AlarmRules
 from app.panel.base import (
     Description,
@@ -27,8 +26,8 @@ from app.panel.base import (
 )
 from app.panel.condition import Condition
 from app.panel.demo import DemoEntry
-from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
+from app.panel.language_choice import Language, Languages
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
 from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
@@ -49,27 +48,6 @@ from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
 from app.pictures import picture_files
-
-
-def _check_language(tag: str) -> str:
-    if tag not in files():
-        raise ValueError(one_of([*files()], tag))
-    return tag
-
-
-def _check_languages(tags: tuple[str, ...]) -> tuple[str, ...]:
-    if not tags:
-        raise ValueError("is empty: name one language at least, or leave the key out")
-    for i, tag in enumerate(tags):
-        if tag in tags[:i]:
-            raise ValueError(f"names {format_value(tag)} twice")
-    return tags
-
-
-Language = Annotated[
-    str, AfterValidator(_check_language), WithJsonSchema({"type": "string", "enum": [*files()]})
-]
-Languages = Annotated[tuple[Language, ...], Field(strict=False), AfterValidator(_check_languages)]
 
 
 class RobotEntry(Description):
