@@ -32,14 +32,14 @@ def add_settings(parser: Parser) -> None:
     add("--data", metavar="FOLDER", help="where the operator's log and recordings are (KIOSK_DATA)")
 
 
-def environment(given: Any) -> dict[str, str]:
+def environment(options: Any) -> dict[str, str]:
     """The variables of the options that were given; several names are one list."""
-    found = {}
+    variables = {}
     for option, variable in VARIABLES.items():
-        value = getattr(given, option, None)
+        value = getattr(options, option, None)
         if value is not None:
-            found[variable] = ",".join(value) if isinstance(value, list) else str(value)
-    return found
+            variables[variable] = ",".join(value) if isinstance(value, list) else str(value)
+    return variables
 
 
 def port(text: str) -> int:

@@ -27,19 +27,19 @@ HIGHEST_DOMAIN: Final = 232
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     try:
-        panel = load_panel(given.panel or Settings.from_environment().panel)
+        panel = load_panel(options.panel or Settings.from_environment().panel)
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
-    entry = _robot(parser, panel, given.robot)
-    text = bridge_config(panel, entry, _options(given, entry))
-    if given.output is None:
+    entry = _robot(parser, panel, options.robot)
+    text = bridge_config(panel, entry, _options(options, entry))
+    if options.output is None:
         print(text, end="")
         return 0
     try:
-        with draft_of(given.output, given.force) as draft:
+        with draft_of(options.output, options.force) as draft:
             draft.write_text(text, encoding="utf-8")
     except OutputError as error:
         print(error, file=sys.stderr)
@@ -59,13 +59,13 @@ def _robot(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | None:
     parser.error(f"--robot names one of the panel's robots: there is {listed}")
 
 
-def _options(given: Any, entry: RobotEntry | None) -> BridgeOptions:
-    listen = given.listen or (entry.connect if entry and entry.connect else LISTEN)
+def _options(options: Any, entry: RobotEntry | None) -> BridgeOptions:
+    listen = options.listen or (entry.connect if entry and entry.connect else LISTEN)
     return BridgeOptions(
-        domain=given.domain,
+        domain=options.domain,
         listen=tuple(listen),
-        nodename=given.nodename,
-        prefixed=given.prefixed,
+        nodename=options.nodename,
+        prefixed=options.prefixed,
     )
 
 

@@ -17,13 +17,13 @@ GOOD, FAULTY, UNREADABLE = range(3)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
+    options = make_parser(prog).parse_args(arguments)
     try:
-        paths = given.panel or [Settings.from_environment().panel]
+        paths = options.panel or [Settings.from_environment().panel]
     except KioskError as error:
         print(error, file=sys.stderr)
         return UNREADABLE
-    return max(checked(path, given.verbose) for path in paths)
+    return max(checked(path, options.verbose) for path in paths)
 
 
 def checked(path: Path, verbose: bool = False) -> int:

@@ -14,20 +14,20 @@ from app.settings import APP
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The exit status; `--help` and a mistake on the command line raise SystemExit."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    return until_closed(lambda: _run(given))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return until_closed(lambda: _run(words))
 
 
-def _run(given: list[str]) -> int:
-    if not given:
+def _run(words: list[str]) -> int:
+    if not words:
         program_parser().print_help(sys.stderr)
         return USAGE_ERROR
-    name = given[0]
+    name = words[0]
     if name not in COMMANDS:  # an option of this program, or a mistake
         parser = program_parser()
         parser.parse_args([name])
         parser.error(f"the command is missing: there is {', '.join(COMMANDS)}")
-    return COMMANDS[name].load().main(given[1:], f"{APP} {name}")
+    return COMMANDS[name].load().main(words[1:], f"{APP} {name}")
 
 
 class _ProgramParser(Parser):

@@ -36,11 +36,11 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def _words(parser: argparse.ArgumentParser) -> list[str]:
     """The options, and the words that its arguments are chosen from."""
-    found = [option for action in parser._actions for option in action.option_strings]
+    options = [option for action in parser._actions for option in action.option_strings]
     for action in parser._actions:
         if not action.option_strings and action.choices is not None:
-            found += map(str, action.choices)
-    return found
+            options += map(str, action.choices)
+    return options
 
 
 def _choices(parser: argparse.ArgumentParser) -> Iterator[tuple[list[str], list[str]]]:

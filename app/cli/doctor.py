@@ -26,38 +26,38 @@ LONGEST_LISTEN_S: Final = 600.0
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
+    parsed = make_parser(prog).parse_args(arguments)
     try:
-        settings = settings_of(given)
-        found = asyncio.run(diagnose(settings, options_of(given)))
+        settings = settings_of(parsed)
+        diagnosis = asyncio.run(diagnose(settings, options_of(parsed)))
     except KioskError as error:
         print(error, file=sys.stderr)
         return FAILED
-    if given.json:
-        print(json.dumps(as_json(settings, found), indent=2, ensure_ascii=False))
+    if parsed.json:
+        print(json.dumps(as_json(settings, diagnosis), indent=2, ensure_ascii=False))
     else:
-        print(as_text(found.report, given.verbose))
-    return WELL if found.report.is_well else FINDINGS
+        print(as_text(diagnosis.report, parsed.verbose))
+    return WELL if diagnosis.report.is_well else FINDINGS
 
 
-def settings_of(given: Any) -> Settings:
+def settings_of(options: Any) -> Settings:
     """The settings of the environment, with what the command line says instead."""
-    return Settings.from_environment({**os.environ, **environment(given)})
+    return Settings.from_environment({**os.environ, **environment(options)})
 
 
-def options_of(given: Any) -> Options:
-    return Options(host=given.host, port=given.port, listen_s=given.listen)
+def options_of(options: Any) -> Options:
+    return Options(host=options.host, port=options.port, listen_s=options.listen)
 
 
-def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
+def as_json(settings: Settings, diagnosis: Diagnosis) -> dict[str, Any]:
     """What `--json` prints; see docs/how-to/doctor.md."""
     return {
         "version": installed_version(),
         "panel": str(settings.panel),
-        "well": found.report.is_well,
-        "findings": [finding.as_json() for finding in found.report.findings],
-        "more": dict(found.report.more),
-        "facts": found.report.facts,
+        "well": diagnosis.report.is_well,
+        "findings": [finding.as_json() for finding in diagnosis.report.findings],
+        "more": dict(diagnosis.report.more),
+        "facts": diagnosis.report.facts,
     }
 
 

@@ -26,11 +26,11 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     return exit_status(_install, make_parser(prog).parse_args(arguments))
 
 
-def exit_status(work: Callable[[Namespace], int], given: Namespace) -> int:
+def exit_status(work: Callable[[Namespace], int], options: Namespace) -> int:
     """That of the work; 1 with the sentence if it can't be done."""
     os.umask(UMASK)
     try:
-        return work(given)
+        return work(options)
     except (SettingsError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -61,9 +61,9 @@ def _install(given: Namespace) -> int:
     return 0
 
 
-def confirmed(given: Namespace) -> bool:
+def confirmed(options: Namespace) -> bool:
     """By --yes or by the user."""
-    if given.yes:
+    if options.yes:
         return True
     if not sys.stdin.isatty():
         print("nothing was changed: add --yes to go on without a question", file=sys.stderr)

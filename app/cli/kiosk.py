@@ -29,11 +29,11 @@ PROG = "python -m app.cli kiosk"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = vars(make_parser(prog).parse_args(arguments))
-    file, folder = given.pop("config"), given.pop("folder")
+    options = vars(make_parser(prog).parse_args(arguments))
+    file, folder = options.pop("config"), options.pop("folder")
     logging.basicConfig(format="[%(levelname)s] %(message)s", level=logging.INFO)
     try:
-        config = read_config(file, **given)
+        config = read_config(file, **options)
         asyncio.run(_run(config, folder or runtime_folder()))
     except (SettingsError, OSError) as error:
         print(error, file=sys.stderr)

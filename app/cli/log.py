@@ -16,16 +16,16 @@ PROG = "python -m app.log"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
+    options = make_parser(prog).parse_args(arguments)
     try:
-        found = verify(given.data or _usual_folder(), given.head)
+        verification = verify(options.data or _usual_folder(), options.head)
     except KioskError as error:
         print(f"the operator's log can't be read: {error}", file=sys.stderr)
         return 2
-    if found.fault:
-        print(f"the log was changed: {found.fault} ({found.count} entries verified)")
+    if verification.fault:
+        print(f"the log was changed: {verification.fault} ({verification.count} entries verified)")
         return 1
-    print(f"ok, {found.count} entries, head {found.head}")
+    print(f"ok, {verification.count} entries, head {verification.head}")
     return 0
 
 

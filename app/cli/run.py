@@ -23,24 +23,24 @@ PROG = "python -m app.cli run"
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
-    given = parser.parse_args(arguments)
-    if (given.ssl_certfile is None) != (given.ssl_keyfile is None):
+    options = parser.parse_args(arguments)
+    if (options.ssl_certfile is None) != (options.ssl_keyfile is None):
         parser.error("--ssl-certfile and --ssl-keyfile are given together")
     try:
-        for file in filter(None, (given.ssl_certfile, given.ssl_keyfile)):
+        for file in filter(None, (options.ssl_certfile, options.ssl_keyfile)):
             _readable(file)
-        os.environ.update(environment(given))
+        os.environ.update(environment(options))
         Settings.from_environment()
-        check_port_free(given.host, given.port)
+        check_port_free(options.host, options.port)
     except (KioskError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     uvicorn.run(
         "app.main:app",
-        host=given.host,
-        port=given.port,
-        ssl_certfile=given.ssl_certfile,
-        ssl_keyfile=given.ssl_keyfile,
+        host=options.host,
+        port=options.port,
+        ssl_certfile=options.ssl_certfile,
+        ssl_keyfile=options.ssl_keyfile,
         **OPTIONS,
     )
     return 0

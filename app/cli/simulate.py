@@ -36,8 +36,8 @@ report = partial(print, file=sys.stderr, flush=True)
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
-    given = _sorted_out(parser, parser.parse_args(arguments))
-    namespace = given.namespace.rstrip("/")
+    options = _sorted_out(parser, parser.parse_args(arguments))
+    namespace = options.namespace.rstrip("/")
     if not NAMESPACE.fullmatch(namespace):
         report(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1')
         return 2
@@ -45,14 +45,14 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ends.set())
     try:
-        panel = load_panel(given.panel or Settings.from_environment().panel)
+        panel = load_panel(options.panel or Settings.from_environment().panel)
         interfaces = load_interfaces(panel.distro, panel.interfaces)
-        listening = partial(report, f"demo robot: listening at {given.endpoint}")
+        listening = partial(report, f"demo robot: listening at {options.endpoint}")
         with ExitStack() as stack:
             robots = _simulated(panel, namespace)
-            if given.bag is not None:
-                robots = {namespace: _replayed(given, panel, ends, stack)}
-            serve(given.endpoint, robots, interfaces, ends, listening)
+            if options.bag is not None:
+                robots = {namespace: _replayed(options, panel, ends, stack)}
+            serve(options.endpoint, robots, interfaces, ends, listening)
     except KioskError as error:
         report(f"demo robot: {error}")
         return 1 if isinstance(error, LinkError) else 2
@@ -65,34 +65,34 @@ def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
     return {namespace: next(iter(robots.values()))} if namespace else robots
 
 
-def _replayed(given: Any, panel: Panel, ends: threading.Event, stack: ExitStack) -> "SimulatedRobot":
+def _replayed(options: Any, panel: Panel, ends: threading.Event, stack: ExitStack) -> "SimulatedRobot":
     """A recording. If a panel file was given, prints what the recording lacks for it."""
     from app.simulator.bag.recording import Recording
     from app.simulator.bag.replay import ReplayedRobot, missing
 
-    recording = stack.enter_context(closing(Recording(given.bag)))
-    robot = ReplayedRobot(recording, given.rate, given.loop, ends.set)
-    lacks = missing(panel, recording.topics) if given.panel else ()
+    recording = stack.enter_context(closing(Recording(options.bag)))
+    robot = ReplayedRobot(recording, options.rate, options.loop, ends.set)
+    lacks = missing(panel, recording.topics) if options.panel else ()
     for note in (*recording.notes, *lacks):
         report(f"demo robot: {note}")
     about = f"{len(recording.topics)} topic(s), {recording.duration_s:.1f} s"
-    report(f"demo robot: replaying {given.bag}: {about}")
+    report(f"demo robot: replaying {options.bag}: {about}")
     return robot
 
 
-def _sorted_out(parser: Parser, given: Any) -> Any:
+def _sorted_out(parser: Parser, options: Any) -> Any:
     """The arguments with what is no panel file moved to where it belongs."""
-    words = [one for one in (given.panel, given.endpoint, given.namespace) if one is not None]
+    words = [one for one in (options.panel, options.endpoint, options.namespace) if one is not None]
     panel = words.pop(0) if words and words[0].endswith(SUFFIX) else None
     if len(words) > 2:
         parser.error(f'"{words[2]}" is one argument too many')
-    if given.bag is None and (given.loop or given.rate is not None):
+    if options.bag is None and (options.loop or options.rate is not None):
         parser.error("--loop and --rate are of a recording: give --bag too")
-    given.panel = None if panel is None else Path(panel)
-    given.endpoint = words[0] if words else ENDPOINT
-    given.namespace = words[1] if len(words) > 1 else ""
-    given.rate = 1.0 if given.rate is None else given.rate
-    return given
+    options.panel = None if panel is None else Path(panel)
+    options.endpoint = words[0] if words else ENDPOINT
+    options.namespace = words[1] if len(words) > 1 else ""
+    options.rate = 1.0 if options.rate is None else options.rate
+    return options
 
 
 def _rate(text: str) -> float:

@@ -31,12 +31,12 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         return 2
     try:
         settings, options = settings_of(given), options_of(given)
-        found = asyncio.run(diagnose(settings, options))
+        diagnosis = asyncio.run(diagnose(settings, options))
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
     sources = Sources(environment=os.environ, journal=journal)
-    made = parts(settings, options, found, sources)
+    made = parts(settings, options, diagnosis, sources)
     print(listed(made))
     if given.list:
         return 0

@@ -16,14 +16,14 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     return exit_status(_uninstall, make_parser(prog).parse_args(arguments))
 
 
-def _uninstall(given: Namespace) -> int:
-    host = Host(given.root.resolve())
+def _uninstall(options: Namespace) -> int:
+    host = Host(options.root.resolve())
     plan = uninstall_steps(host)
     print("stops and removes the services, the releases, and the browser's user")
     print("keeps /etc/operator-panel, /var/lib/operator-panel (the operator's log) and the packages")
-    if given.dry_run:
+    if options.dry_run:
         return 0
-    if not confirmed(given):
+    if not confirmed(options):
         return USAGE_ERROR
     revert(plan, host, print_progress)
     return 0

@@ -16,20 +16,20 @@ PROG = "python -m app.cli update"
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
-    given = parser.parse_args(arguments)
-    if given.back and given.wheel is not None:
+    options = parser.parse_args(arguments)
+    if options.back and options.wheel is not None:
         parser.error("either a wheel or --back")
-    return exit_status(_update, given)
+    return exit_status(_update, options)
 
 
-def _update(given: Namespace) -> int:
-    host = Host(given.root.resolve())
-    url = given.url if host.runs_systemd else None
+def _update(options: Namespace) -> int:
+    host = Host(options.root.resolve())
+    url = options.url if host.runs_systemd else None
     updater = Updater(host=host, services=SystemdServices(host), url=url, say=print_progress)
-    if given.back:
+    if options.back:
         updater.back()
     else:
-        updater.update(checked_wheel(given.wheel), given.wheels and given.wheels.resolve())
+        updater.update(checked_wheel(options.wheel), options.wheels and options.wheels.resolve())
     return 0
 
 

@@ -58,21 +58,21 @@ class Sources:
     journal: Callable[[], bytes]
 
 
-def parts(settings: Settings, options: Options, found: Diagnosis, sources: Sources) -> list[Part]:
+def parts(settings: Settings, options: Options, diagnosis: Diagnosis, sources: Sources) -> list[Part]:
     """The files, without what may be a secret; what is not there is left out."""
-    report = harmless_report(found, installed_version())
+    report = harmless_report(diagnosis, installed_version())
     made = [
         _json("doctor.json", "findings of `operator-panel doctor`", report),
         _json("versions.json", "versions of the panel, its libraries and the system", _versions()),
         _json("settings.json", "KIOSK_ variables", _settings(settings, sources.environment)),
-        _json("machine.json", "load, memory, disk and screens", _machine(settings, found)),
+        _json("machine.json", "load, memory, disk and screens", _machine(settings, diagnosis)),
         *_files(settings),
         text_part("logs/journal.txt", "the units' log", harmless_journal(sources.journal())),
-        *_operators_log(_data_folder(settings, found)),
-        *_of_server(options, found),
+        *_operators_log(_data_folder(settings, diagnosis)),
+        *_of_server(options, diagnosis),
         *(
             _json(f"graph{f'-{name}' if name else ''}.json", "ROS graph", _graph(graph))
-            for name, graph in found.graphs.items()
+            for name, graph in diagnosis.graphs.items()
         ),
     ]
     return [part for part in made if part.text]
@@ -112,11 +112,11 @@ def _settings(settings: Settings, environment: Mapping[str, str]) -> dict[str, A
     }
 
 
-def _data_folder(settings: Settings, found: Diagnosis) -> Path:
-    return settings.data_folder(settings.mode or (found.panel.mode if found.panel else "live"))
+def _data_folder(settings: Settings, diagnosis: Diagnosis) -> Path:
+    return settings.data_folder(settings.mode or (diagnosis.panel.mode if diagnosis.panel else "live"))
 
 
-def _machine(settings: Settings, found: Diagnosis) -> dict[str, Any]:
+def _machine(settings: Settings, diagnosis: Diagnosis) -> dict[str, Any]:
     facts: dict[str, Any] = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "cpus": os.cpu_count()}
     with suppress(OSError):
         facts["load"] = os.getloadavg()
@@ -124,7 +124,7 @@ def _machine(settings: Settings, found: Diagnosis) -> dict[str, Any]:
         facts["memory"] = Path("/proc/meminfo").read_text().splitlines()[:5]
     with suppress(OSError):
         facts["uptime_s"] = float(Path("/proc/uptime").read_text().split()[0])
-    folder = _data_folder(settings, found)
+    folder = _data_folder(settings, diagnosis)
     with suppress(OSError):
         facts["disk"] = shutil.disk_usage(folder)._asdict()
     with suppress(OSError):
@@ -165,9 +165,9 @@ def _presses(folder: Path) -> list[Row]:
     return found[::-1]
 
 
-def _of_server(options: Options, found: Diagnosis) -> Iterator[Part]:
+def _of_server(options: Options, diagnosis: Diagnosis) -> Iterator[Part]:
     """What a running server says; nothing without one."""
-    if "server_running" not in found.report.codes():
+    if "server_running" not in diagnosis.report.codes():
         return
 
     def ask(path: str) -> Any:
@@ -176,7 +176,7 @@ def _of_server(options: Options, found: Diagnosis) -> Iterator[Part]:
 
     ready = harmless_ready(ask("/readyz"))
     yield _json("state/readyz.json", "whether the server reaches the robot", ready)
-    robots = [f"/robots/{robot.id}" for robot in found.panel.robots] if found.panel else []
+    robots = [f"/robots/{robot.id}" for robot in diagnosis.panel.robots] if diagnosis.panel else []
     for base in robots or [""]:
         state = harmless_snapshot(str(ask(f"{base}/events?once=1")))
         yield _json(f"state/snapshot{base.replace('/', '-')}.json", "states of widgets", state)

@@ -54,9 +54,9 @@ class Diagnosis:
 
 async def diagnose(settings: Settings, options: Options) -> Diagnosis:
     """PanelError for a panel file that can't be read at all; its faults are findings."""
-    found = Diagnosis()
-    report = found.report
-    found.panel = panel = _panel(report, settings)
+    diagnosis = Diagnosis()
+    report = diagnosis.report
+    diagnosis.panel = panel = _panel(report, settings)
     mode = settings.mode or (panel.mode if panel else "live")
     served = check_port(report, options.host, options.port)
     machine = options.machine
@@ -74,8 +74,8 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
             robot = PanelRobot(panel, entry)
             graph = await check_robot(report, robot, settings.zenoh, options.listen_s)
             if graph is not None:
-                found.graphs[robot.id] = graph
-    return found
+                diagnosis.graphs[robot.id] = graph
+    return diagnosis
 
 
 def _panel(report: Report, settings: Settings) -> Panel | None:

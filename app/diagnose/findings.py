@@ -70,8 +70,12 @@ class Finding:
         return sentence.format(about=one_line(self.about, MOST_TEXT), **details)
 
     def as_json(self) -> dict[str, str]:
-        found = {"severity": self.severity, "code": self.code, "about": one_line(self.about, MOST_TEXT)}
-        return found | {"robot": self.robot, "what": self.what, "do": self.do}
+        finding = {
+            "severity": self.severity,
+            "code": self.code,
+            "about": one_line(self.about, MOST_TEXT),
+        }
+        return finding | {"robot": self.robot, "what": self.what, "do": self.do}
 
 
 def few(names: Sequence[str]) -> str:
@@ -98,9 +102,9 @@ class Report:
         if self._known[code, robot] >= MOST_ALIKE:
             self.more[code] += 1
             return
-        found = Finding(code, about, robot, details)
-        if found not in self.findings:
-            self.findings.append(found)
+        finding = Finding(code, about, robot, details)
+        if finding not in self.findings:
+            self.findings.append(finding)
             self._known[code, robot] += 1
 
     def fact(self, text: str) -> None:

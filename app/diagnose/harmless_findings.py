@@ -28,8 +28,8 @@ _LINE: Final = re.compile(r" \(line \d{1,7}\)")
 OF_THE_FILE: Final = ("panel_fault", "type_unknown")
 
 
-def harmless_report(found: Diagnosis, version: str) -> dict[str, Any]:
-    report = found.report
+def harmless_report(diagnosis: Diagnosis, version: str) -> dict[str, Any]:
+    report = diagnosis.report
     return {
         "version": version,
         "well": report.is_well,

@@ -134,12 +134,12 @@ def sentence(text: str, arguments: Sequence[str] = ()) -> Sentence:
 @cache
 def sentences() -> tuple[Sentence, ...]:
     """All sentences that this program and those around it log, the most exact first."""
-    found = {sentence(text, arguments) for text, *arguments in OTHERS}
+    other_sentences = {sentence(text, arguments) for text, *arguments in OTHERS}
     for file in sorted(PACKAGE.rglob("*.py")):
         text = file.read_text(encoding="utf-8")
         if "log." in text:
-            found |= set(_logged(ast.parse(text)))
-    telling = [one for one in found if _letters(one) >= LEAST_LETTERS]
+            other_sentences |= set(_logged(ast.parse(text)))
+    telling = [one for one in other_sentences if _letters(one) >= LEAST_LETTERS]
     return tuple(sorted(telling, key=lambda one: (-len(one.fixed[0]), -_letters(one), one.fixed)))
 
 

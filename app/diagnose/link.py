@@ -37,14 +37,14 @@ class AdminSession(AdminSpace, Protocol):
 def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) -> tuple[str, ...]:
     """The endpoints that a Zenoh configuration connects to; () if it can't be used."""
     try:
-        found = endpoints_of(config_from(zenoh, connect))
+        endpoints = endpoints_of(config_from(zenoh, connect))
     except SettingsError as error:
         report.find("zenoh_config", str(zenoh), robot=robot, detail=" ".join(str(error).split()))
         return ()
-    if not found:
+    if not endpoints:
         detail = f"{zenoh} names no endpoint to connect to: connect.endpoints is empty"
         report.find("zenoh_config", str(zenoh), robot=robot, detail=detail)
-    return found
+    return endpoints
 
 
 async def check_link(
@@ -61,11 +61,11 @@ async def check_link(
 
 def connects(report: Report, endpoint: str, robot: str) -> bool:
     """Whether TCP gets through; True where an endpoint is none of TCP."""
-    found = TCP.fullmatch(endpoint)
-    if found is None:
+    match = TCP.fullmatch(endpoint)
+    if match is None:
         return True
     try:
-        with socket.create_connection((found["host"].strip("[]"), int(found["port"])), CONNECT_S):
+        with socket.create_connection((match["host"].strip("[]"), int(match["port"])), CONNECT_S):
             return True
     except socket.gaierror as error:
         report.find("host_unknown", endpoint, robot=robot, detail=(error.strerror or "").lower())

@@ -24,21 +24,23 @@ def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
     english = translations(catalogues[ENGLISH])
     for language, path in catalogues.items():
         try:
-            found = translations(path)
+            translated = translations(path)
         except (PoFileError, UnicodeDecodeError) as error:
             yield f"{path.name}: {error}"
             continue
-        yield from (f"{path.name}: {code} is not translated" for code in english if code not in found)
-        yield from (f"{path.name}: {fault}" for fault in _language_faults(language, found))
-        for code, sentence in found.items():
+        yield from (
+            f"{path.name}: {code} is not translated" for code in english if code not in translated
+        )
+        yield from (f"{path.name}: {fault}" for fault in _language_faults(language, translated))
+        for code, sentence in translated.items():
             if fault := _fault(english.get(code), sentence):
                 yield f"{path.name}: {code} {fault}"
 
 
-def _language_faults(language: str, found: Mapping[str, str]) -> Iterator[str]:
+def _language_faults(language: str, translated: Mapping[str, str]) -> Iterator[str]:
     if own_name(language) == language:
         yield f'"{language}" has no name: it must be a tag of BCP 47 that CLDR knows, like pt-BR'
-    sign, decimal = found.get(DECIMAL), symbols(language).decimal
+    sign, decimal = translated.get(DECIMAL), symbols(language).decimal
     if sign is not None and sign != decimal:
         yield f'{DECIMAL} is "{sign}", and numbers in this language have "{decimal}"'
 
@@ -68,10 +70,10 @@ def _listed(names: frozenset[str]) -> str:
 
 
 def main() -> int:
-    found = list(faults(files()))
-    for fault in found:
+    reported = list(faults(files()))
+    for fault in reported:
         print(fault, file=sys.stderr)
-    return 1 if found else 0
+    return 1 if reported else 0
 
 
 if __name__ == "__main__":

@@ -44,8 +44,8 @@ def _forget() -> None:
 @cache
 def files() -> Mapping[str, Path]:
     """The catalogue of each language."""
-    found = {path.stem: path for folder in _folders for path in folder.glob(f"*{SUFFIX}")}
-    return dict(sorted(found.items()))
+    paths = {path.stem: path for folder in _folders for path in folder.glob(f"*{SUFFIX}")}
+    return dict(sorted(paths.items()))
 
 
 @cache
@@ -69,5 +69,7 @@ def translations(path: Path) -> dict[str, str]:
     from babel.messages.pofile import read_po
 
     with path.open("rb") as file:
-        found = read_po(file, abort_invalid=True)
-    return {str(one.id): str(one.string) for one in found if one.id and one.string and not one.fuzzy}
+        catalogue = read_po(file, abort_invalid=True)
+    return {
+        str(one.id): str(one.string) for one in catalogue if one.id and one.string and not one.fuzzy
+    }

@@ -94,10 +94,10 @@ def hint(code: str) -> TextLike:
 def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> TextLike:
     """Texts in sequence, without those that are ""; a single one is returned as it is. `between` is the
     code of the pattern that joins two of them."""
-    given = tuple(part for part in parts if part != "")
-    if len(given) > 1:
-        return Text(between, (("parts", given),))
-    return given[0] if given else ""
+    texts = tuple(part for part in parts if part != "")
+    if len(texts) > 1:
+        return Text(between, (("parts", texts),))
+    return texts[0] if texts else ""
 
 
 def render(text: TextLike, language: str = ENGLISH) -> str:
@@ -195,19 +195,19 @@ def present_code(stored: str) -> str:
     return renamed_codes().get(stored, stored)
 
 
-def text_in(given: str) -> Text:
+def text_in(stored: str) -> Text:
     """The text in JSON of `as_json`, with its present code; ValueError if it is not one."""
-    return _text_in(json.loads(given))
+    return _text_in(json.loads(stored))
 
 
-def _text_in(given: Any) -> Text:
-    if not isinstance(given, dict) or given.keys() != {"code", "params"}:
+def _text_in(stored: Any) -> Text:
+    if not isinstance(stored, dict) or stored.keys() != {"code", "params"}:
         raise ValueError("it is no sentence with a code and params")
-    code = present_code(given["code"])
-    return say(code, **{name: _param_in(one) for name, one in given["params"].items()})
+    code = present_code(stored["code"])
+    return say(code, **{name: _param_in(one) for name, one in stored["params"].items()})
 
 
-def _param_in(given: Any) -> Any:
-    if isinstance(given, dict):
-        return _text_in(given)
-    return tuple(_param_in(one) for one in given) if isinstance(given, list) else given
+def _param_in(stored: Any) -> Any:
+    if isinstance(stored, dict):
+        return _text_in(stored)
+    return tuple(_param_in(one) for one in stored) if isinstance(stored, list) else stored

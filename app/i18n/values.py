@@ -51,9 +51,9 @@ def changed(text: str | PanelText, change: Callable[[str], str]) -> str | PanelT
 
 def together(parts: Iterable[TextLike]) -> TextLike:
     """Texts joined to one, with nothing between them."""
-    given = tuple(part for part in parts if part != "")
-    texts = [part for part in given if isinstance(part, str)]
-    return "".join(texts) if len(texts) == len(given) else Text(PARTS, (("parts", given),))
+    shown = tuple(part for part in parts if part != "")
+    texts = [part for part in shown if isinstance(part, str)]
+    return "".join(texts) if len(texts) == len(shown) else Text(PARTS, (("parts", shown),))
 
 
 def filled_in(text: PanelText, fill: Callable[[str], TextLike]) -> Text:

@@ -127,5 +127,5 @@ def _named(
                     yield key, name, lambda file: [file]
 
 
-def _texts(given: Any) -> list[str]:
-    return [one for one in given if isinstance(one, str) and one] if isinstance(given, list) else []
+def _texts(value: Any) -> list[str]:
+    return [one for one in value if isinstance(one, str) and one] if isinstance(value, list) else []

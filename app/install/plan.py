@@ -103,7 +103,7 @@ def own_files(assets: Assets, screen: bool) -> list[InstallStep]:
 
 def _of_the_screen(options: Options, assets: Assets) -> list[InstallStep]:
     users = "/etc/sysusers.d/operator-panel.conf"
-    found: list[InstallStep] = [
+    steps: list[InstallStep] = [
         OwnFile(path=users, content=assets.text("deploy/sysusers.conf"), about="the browser's user"),
         User(USER, users),
         UsersFile(
@@ -113,8 +113,8 @@ def _of_the_screen(options: Options, assets: Assets) -> list[InstallStep]:
     ]
     if options.touch_matrix:
         rule = touch_rule(options.touch_matrix)
-        found.append(OwnFile(path=TOUCH_RULE, content=rule, about="the touch screen's calibration"))
-    return found
+        steps.append(OwnFile(path=TOUCH_RULE, content=rule, about="the touch screen's calibration"))
+    return steps
 
 
 def uninstall_steps(host: Host) -> list[InstallStep]:
@@ -168,11 +168,11 @@ def _packages(options: Options, host: Host) -> list[str]:
     return [*names, CHROMIUM]
 
 
-def _content(given: Path | None, assets: Assets, shipped: str) -> str:
+def _content(path: Path | None, assets: Assets, shipped: str) -> str:
     """Of the user's file, else of the shipped one."""
-    if given is None:
+    if path is None:
         return assets.text(shipped)
     try:
-        return users_file(given).decode()
+        return users_file(path).decode()
     except UnicodeDecodeError as error:
-        raise SettingsError(f"{given} can't be read: it is not UTF-8 text") from error
+        raise SettingsError(f"{path} can't be read: it is not UTF-8 text") from error

@@ -42,12 +42,12 @@ def forget(host: Host, name: str) -> None:
 
 def wheel_in(host: Host, name: str) -> bytes:
     """The wheel that a release was made of; StepFailed if it is gone."""
-    found = [file for file in host.files.names(f"{RELEASES}/{name}") if file.endswith(SUFFIX)]
-    if not found:
+    wheels = [file for file in host.files.names(f"{RELEASES}/{name}") if file.endswith(SUFFIX)]
+    if not wheels:
         raise StepFailed(
             f"{RELEASES}/{name} has no wheel: remove the folder and install that release again"
         )
-    return host.files.read(f"{RELEASES}/{name}/{found[0]}")
+    return host.files.read(f"{RELEASES}/{name}/{wheels[0]}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
     Files that can't be read, and types that two folders define differently, are `unusable`.
     `usable_definitions` checks references. InterfaceError if a folder has no interfaces.
     """
-    found = Definitions()
+    definitions = Definitions()
     for folder in folders:
         in_it = list(packages(folder))
         if not in_it:
@@ -33,8 +33,8 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
         for package in in_it:
             name = package_name(package)
             for file in definition_files(package):
-                _add_file(found, file, name)
-    return found.excluding(found.unusable)
+                _add_file(definitions, file, name)
+    return definitions.excluding(definitions.unusable)
 
 
 def _read_file(file: Path, package: str) -> Definitions:
@@ -49,24 +49,24 @@ def _error_text(error: OSError | UnicodeDecodeError) -> str:
     return str(error.strerror) if isinstance(error, OSError) else "it is not UTF-8"
 
 
-def _add_file(found: Definitions, file: Path, package: str) -> None:
+def _add_file(definitions: Definitions, file: Path, package: str) -> None:
     """Adds the definitions of a file to `found`, or its error."""
     try:
         read = _read_file(file, package)
         for name, structure in read.structures.items():
-            known = found.structures.get(name, structure)
+            known = definitions.structures.get(name, structure)
             if known != structure:
                 why = f"{name} is defined here and, differently, in {known.source}"
                 raise InterfaceError(f"{file}: {why}", file)
     except InterfaceError as error:
-        found.unusable.setdefault(f"{package}/{file.suffix[1:]}/{file.stem}", error)
+        definitions.unusable.setdefault(f"{package}/{file.suffix[1:]}/{file.stem}", error)
         return
-    found.structures.update(read.structures)
-    found.interface_types.update(read.interface_types)
+    definitions.structures.update(read.structures)
+    definitions.interface_types.update(read.interface_types)
 
 
 def usable_definitions(
-    found: Definitions, known: Definitions, unread: Mapping[str, Path]
+    definitions: Definitions, known: Definitions, unread: Mapping[str, Path]
 ) -> Definitions:
     """The usable definitions of `known` and `found`; `found` takes precedence. `unread` as of
     `find_idl_only`.
@@ -75,7 +75,7 @@ def usable_definitions(
     Without service events in the distribution (humble), events and the hashes of services and actions
     are left out.
     """
-    every = (known | _without_unusable_events(found, known)).excluding(found.unusable)
+    every = (known | _without_unusable_events(definitions, known)).excluding(definitions.unusable)
     while left_out := _missing_types(every, unread) or _recursive_types(every.structures):
         every = every.excluding(left_out)
     return every
@@ -106,14 +106,14 @@ def _missing_type_error(
 def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
     """The errors of interfaces that contain themselves, directly or through others."""
     done: set[str] = set()
-    found: dict[str, InterfaceError] = {}
+    errors: dict[str, InterfaceError] = {}
 
     def visit(structure: Structure, above: tuple[str, ...]) -> None:
         path = (*above, structure.name)
         if structure.name in above:
             why = f"{structure.name} contains itself ({' → '.join(path)})"
             error = InterfaceError(f"{structure.source}: {why}", structure.source)
-            found[interface_name(structure.name)] = error
+            errors[interface_name(structure.name)] = error
         elif structure.name not in done:
             for _, need in structure.nested_fields():
                 visit(every[need], path)
@@ -121,38 +121,40 @@ def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError
 
     for structure in every.values():
         visit(structure, ())
-    return found
+    return errors
 
 
-def complete_definitions(found: Definitions, known: Definitions) -> Definitions:
+def complete_definitions(definitions: Definitions, known: Definitions) -> Definitions:
     """The files of `found` whose references all exist in `found` or `known`."""
-    found = _without_unusable_events(found, known)
-    while lacking := _incomplete_files(found, known):
-        found = Definitions(
-            _excluding_files(found.structures, lacking),
-            _excluding_files(found.interface_types, lacking),
+    definitions = _without_unusable_events(definitions, known)
+    while lacking := _incomplete_files(definitions, known):
+        definitions = Definitions(
+            _excluding_files(definitions.structures, lacking),
+            _excluding_files(definitions.interface_types, lacking),
         )
-    return found
+    return definitions
 
 
-def _without_unusable_events(found: Definitions, known: Definitions) -> Definitions:
+def _without_unusable_events(definitions: Definitions, known: Definitions) -> Definitions:
     """`found` without service events if their type does not exist."""
-    if EVENT_INFO in known.structures or EVENT_INFO in found.structures:
-        return found
+    if EVENT_INFO in known.structures or EVENT_INFO in definitions.structures:
+        return definitions
     return Definitions(
         {
             n: s
-            for n, s in found.structures.items()
+            for n, s in definitions.structures.items()
             if EVENT_INFO not in {need for _, need in s.nested_fields()}
         },
-        unusable=found.unusable,
+        unusable=definitions.unusable,
     )
 
 
-def _incomplete_files(found: Definitions, known: Definitions) -> set[Path | None]:
-    every = known.structures.keys() | found.structures.keys()
+def _incomplete_files(definitions: Definitions, known: Definitions) -> set[Path | None]:
+    every = known.structures.keys() | definitions.structures.keys()
     return {
-        s.source for s in found.structures.values() if any(n not in every for _, n in s.nested_fields())
+        s.source
+        for s in definitions.structures.values()
+        if any(n not in every for _, n in s.nested_fields())
     }
 
 

@@ -175,15 +175,15 @@ def _parse_list(kind: Type, text: str) -> list[Any]:
 
 
 def _split_elements(inside: str) -> list[str]:
-    found: list[str] = []
+    parts: list[str] = []
     at = 0
     while inside[at:].strip():
         match = _ELEMENT.match(inside, at)
         if match is None:
             raise ValueError(f"[{inside}] is not a list of values with commas between them")
-        found.append(match[1])
+        parts.append(match[1])
         at = match.end()
-    return found
+    return parts
 
 
 def _parse_value(kind: Type, text: str) -> Any:

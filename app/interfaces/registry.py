@@ -206,11 +206,11 @@ class Interfaces:
         return self._checks[type_name]
 
     def _find(self, type_name: str) -> Structure:
-        found = self._definitions.find(type_name)
-        if found is None:
+        definition = self._definitions.find(type_name)
+        if definition is None:
             names = {*self._structures, *self._definitions.interface_types}
             raise self._unknown_type_error(type_name, names, "a type with a hash")
-        return found
+        return definition
 
     def _service_or_action_names(self, kind: str) -> list[str]:
         """The names of all services ("/srv/") or actions ("/action/")."""

@@ -28,29 +28,29 @@ _shortener = reprlib.Repr()
 _shortener.maxother = MAX_SHOWN_CHARS
 
 
-def format_value(given: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
+def format_value(value: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
     """A value as TOML and JSON write it, cut to a line, for an error message."""
-    match given:
+    match value:
         case None:
             return "null"
         case bool():
-            return "true" if given else "false"
+            return "true" if value else "false"
         case str():
-            return _quote(given)
+            return _quote(value)
         case datetime.date() | datetime.time():
-            return given.isoformat()
+            return value.isoformat()
         case Mapping() | list() | tuple() if not depth:
             return "…"
         case Mapping():
             items = (
                 f"{key} = {format_value(one, depth - 1)}"
-                for key, one in islice(given.items(), MAX_SHOWN_ELEMENTS)
+                for key, one in islice(value.items(), MAX_SHOWN_ELEMENTS)
             )
-            return f"{{{_join_limited(items, len(given))}}}"
+            return f"{{{_join_limited(items, len(value))}}}"
         case list() | tuple():
-            elements = (format_value(one, depth - 1) for one in given[:MAX_SHOWN_ELEMENTS])
-            return f"[{_join_limited(elements, len(given))}]"
-    return _shortener.repr(given)
+            elements = (format_value(one, depth - 1) for one in value[:MAX_SHOWN_ELEMENTS])
+            return f"[{_join_limited(elements, len(value))}]"
+    return _shortener.repr(value)
 
 
 def _quote(text: str) -> str:
@@ -94,12 +94,12 @@ def named_check(kind: Type, structure: Structure) -> Check:
     if not fitting:
         return check
 
-    def named(given: Any) -> Any:
-        if type(given) is not str:
-            return check(given)
-        if given in fitting:
-            return check(fitting[given])
-        raise FieldError("", unknown_constant(given, kind, structure.name, fitting))
+    def named(value: Any) -> Any:
+        if type(value) is not str:
+            return check(value)
+        if value in fitting:
+            return check(fitting[value])
+        raise FieldError("", unknown_constant(value, kind, structure.name, fitting))
 
     return named
 
@@ -129,9 +129,9 @@ def unknown_constant(name: str, kind: Type, type_name: str, constants: Mapping[s
     return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"
 
 
-def _to_python_scalar(given: Any) -> Any:
+def _to_python_scalar(value: Any) -> Any:
     """A scalar of an array library as a Python scalar."""
-    return given.item() if hasattr(given, "item") else given
+    return value.item() if hasattr(value, "item") else value
 
 
 def _check_bool(given: Any) -> bool:
@@ -144,14 +144,14 @@ def _check_bool(given: Any) -> bool:
 def _integer_check(name: str) -> Check:
     low, high = INTEGER_RANGES[name]
 
-    def check(given: Any) -> int:
-        if type(given) is not int:
-            given = _to_python_scalar(given)
-            if type(given) is not int:
-                raise FieldError("", f"must be a whole number ({name}), not {format_value(given)}")
-        if low <= given <= high:
-            return given
-        raise FieldError("", f"{given} is out of range: {name} goes from {low} to {high}")
+    def check(value: Any) -> int:
+        if type(value) is not int:
+            value = _to_python_scalar(value)
+            if type(value) is not int:
+                raise FieldError("", f"must be a whole number ({name}), not {format_value(value)}")
+        if low <= value <= high:
+            return value
+        raise FieldError("", f"{value} is out of range: {name} goes from {low} to {high}")
 
     return check
 
@@ -180,21 +180,21 @@ def _text_check(kind: Type) -> Check:
         ("utf-8", 1, "bytes") if name == "string" else ("utf-16-le", 2, "UTF-16 units")
     )
 
-    def check(given: Any) -> str:
-        if not isinstance(given, str):
-            raise FieldError("", f"must be text ({name}), not {format_value(given)}")
-        if "\0" in given:
+    def check(value: Any) -> str:
+        if not isinstance(value, str):
+            raise FieldError("", f"must be text ({name}), not {format_value(value)}")
+        if "\0" in value:
             raise FieldError("", "has a NUL character, at which a ROS string ends")
-        size = len(given)
-        if not given.isascii():
+        size = len(value)
+        if not value.isascii():
             try:
-                size = len(given.encode(encoding)) // unit
+                size = len(value.encode(encoding)) // unit
             except UnicodeEncodeError:
                 why = "is not valid Unicode text (it has half of a surrogate pair)"
                 raise FieldError("", why) from None
         if bound and size > bound:
             raise FieldError("", f"is {size} {units} long; {kind} takes {bound} at most")
-        return given
+        return value
 
     return check
 
@@ -207,18 +207,18 @@ def message_check(structure: Structure, make: Callable[..., Any], checks: Sequen
         for field, check in zip(structure.fields, checks, strict=True)
     ]
 
-    def message(given: Any) -> Any:
-        if type(given) is not dict and not isinstance(given, Mapping):
+    def message(value: Any) -> Any:
+        if type(value) is not dict and not isinstance(value, Mapping):
             raise FieldError(
-                "", f"must be a table of the fields of {structure.name}, not {format_value(given)}"
+                "", f"must be a table of the fields of {structure.name}, not {format_value(value)}"
             )
-        if not given.keys() <= names:
-            raise _unknown_field_error(structure, given)
+        if not value.keys() <= names:
+            raise _unknown_field_error(structure, value)
         name = ""
         try:
             values = []
             for name, check, left_out in plan:
-                values.append(check(given[name]) if name in given else left_out)
+                values.append(check(value[name]) if name in value else left_out)
         except FieldError as error:
             raise _prefix_field(name, error) from None
         return make(*values)
@@ -230,25 +230,25 @@ def list_check(kind: Type, element: Check) -> Check:
     """The check of an array or a sequence; `element` checks its elements. `bytes` are accepted for
     8-bit numbers, and one-dimensional arrays of any library for lists."""
 
-    def many(given: Any) -> Any:
-        if isinstance(given, bytes | bytearray | memoryview) and FORMATS.get(kind.name) == "B":
-            given = bytes(given)
-            _check_length(kind, len(given))
-            return given
-        if getattr(given, "ndim", 0) == 1:
-            given = given.tolist()
-        if not isinstance(given, Sequence) or isinstance(given, str | bytes | bytearray | memoryview):
-            raise FieldError("", f"must be a list ({kind}), not {format_value(given)}")
-        _check_length(kind, len(given))
-        return _check_elements(given, element)
+    def many(value: Any) -> Any:
+        if isinstance(value, bytes | bytearray | memoryview) and FORMATS.get(kind.name) == "B":
+            value = bytes(value)
+            _check_length(kind, len(value))
+            return value
+        if getattr(value, "ndim", 0) == 1:
+            value = value.tolist()
+        if not isinstance(value, Sequence) or isinstance(value, str | bytes | bytearray | memoryview):
+            raise FieldError("", f"must be a list ({kind}), not {format_value(value)}")
+        _check_length(kind, len(value))
+        return _check_elements(value, element)
 
     return many
 
 
-def _check_elements(given: Sequence[Any], check: Check) -> list[Any]:
+def _check_elements(values: Sequence[Any], check: Check) -> list[Any]:
     made: list[Any] = []
     try:
-        for item in given:
+        for item in values:
             made.append(check(item))
     except FieldError as error:
         raise _prefix_field(f"[{len(made)}]", error) from None
@@ -268,9 +268,9 @@ def _prefix_field(step: str, error: FieldError) -> FieldError:
     return FieldError(f"{step}{joint}{error.field}", error.message)
 
 
-def _unknown_field_error(structure: Structure, given: Mapping[str, Any]) -> FieldError:
+def _unknown_field_error(structure: Structure, value: Mapping[str, Any]) -> FieldError:
     names = [field.name for field in structure.fields]
-    name = next(name for name in given if name not in names)
+    name = next(name for name in value if name not in names)
     return FieldError(str(name), f"unknown field; {structure.name} has {', '.join(names) or 'none'}")
 
 

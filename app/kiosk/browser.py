@@ -144,8 +144,8 @@ class Browser:
             await self._child.end()
 
     async def _attach(self) -> None:
-        found = await self._call("Target.attachToTarget", targetId=self._target, flatten=True)
-        self._session = str(found["sessionId"])
+        session = await self._call("Target.attachToTarget", targetId=self._target, flatten=True)
+        self._session = str(session["sessionId"])
         add = "Page.addScriptToEvaluateOnNewDocument"
         await self._call("Page.enable", session=self._session)
         await self._call(add, session=self._session, source=KEEP_IN, runImmediately=True)
@@ -157,11 +157,11 @@ class Browser:
                 await self._call("Target.closeTarget", targetId=target)
 
     async def _evaluate(self, expression: str) -> dict[str, Any]:
-        given = {"expression": expression, "awaitPromise": True, "returnByValue": True}
-        found = await self._call("Runtime.evaluate", session=self._session, **given)
-        if "exceptionDetails" in found:
+        parameters = {"expression": expression, "awaitPromise": True, "returnByValue": True}
+        result = await self._call("Runtime.evaluate", session=self._session, **parameters)
+        if "exceptionDetails" in result:
             raise DevToolsError("the page could not be looked at")
-        return dict(found["result"]["value"])
+        return dict(result["result"]["value"])
 
     async def _call(self, method: str, session: str = "", **params: Any) -> dict[str, Any]:
         return await self._devtools.call(method, HANGS_AFTER_S, session, **params)

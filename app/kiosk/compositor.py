@@ -107,10 +107,10 @@ class Compositor:
     def _first_output(self) -> str:
         query = ["swaymsg", "--raw", "--type", "get_outputs"]
         with suppress(OSError, ValueError, subprocess.SubprocessError, LookupError):
-            found = subprocess.run(
+            result = subprocess.run(
                 query, env=self._env, capture_output=True, timeout=RESPONDS_WITHIN_S, check=True
             )
-            return str(json.loads(found.stdout)[0]["name"])
+            return str(json.loads(result.stdout)[0]["name"])
         return ""
 
     async def _send(self, *command: str) -> None:

@@ -77,21 +77,21 @@ def _is_of_this_machine(url: str) -> bool:
 
 def runtime_folder(env: Mapping[str, str] = os.environ) -> Path:
     """A folder in memory for the browser's profile: that of the unit, else of the user's session."""
-    given = env.get("RUNTIME_DIRECTORY") or env.get("XDG_RUNTIME_DIR") or RUNTIME
-    return Path(given.split(":")[0])
+    folder = env.get("RUNTIME_DIRECTORY") or env.get("XDG_RUNTIME_DIR") or RUNTIME
+    return Path(folder.split(":")[0])
 
 
 def read_config(path: Path | None, **given: Any) -> KioskConfig:
     """The file's keys, and over them those that are given and not None. SettingsError names the key."""
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     if path is not None:
         try:
-            found = tomllib.loads(path.read_text())
+            settings = tomllib.loads(path.read_text())
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise SettingsError(f"{path} can't be read: {error}") from error
-    found |= {name: value for name, value in given.items() if value is not None}
+    settings |= {name: value for name, value in given.items() if value is not None}
     try:
-        return KioskConfig(**dict(_checked(name, value) for name, value in found.items()))
+        return KioskConfig(**dict(_checked(name, value) for name, value in settings.items()))
     except SettingsError as error:
         raise SettingsError(f"{path}: {error}" if path else str(error)) from None
 

@@ -64,14 +64,14 @@ class DevTools:
         self._writer.write(json.dumps(message).encode() + END)
         try:
             async with asyncio.timeout(timeout_s):  # wait_for of Python 3.11 may lose a cancellation
-                found = await reply
+                response = await reply
         except TimeoutError:
             raise NoResponse(f"{method}: no response within {timeout_s:g} s") from None
         finally:
             self._replies.pop(number, None)
-        if "error" in found:
-            raise DevToolsError(f"{method}: {found['error'].get('message')}")
-        return dict(found["result"])
+        if "error" in response:
+            raise DevToolsError(f"{method}: {response['error'].get('message')}")
+        return dict(response["result"])
 
     def close(self) -> None:
         for transport in (self._writer, self._reader):

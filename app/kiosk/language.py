@@ -12,7 +12,7 @@ def panel_language(panel: Path) -> str:
     """`language` of the file, "en" where it does not say; "" if it can't be read: the server
     reports what is wrong with it."""
     try:
-        given = tomllib.loads(panel.read_text()).get("language", "en")
+        language = tomllib.loads(panel.read_text()).get("language", "en")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         return ""
-    return given if isinstance(given, str) and TAG.fullmatch(given) else ""
+    return language if isinstance(language, str) and TAG.fullmatch(language) else ""

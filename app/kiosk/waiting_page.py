@@ -49,10 +49,10 @@ def page_of(panel: Path) -> str:
     from app.panel import load_panel
 
     try:
-        found = load_panel(panel)
-        first = found.language
-        others = [tag for tag in found.readers_languages if tag != first]
-        return waiting_page(render(found.title, first), [first, *others])
+        loaded = load_panel(panel)
+        first = loaded.language
+        others = [tag for tag in loaded.readers_languages if tag != first]
+        return waiting_page(render(loaded.title, first), [first, *others])
     except (KioskError, OSError):
         return waiting_page("", list(files()))
 

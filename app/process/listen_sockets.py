@@ -58,7 +58,7 @@ async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
     A small buffer means that little old data waits in the kernel for a browser that does not read. A
     client that disappears, or does not read for `USER_TIMEOUT_MS`, is disconnected.
     """
-    found: list[tuple[str, int]] = []
+    addresses: list[tuple[str, int]] = []
     with suppress(OSError):  # no /proc on this system
         before = listener_names()
         await wait_for_listener(before)
@@ -66,10 +66,10 @@ async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
             if name not in before and one.family in INET_FAMILIES:
                 host, port = one.getsockname()[:2]
                 ports.add(port)
-                found.append((host, port))
+                addresses.append((host, port))
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
                 one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
-    return found
+    return addresses
 
 
 def abort_unsent(ports: Collection[int]) -> None:
@@ -93,8 +93,8 @@ def check_port_free(host: str, port: int) -> None:
     """SettingsError if the address can't be listened on now."""
     where = f"can't listen on {host} port {port}"
     try:
-        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        for family, kind, protocol, _, address in found:
+        infos = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        for family, kind, protocol, _, address in infos:
             with socket.socket(family, kind, protocol) as probe:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 if family == socket.AF_INET6:  # as asyncio does

@@ -47,22 +47,22 @@ def status_line(text: str) -> str:
     return "STATUS=" + " ".join(text.split())[:MAX_STATUS_BYTES]
 
 
-def _socket_address(given: str) -> str:
+def _socket_address(path: str) -> str:
     """The socket address of a path or of an abstract socket ("@name"); "" if it is neither."""
-    if given.startswith("@"):
-        return "\0" + given[1:]
-    if given and not given.startswith("/"):
-        log.warning('NOTIFY_SOCKET is "%s": only a path or an abstract socket (@…) is used', given)
+    if path.startswith("@"):
+        return "\0" + path[1:]
+    if path and not path.startswith("/"):
+        log.warning('NOTIFY_SOCKET is "%s": only a path or an abstract socket (@…) is used', path)
         return ""
-    return given
+    return path
 
 
 def _watchdog_interval_s(env: Mapping[str, str]) -> float | None:
     """The watchdog interval in seconds; None if this process has none."""
-    given = env.get("WATCHDOG_USEC", "")
-    if not given or env.get("WATCHDOG_PID") not in (None, "", str(os.getpid())):
+    timeout_us = env.get("WATCHDOG_USEC", "")
+    if not timeout_us or env.get("WATCHDOG_PID") not in (None, "", str(os.getpid())):
         return None
-    if not given.isdecimal() or int(given) == 0:
-        log.warning('WATCHDOG_USEC is "%s": it must be a number of microseconds', given)
+    if not timeout_us.isdecimal() or int(timeout_us) == 0:
+        log.warning('WATCHDOG_USEC is "%s": it must be a number of microseconds', timeout_us)
         return None
-    return int(given) / 1e6
+    return int(timeout_us) / 1e6

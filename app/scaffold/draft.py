@@ -152,13 +152,13 @@ def _of_topic(
 def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> list[DraftWidget]:
     make = controls.goals if "/action/" in server.type else controls.calls
     try:
-        found = list(make(server, interfaces))
+        drafts = list(make(server, interfaces))
     except InterfaceError as error:
         remarks.append(f"{server.name}: {error}")
         return []
-    if not server.can_be_called and found:
+    if not server.can_be_called and drafts:
         remarks.append(f"{server.name} ({server.type}), on {server.dds}: {CYCLONE_ONLY}")
         return []
-    if not found and not server.type.startswith(controls.OF_EVERY_NODE):
+    if not drafts and not server.type.startswith(controls.OF_EVERY_NODE):
         remarks.append(f"{server.name} ({server.type}): give its request")
-    return found
+    return drafts

@@ -23,11 +23,11 @@ def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandi
     likely.sort(key=lambda one: (not permits(one.name), not one.latched, one.name))
     labels = own_labels([(label_of(topic.name), topic.name) for topic in likely])
     taken: set[str] = set()
-    found = []
+    candidates = []
     for topic, label in zip(likely, labels, strict=True):
         own_id = id_of(topic.name, taken)
         taken.add(own_id)
-        found.append(
+        candidates.append(
             InterlockCandidate(
                 id=own_id,
                 label=label.lower(),
@@ -38,7 +38,7 @@ def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandi
                 nodes=_several(topic),
             )
         )
-    return found
+    return candidates
 
 
 def _several(topic: SurveyedTopic) -> str:

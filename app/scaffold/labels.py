@@ -26,20 +26,20 @@ def own_labels(labelled: Sequence[tuple[str, str]]) -> list[str]:
     alike: defaultdict[str, list[int]] = defaultdict(list)
     for place, (label, _) in enumerate(labelled):
         alike[label.lower()].append(place)
-    found = [label for label, _ in labelled]
+    labels = [label for label, _ in labelled]
     for places in alike.values():
         for place, parts in zip(places, _differing(labelled[at][1] for at in places), strict=True):
-            found[place] = _label(parts, found[place]) if len(places) > 1 else found[place]
+            labels[place] = _label(parts, labels[place]) if len(places) > 1 else labels[place]
     taken: set[str] = set()
     for place, (_, name) in enumerate(labelled):
-        if found[place].lower() in taken:
-            found[place] = next(
+        if labels[place].lower() in taken:
+            labels[place] = next(
                 text
-                for number in range(1, len(found) + 2)
+                for number in range(1, len(labels) + 2)
                 if (text := _numbered(name, number)).lower() not in taken
             )
-        taken.add(found[place].lower())
-    return found
+        taken.add(labels[place].lower())
+    return labels
 
 
 def _label(parts: Sequence[str], label: str) -> str:

@@ -55,11 +55,11 @@ def _by_place(entries: Sequence[DraftWidget], own: int) -> dict[Place, list[Draf
     """The entries by the first part of their places. Small places are put together."""
     sizes = Counter(entry.place[:1] for entry in entries)
     kept = {place for place, size in sizes.most_common(own) if size > 1} | {(NODES_PAGE,)}
-    found: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
+    by_place: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
     for entry in entries:
         place = entry.place[:1]
-        found[place if place in kept else (GENERAL,)].append(entry)
-    return found
+        by_place[place if place in kept else (GENERAL,)].append(entry)
+    return by_place
 
 
 def _parts(entries: Sequence[DraftWidget], depth: int, live: bool) -> list[list[DraftWidget]]:

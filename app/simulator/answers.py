@@ -37,7 +37,7 @@ def good_response(
 
 def _good(structure: Structure, interfaces: Interfaces, depth: int) -> Fields:
     """The fields of a success."""
-    found: Fields = {}
+    fields: Fields = {}
     for field in structure.fields:
         kind = field.type
         if field.name == PLACEHOLDER or kind.container != "one":
@@ -45,14 +45,14 @@ def _good(structure: Structure, interfaces: Interfaces, depth: int) -> Fields:
         if kind.is_nested:
             own = kind.name not in KNOWN and kind.name.startswith(f"{structure.name.split('/')[0]}/")
             if own and depth < DEEPEST:
-                found[field.name] = _good(interfaces.structures[kind.name], interfaces, depth + 1)
+                fields[field.name] = _good(interfaces.structures[kind.name], interfaces, depth + 1)
         elif kind.name == "bool":
-            found[field.name] = not NEGATIVE.search(field.name)
+            fields[field.name] = not NEGATIVE.search(field.name)
         elif kind.name in STRING_TYPES:
-            found[field.name] = DONE[: kind.bound or None]
+            fields[field.name] = DONE[: kind.bound or None]
         elif kind.name in INTEGER_RANGES and STATUS.search(field.name):
-            found[field.name] = 0
-    return found
+            fields[field.name] = 0
+    return fields
 
 
 def feedback_at(

@@ -29,24 +29,24 @@ def declared_by(
 ) -> dict[str, dict[str, Parameter]]:
     """Node → name → parameter. Of several widgets for one parameter the limits are those that they
     all have."""
-    found: dict[str, dict[str, list[widgets.Parameter]]] = {}
+    parameters: dict[str, dict[str, list[widgets.Parameter]]] = {}
     for panel in panels:
-        found.setdefault(panel.node, {}).setdefault(panel.parameter, []).append(panel)
+        parameters.setdefault(panel.node, {}).setdefault(panel.parameter, []).append(panel)
     return {
         node: {
             name: _declared(several, demo.get(node, NO_ENTRY).parameters.get(name))
             for name, several in names.items()
         }
-        for node, names in found.items()
+        for node, names in parameters.items()
     }
 
 
-def _declared(several: list[widgets.Parameter], given: Any) -> Parameter:
+def _declared(several: list[widgets.Parameter], entry: Any) -> Parameter:
     first = several[0]
     alike = len({(one.min, one.max, one.step) for one in several}) == 1
     limits = _limits(first) if alike else None
     options = tuple(option.value for option in first.options) if len(several) == 1 else ()
-    value = given if given is not None else _value(first, limits, options)
+    value = entry if entry is not None else _value(first, limits, options)
     if first.element_type == "double":
         value = [float(one) for one in value] if first.is_list else float(value)
     return Parameter(TYPES[first.type], value, limits=limits, options=options)

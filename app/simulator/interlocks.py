@@ -37,8 +37,8 @@ def permitting(
 ) -> Signal:
     """A field of the base type `kind` that satisfies its interlocks, and then does not; `others` are
     further values that the field may have. Where no value satisfies all, each has its turn."""
-    found = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others))
-    candidates = [one for one in found if _fits(one, kind)]
+    values = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others))
+    candidates = [one for one in values if _fits(one, kind)]
     met = [sum(satisfies(interlock, candidate) for interlock in interlocks) for candidate in candidates]
     best, least = max(met), min(met)
     good = [one for one, count in zip(candidates, met, strict=True) if count == best]
@@ -59,15 +59,17 @@ def permitting(
 
 def satisfies(interlock: Interlock, value: Any) -> bool:
     """Whether a value meets all conditions; without any, whether it is true."""
-    given = interlock.comparisons
-    if not given:
+    comparisons = interlock.comparisons
+    if not comparisons:
         return value is True
     return (
-        ("equals" not in given or same_value(value, interlock.equals))
-        and ("not_equals" not in given or not same_value(value, interlock.not_equals))
-        and ("one_of" not in given or any(same_value(value, one) for one in given["one_of"]))
-        and ("min" not in given or value >= given["min"])
-        and ("max" not in given or value <= given["max"])
+        ("equals" not in comparisons or same_value(value, interlock.equals))
+        and ("not_equals" not in comparisons or not same_value(value, interlock.not_equals))
+        and (
+            "one_of" not in comparisons or any(same_value(value, one) for one in comparisons["one_of"])
+        )
+        and ("min" not in comparisons or value >= comparisons["min"])
+        and ("max" not in comparisons or value <= comparisons["max"])
     )
 
 
@@ -78,11 +80,11 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
         return
     numeric = kind in INTEGER_RANGES or kind in FLOAT_TYPES
     for interlock in interlocks:
-        given = interlock.comparisons
-        for one in (given.get("equals"), *given.get("one_of", ())):
+        comparisons = interlock.comparisons
+        for one in (comparisons.get("equals"), *comparisons.get("one_of", ())):
             if one is not None:
                 yield one
-        if "min" in given or "max" in given:
+        if "min" in comparisons or "max" in comparisons:
             low, high = _limits(interlock)
             span = high - low
             yield from ((low + high) / 2, low - span / 4, high + span / 4, low, high)

@@ -219,7 +219,7 @@ class PanelRobot:
 
     def _served(self, served: Iterable[Served]) -> dict[str, tuple[str, Response]]:
         """Service → (type, responses), without those of the `system_controller`."""
-        found: dict[str, tuple[str, Response]] = {}
+        responses: dict[str, tuple[str, Response]] = {}
         for one in served:
             entry = self._panel.demo.get(one.service, NO_ENTRY)
             if SERVES.get(one.service) == one.type and not entry.response and self._permits_known():
@@ -228,8 +228,8 @@ class PanelRobot:
             paths = {one.success or "": True, one.message or "": DONE}
             paths.pop("", None)
             made = good_response(response, self._interfaces, entry.response, paths)
-            found[one.service] = one.type, made
-        return found
+            responses[one.service] = one.type, made
+        return responses
 
     def _permits_known(self) -> bool:
         """Whether the panel shows why the `system_controller` refuses a reset."""
@@ -272,10 +272,10 @@ def _reference_topics(panel: Panel) -> dict[str, str]:
 
 
 def _by_topic(published: Iterable[Published]) -> dict[str, list[Published]]:
-    found: dict[str, list[Published]] = {}
+    published_by_topic: dict[str, list[Published]] = {}
     for one in published:
-        found.setdefault(one.topic, []).append(one)
-    return found
+        published_by_topic.setdefault(one.topic, []).append(one)
+    return published_by_topic
 
 
 def _of(needs: Iterable[Need], kind: type[AnyNeed]) -> list[AnyNeed]:

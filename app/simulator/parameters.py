@@ -76,10 +76,10 @@ class NodeParameters:
         if service.endswith("/set_parameters"):
             return {"results": [self._set(parameter) for parameter in request.parameters]}
         known = all(name in self._declared for name in request.names)
-        found = [(name, self._declared[name]) for name in request.names] if known else []
+        parameters = [(name, self._declared[name]) for name in request.names] if known else []
         if service.endswith("/get_parameters"):
-            return {"values": [_value(one.type, one.value) for _, one in found]}
-        return {"descriptors": [_descriptor(name, one) for name, one in found]}
+            return {"values": [_value(one.type, one.value) for _, one in parameters]}
+        return {"descriptors": [_descriptor(name, one) for name, one in parameters]}
 
     def value(self, name: str, default: Any) -> Any:
         """The value of a parameter, or a default if it is not declared."""

@@ -66,9 +66,9 @@ def _text_fits(template: str, value: Any, inputs: dict[str, Any]) -> bool:
         return _learned(names[0], value, inputs)
     if not names:
         return bool(fill(template, {}) == value)
-    found = re.fullmatch(_pattern(template), value, re.DOTALL) if isinstance(value, str) else None
-    return found is not None and all(
-        _learned(name, text, inputs) for name, text in zip(names, found.groups(), strict=True)
+    match = re.fullmatch(_pattern(template), value, re.DOTALL) if isinstance(value, str) else None
+    return match is not None and all(
+        _learned(name, text, inputs) for name, text in zip(names, match.groups(), strict=True)
     )
 
 

@@ -132,9 +132,9 @@ def _hz(
     shown: Sequence[Shown],
 ) -> float:
     """Messages per second: so many that no value gets too old."""
-    given = fields.entry(topic).hz
-    if given is not None:
-        return given
+    rate_hz = fields.entry(topic).hz
+    if rate_hz is not None:
+        return rate_hz
     still = made and not any(one.moving for one in made)
     hz = OTHERS_HZ if still or type_name in SLOW else MOVING_HZ
     locks = (interlock.max_age_s for interlock in fields.panel.interlocks if interlock.topic == topic)

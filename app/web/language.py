@@ -28,12 +28,12 @@ def language_of(connection: HTTPConnection) -> str:
     """The language of the response to a request, one of the panel's."""
     panel = site_of(connection).fleet.panel
     available = panel.readers_languages
-    found = panel.language
+    language = panel.language
     if len(available) > 1:
-        given = connection.headers.get("accept-language", "")[:MOST_ACCEPTED]
-        found = negotiated(connection.cookies.get(COOKIE, ""), given, available) or found
-    connection.scope[SCOPE] = found
-    return found
+        accepted = connection.headers.get("accept-language", "")[:MOST_ACCEPTED]
+        language = negotiated(connection.cookies.get(COOKIE, ""), accepted, available) or language
+    connection.scope[SCOPE] = language
+    return language
 
 
 class LanguageHeaders:
@@ -59,12 +59,12 @@ def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
     """The available language that fits best; "" if none does."""
     by_name = {tag.lower(): tag for tag in available}
     preferred = [*([chosen] if chosen else []), *_preferred(accepted)]
-    found = negotiate_locale(preferred, available, sep="-")
-    return by_name.get((found or "").lower(), "")
+    language = negotiate_locale(preferred, available, sep="-")
+    return by_name.get((language or "").lower(), "")
 
 
 def _preferred(accepted: str) -> list[str]:
     """The tags of the header, by falling weight."""
-    found = [match for part in accepted.split(",") if (match := _accepted.fullmatch(part))]
-    weighted = [(float(match["weight"] or 1), match["tag"]) for match in found]
+    matches = [match for part in accepted.split(",") if (match := _accepted.fullmatch(part))]
+    weighted = [(float(match["weight"] or 1), match["tag"]) for match in matches]
     return [tag for weight, tag in sorted(weighted, key=lambda one: -one[0]) if weight > 0]

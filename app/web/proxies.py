@@ -27,10 +27,10 @@ class NamedProxies:
         if not self._networks:
             return False
         try:
-            found = ip_network(address)  # of IPv6 it is a subnet
+            network = ip_network(address)  # of IPv6 it is a subnet
         except ValueError:
             return False
-        return any(found.version == own.version and found.overlaps(own) for own in self._networks)
+        return any(network.version == own.version and network.overlaps(own) for own in self._networks)
 
 
 class Proxies:

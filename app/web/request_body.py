@@ -65,20 +65,20 @@ def json_of(text: str | bytes, place: str = "the body") -> Any:
     """The value of a JSON text; InputError if it is not JSON, or has text that is not Unicode."""
     try:
         text = text.decode("utf-8-sig") if isinstance(text, bytes) else text
-        given = _decoder.decode(text)
+        decoded = _decoder.decode(text)
         if "\\u" in text:
-            json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
+            json.dumps(decoded, ensure_ascii=False).encode()  # half a surrogate pair is no text
     except UnicodeEncodeError:
         raise InputError(f"{place} has half of a surrogate pair, which is not Unicode text") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{place} is not JSON: {error}") from None
-    return given
+    return decoded
 
 
-def as_model(model: type[Model], given: object, place: str = "the body") -> Model:
+def as_model(model: type[Model], value: object, place: str = "the body") -> Model:
     """A value as a model; InputError names the first fault and its place."""
     try:
-        return model.model_validate(given)
+        return model.model_validate(value)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(step) for step in first["loc"])

@@ -135,5 +135,5 @@ def _host_of(origin: str) -> str | None:
 
 def _without_port(host: str) -> str | None:
     """`localhost:8000` → `localhost`; an IPv6 address keeps its brackets; None if it is no host."""
-    found = HOST.fullmatch(host)
-    return found["name"] if found else None
+    match = HOST.fullmatch(host)
+    return match["name"] if match else None

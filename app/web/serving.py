@@ -59,11 +59,11 @@ def urls(
     """Where a browser finds the panel; `hosts` are the names that it answers to, of which any may be
     meant where the server listens on all addresses."""
     scheme = "https" if server is not None and server.is_ssl else "http"
-    found = []
+    sockets = []
     for host, port in listening:
         names = hosts if host in ("0.0.0.0", "::") else [f"[{host}]" if ":" in host else host]
-        found += [f"{scheme}://{name}:{port}" for name in names]
-    return found
+        sockets += [f"{scheme}://{name}:{port}" for name in names]
+    return sockets
 
 
 def check_port(server: Config | None) -> None:

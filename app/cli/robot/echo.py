@@ -25,49 +25,49 @@ SEPARATOR = "---"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
-    return ended(lambda: _echo(given))
+    options = make_parser(prog).parse_args(arguments)
+    return ended(lambda: _echo(options))
 
 
-async def _echo(given: Any) -> int:
-    place = place_of(given)
+async def _echo(options: Any) -> int:
+    place = place_of(options)
     async with opened(place) as (observer, graph):
-        reader = await TopicReader.find(observer, graph, place, given.topic, given.type or "")
+        reader = await TopicReader.find(observer, graph, place, options.topic, options.type or "")
         interfaces = await reader.interfaces(place)
-        if given.field:
-            interfaces.type_at(reader.type, given.field)
+        if options.field:
+            interfaces.type_at(reader.type, options.field)
         try:
-            async with asyncio.timeout(given.timeout) as limit:
+            async with asyncio.timeout(options.timeout) as limit:
                 async for sample in reader.samples():
                     limit.reschedule(None)
-                    _show(bytes(sample.payload), interfaces, reader.type, given)
-                    if given.once:
+                    _show(bytes(sample.payload), interfaces, reader.type, options)
+                    if options.once:
                         return 0
         except TimeoutError:
-            print(f"no message on {reader.topic.name} in {given.timeout:g} s", file=sys.stderr)
+            print(f"no message on {reader.topic.name} in {options.timeout:g} s", file=sys.stderr)
             return GONE
     return 0
 
 
-def _show(data: bytes, interfaces: Interfaces, type_name: str, given: Any) -> None:
+def _show(data: bytes, interfaces: Interfaces, type_name: str, options: Any) -> None:
     """One message. If it can't be decoded, the error is printed in its place."""
     try:
-        value = value_in(data, interfaces, type_name, given.field or "")
+        value = value_in(data, interfaces, type_name, options.field or "")
     except DecodeError as error:
         print(error, file=sys.stderr, flush=True)
         return
-    print(_written(given)(value), flush=True)
+    print(_written(options)(value), flush=True)
 
 
-def _written(given: Any) -> Callable[[Any], str]:
+def _written(options: Any) -> Callable[[Any], str]:
     shape = Shape(
-        most=None if given.full_length else given.truncate_length,
-        lists=not given.no_arr,
-        texts=not given.no_str,
+        most=None if options.full_length else options.truncate_length,
+        lists=not options.no_arr,
+        texts=not options.no_str,
     )
-    if given.json:
+    if options.json:
         return lambda value: printable(json.dumps(to_plain(value), ensure_ascii=False))
-    if given.csv:
+    if options.csv:
         return partial(csv_line, shape=shape)
     return lambda value: f"{yaml_text(value, shape)}\n{SEPARATOR}"
 

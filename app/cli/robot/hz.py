@@ -45,27 +45,29 @@ class Rate:
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
-    return ended(lambda: _measure(given))
+    options = make_parser(prog).parse_args(arguments)
+    return ended(lambda: _measure(options))
 
 
-async def _measure(given: Any) -> int:
-    place = place_of(given)
-    rate = Rate(given.window)
+async def _measure(options: Any) -> int:
+    place = place_of(options)
+    rate = Rate(options.window)
     async with opened(place) as (observer, graph):
-        reader = await TopicReader.find(observer, graph, place, given.topic)
+        reader = await TopicReader.find(observer, graph, place, options.topic)
         showing = asyncio.create_task(_show(rate))
         try:
             with suppress(TimeoutError):
-                async with asyncio.timeout(given.duration):
+                async with asyncio.timeout(options.duration):
                     async for sample in reader.samples():
                         if not sample.cached:  # published at an unknown time
                             rate.arrivals.append(sample.at)
         finally:
             showing.cancel()
-    if given.duration is None:
+    if options.duration is None:
         return 0
-    print(str(rate) or f"no rate: {len(rate.arrivals)} message(s) in {given.duration:g} s", flush=True)
+    print(
+        str(rate) or f"no rate: {len(rate.arrivals)} message(s) in {options.duration:g} s", flush=True
+    )
     return 0 if str(rate) else GONE
 
 

@@ -89,21 +89,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def namespace(text: str) -> str:
-    given = f"/{text.strip('/')}" if text.strip("/") else ""
-    if not NAMESPACE.fullmatch(given):
+    name = f"/{text.strip('/')}" if text.strip("/") else ""
+    if not NAMESPACE.fullmatch(name):
         raise argparse.ArgumentTypeError(f'"{text}" is not a ROS 2 namespace, like /robot1')
-    return given
+    return name
 
 
-def place_of(given: Any) -> Place:
+def place_of(options: Any) -> Place:
     """What the options say; a panel file's where they say nothing. KioskError for a faulty file."""
     settings = Settings.from_environment()
-    connect, named = tuple(given.connect or ()), given.namespace
-    distro, folders = given.distro, tuple(given.interfaces or ())
+    connect, named = tuple(options.connect or ()), options.namespace
+    distro, folders = options.distro, tuple(options.interfaces or ())
     namespaces: tuple[str, ...] = ()
     bridges, dialect = 0, DEFAULT_DIALECT
-    if given.panel is not None:
-        panel = load_panel(given.panel)
+    if options.panel is not None:
+        panel = load_panel(options.panel)
         robots = panel.robots
         dialect = robots[0].dialect if robots else panel.dialect
         if not connect:
@@ -114,14 +114,14 @@ def place_of(given: Any) -> Place:
             named = robots[0].namespace if len(robots) == 1 else panel.namespace
         distro, folders = distro or panel.distro, folders or panel.interfaces
     return Place(
-        zenoh=given.zenoh or settings.zenoh,
+        zenoh=options.zenoh or settings.zenoh,
         connect=connect,
         robots=namespaces,
         bridges=bridges,
         namespace=named or "",
         distro=distro or DEFAULT_DISTRO,
         interfaces=tuple(folders),
-        within_s=given.wait,
+        within_s=options.wait,
         dialect=dialect,
     )
 

@@ -48,15 +48,15 @@ class ScaffoldError(KioskError):
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
-    return ended(lambda: _scaffold(given))
+    options = make_parser(prog).parse_args(arguments)
+    return ended(lambda: _scaffold(options))
 
 
-async def _scaffold(given: Any) -> int:
-    target = None if given.output == STDOUT else Path(given.output)
+async def _scaffold(options: Any) -> int:
+    target = None if options.output == STDOUT else Path(options.output)
     if target is not None:
-        check_absent(target, given.force)
-    place = place_of(given)
+        check_absent(target, options.force)
+    place = place_of(options)
     interfaces = load_interfaces(place.distro, place.interfaces)
     async with opened(place) as (observer, graph):
         graph = await settled_graph(observer, graph, place)
@@ -65,22 +65,22 @@ async def _scaffold(given: Any) -> int:
         if not graph.robots:
             raise ScaffoldError("no bridge has a namespace of ROS 2: correct `namespace` in its file")
         robot, below = robot_at(graph, place.namespace)
-        known = await read_scaffold_input(observer, robot, below, interfaces, given.listen)
+        known = await read_scaffold_input(observer, robot, below, interfaces, options.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
         raise ScaffoldError(nothing_there([robot], f"{robot.namespace}{below}"))
     base = _base(place, graph, f"{robot.namespace}{below}", target)
-    draft = _checked(partial(make_draft, known, interfaces, base, given.controls), target)
-    if given.controls and not draft.interlocks:
+    draft = _checked(partial(make_draft, known, interfaces, base, options.controls), target)
+    if options.controls and not draft.interlocks:
         raise ScaffoldError(
             "no topic looks like a permission of the robot, so no control is made live: leave"
             " --controls out, and give the controls an interlock of your own"
         )
-    text = toml_text(draft, given.controls)
+    text = toml_text(draft, options.controls)
     if target is None:
         print(text, end="", flush=True)
     else:
-        _write(target, text, given.force)
-        print(*_summary(target, draft, given.controls), sep="\n", flush=True)
+        _write(target, text, options.force)
+        print(*_summary(target, draft, options.controls), sep="\n", flush=True)
     return report_lost(lost_names(known))
 
 

@@ -75,7 +75,7 @@ async def _parameters(
     services: NodeServices, robot: RobotGraph, below: str
 ) -> tuple[list[NodeParameter], list[str]]:
     """Those of all nodes but the bridge's own, and the nodes that have some which can't be read."""
-    found: list[NodeParameter] = []
+    parameters: list[NodeParameter] = []
     unreadable: list[str] = []
     bridges = {bridge.node for bridge in robot.bridges}
     end = asyncio.get_running_loop().time() + PARAMETERS_WITHIN_S
@@ -85,10 +85,10 @@ async def _parameters(
         late = asyncio.get_running_loop().time() > end
         of_node = None if late else await services.parameters(node)
         if of_node is not None:
-            found += [replace(one, node=one.node.removeprefix(below)) for one in of_node]
+            parameters += [replace(one, node=one.node.removeprefix(below)) for one in of_node]
         elif robot.service(f"{node.name}/list_parameters") is not None:
             unreadable.append(node.name.removeprefix(below))
-    return found, unreadable
+    return parameters, unreadable
 
 
 def _is_below(name: str, namespace: str) -> bool:

@@ -36,26 +36,26 @@ Found = Mapping[str, tuple[RobotGraph, SurveyedTopic]]
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
-    return ended(lambda: _list(given))
+    options = make_parser(prog).parse_args(arguments)
+    return ended(lambda: _list(options))
 
 
-async def _list(given: Any) -> int:
-    place = place_of(given)
+async def _list(options: Any) -> int:
+    place = place_of(options)
     async with opened(place) as (observer, graph):
         graph = await settled_graph(observer, graph, place)
         check_namespace(graph, place.namespace)
         found = {
             name: one
             for name, one in sorted(shown_topics(graph, place.namespace).items())
-            if given.include_hidden_topics or not is_hidden(name)
+            if options.include_hidden_topics or not is_hidden(name)
         }
-    if given.count_topics:
+    if options.count_topics:
         print(len(found))
-    elif given.json:
+    elif options.json:
         print(json.dumps([_plain(name, *one) for name, one in found.items()], indent=1))
     else:
-        for line in _lines(found, given.show_types, given.verbose):
+        for line in _lines(found, options.show_types, options.verbose):
             print(one_line(line))
     if not found:
         print(nothing_there(graph.robots, place.namespace), file=sys.stderr, flush=True)

@@ -103,8 +103,8 @@ class _Field:
             return FieldSignal(self._path, self._permitting(interlocks), prompt=True)
         if self._entry.values:
             return self._with(cycle(self._entry.values, self._round_s))
-        found = self._by_values() if self._values and not self._limits else self._by_type()
-        return found if found is None or self._limits else self._still(found)
+        fields = self._by_values() if self._values and not self._limits else self._by_type()
+        return fields if fields is None or self._limits else self._still(fields)
 
     def _with(self, signal: Signal, *, is_moving: bool = False) -> FieldSignal:
         return FieldSignal(self._path, signal, moving=is_moving)
@@ -196,13 +196,13 @@ class _Field:
         if self._parent not in KNOWN and self._type not in KNOWN:
             return []
         steps = self._of.interfaces.typed_steps(self._type, self._path)
-        found = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
-        return list(dict.fromkeys(value for value in found if value is not None))
+        values = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
+        return list(dict.fromkeys(value for value in values if value is not None))
 
 
-def _limited(given: Shown, guess: Span) -> Span:
+def _limited(shown: Shown, guess: Span) -> Span:
     """The limits of a widget; one that it does not give is far from the other."""
-    low, high = given.low, given.high
+    low, high = shown.low, shown.high
     if low is None:
         assert high is not None
         low = min(guess.low, high - 1)

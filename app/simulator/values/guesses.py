@@ -131,12 +131,12 @@ def moving(span: Span, kind: str, period_s: float | None, phase: float) -> Signa
         return as_type(fixed(span.low), kind)
     match span.shape:
         case "count":
-            found = count(span.low, span.high, period_s)
+            course = count(span.low, span.high, period_s)
         case "battery":
-            found = battery(span.low, span.high, period_s or BATTERY_S)
+            course = battery(span.low, span.high, period_s or BATTERY_S)
         case _:
-            found = swing(span.low, span.high, period_s or SWING_S, phase)
-    return as_type(found, kind)
+            course = swing(span.low, span.high, period_s or SWING_S, phase)
+    return as_type(course, kind)
 
 
 def guessed(kind: str, bound: int, *names: str) -> Signal:

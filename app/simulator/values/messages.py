@@ -88,5 +88,5 @@ def _several(name: str, kind: Type) -> Part | None:
 def field_constants(name: str, structure: Structure) -> list[Any]:
     """The values of the constants that begin with a field's name, each once."""
     prefix = f"{name}_".upper()
-    found = (value for constant, value in structure.constants.items() if constant.startswith(prefix))
-    return list(dict.fromkeys(found))
+    values = (value for constant, value in structure.constants.items() if constant.startswith(prefix))
+    return list(dict.fromkeys(values))

@@ -94,8 +94,8 @@ def _get_by_key(fields: Mapping[str, Any], name: str, key: Key, rest: Sequence[P
     keys = fields.get(key.path)
     if not isinstance(keys, list | tuple):
         keys = [get(item, path_steps(key.path)) for item in items]
-    found = next((i for i, one in enumerate(keys) if one == key.value), len(items))
-    return get(items[found], rest) if found < len(items) else None
+    index = next((i for i, one in enumerate(keys) if one == key.value), len(items))
+    return get(items[index], rest) if index < len(items) else None
 
 
 def merged(fields: Fields, over: Mapping[str, Any]) -> Fields:

@@ -53,8 +53,8 @@ def display_of(connection: HTTPConnection, panel: Panel) -> Display:
 
 
 def _chosen(connection: HTTPConnection, panel: Panel, name: str) -> str:
-    given = connection.cookies.get(COOKIE.format(name), "")
-    return given if given in CHOICES[name] else _usual(panel, name)
+    choice = connection.cookies.get(COOKIE.format(name), "")
+    return choice if choice in CHOICES[name] else _usual(panel, name)
 
 
 def _usual(panel: Panel, name: str) -> str:
