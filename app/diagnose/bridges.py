@@ -47,7 +47,7 @@ def _check_several(report: Report, behind: PanelNames, robot: str) -> None:
     for name in sorted(behind.robot.needed()):
         there = [t for t in behind.topics(name) if t.announced]
         zids = {e.bridge for t in there for e in (*t.publishers, *t.subscribers)}
-        zids |= {one.bridge for one in (*behind.services(name), *behind.actions(name))}
+        zids |= {server.bridge for server in (*behind.services(name), *behind.actions(name))}
         if len(zids) > 1:
             found[name] = zids
     if found:

@@ -78,7 +78,7 @@ def check_data(
     report: Report, folder: Path, panel: Panel | None, served: bool, free: FreeBytes = free_bytes
 ) -> None:
     """Whether the server can keep its files. `served`: a server runs, which may have the folder."""
-    place = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), folder)
+    place = next((parent for parent in (folder, *folder.parents) if os.path.lexists(parent)), folder)
     try:
         with tempfile.TemporaryFile(dir=place):
             pass

@@ -139,9 +139,11 @@ class PanelNames:
 
     def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
         """A sentence with similar names in the graph; "" if there are none."""
-        there = [f"{graph.namespace}{one.name}" for graph in self.graphs for one in _of(graph, kind)]
+        there = [
+            f"{graph.namespace}{server.name}" for graph in self.graphs for server in _of(graph, kind)
+        ]
         own = self.robot.namespace
-        similar = [self._written(one) for one in near(f"/{self.robot.key(name)}", there)]
+        similar = [self._written(near_name) for near_name in near(f"/{self.robot.key(name)}", there)]
         if own and f"/{name}" not in similar and name in there:
             similar = [f"/{name}", *similar]  # the same name, not below the namespace
         return f" Did you mean {' or '.join(similar)}?" if similar else ""
@@ -166,7 +168,7 @@ def _best(known: Iterable[Forwarding | None]) -> Forwarding | None:
     """That of the robot where it is forwarded, else lost, else denied."""
     order: tuple[Forwarding, ...] = ("forwarded", "lost", "denied")
     there = set(known)
-    return next((one for one in order if one in there), None)
+    return next((key for key in order if key in there), None)
 
 
 def _of(graph: RobotGraph, kind: str) -> tuple[SurveyedTopic, ...] | tuple[Server, ...]:

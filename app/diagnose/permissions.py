@@ -67,7 +67,7 @@ def _check_publishers(
     """Whether several nodes publish a value of which the last one counts. Two bridges of one domain
     know the same publishers."""
     number = max(Counter(publisher.bridge for publisher in publishers).values())
-    whole = [one.id for one in using if not has_key(one.field)]
+    whole = [interlock.id for interlock in using if not has_key(interlock.field)]
     if number > 1 and whole:
         nodes = ", ".join(sorted({node for publisher in publishers for node in publisher.nodes})) or "?"
         ids, topic = ", ".join(whole), using[0].topic

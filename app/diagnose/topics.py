@@ -95,12 +95,17 @@ class TopicChecks:
 
     def _is_let_through(self, of: TopicList, topic: str) -> bool:
         """Whether a bridge forwards a topic that is there. It finds why not, unless that is new."""
-        known = [one.topic_forwarding(topic, of) for one in (self._earlier, self._behind)]
+        known = [
+            robots_behind.topic_forwarding(topic, of) for robots_behind in (self._earlier, self._behind)
+        ]
         return self._is_found("topic_unrouted", topic, known)
 
     def _is_served(self, name: str, kind: ServerList) -> bool:
         """The same, of a service or an action; True as well if no node offers it."""
-        known = [one.server_forwarding(name, kind) for one in (self._earlier, self._behind)]
+        known = [
+            robots_behind.server_forwarding(name, kind)
+            for robots_behind in (self._earlier, self._behind)
+        ]
         return self._is_found("server_unrouted", name, known)
 
     def _is_found(self, lost: str, name: str, known: Sequence[Forwarding | None]) -> bool:

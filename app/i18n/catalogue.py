@@ -71,5 +71,7 @@ def translations(path: Path) -> dict[str, str]:
     with path.open("rb") as file:
         catalogue = read_po(file, abort_invalid=True)
     return {
-        str(one.id): str(one.string) for one in catalogue if one.id and one.string and not one.fuzzy
+        str(message.id): str(message.string)
+        for message in catalogue
+        if message.id and message.string and not message.fuzzy
     }

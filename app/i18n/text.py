@@ -180,14 +180,14 @@ def localized(value: Any, language: str) -> Any:
     if isinstance(value, Text):
         return _rendered(value, language)
     if isinstance(value, list | tuple):
-        return [localized(one, language) for one in value]
+        return [localized(element, language) for element in value]
     return value
 
 
 def _as_json(value: Param) -> Any:
     if isinstance(value, Text):
         return value.as_json()
-    return [_as_json(one) for one in value] if isinstance(value, tuple) else value
+    return [_as_json(element) for element in value] if isinstance(value, tuple) else value
 
 
 def present_code(stored: str) -> str:
@@ -210,4 +210,4 @@ def _text_in(stored: Any) -> Text:
 def _param_in(stored: Any) -> Any:
     if isinstance(stored, dict):
         return _text_in(stored)
-    return tuple(_param_in(one) for one in stored) if isinstance(stored, list) else stored
+    return tuple(_param_in(element) for element in stored) if isinstance(stored, list) else stored

@@ -128,4 +128,8 @@ def _named(
 
 
 def _texts(value: Any) -> list[str]:
-    return [one for one in value if isinstance(one, str) and one] if isinstance(value, list) else []
+    return (
+        [element for element in value if isinstance(element, str) and element]
+        if isinstance(value, list)
+        else []
+    )

@@ -68,7 +68,9 @@ def compose_service(name: str, request: Structure, response: Structure) -> Defin
         ),
         source=request.source,
     )
-    return Definitions({one.name: one for one in (request, response, event)}, {name: whole})
+    return Definitions(
+        {structure.name: structure for structure in (request, response, event)}, {name: whole}
+    )
 
 
 def compose_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> Definitions:

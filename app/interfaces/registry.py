@@ -229,7 +229,7 @@ class Interfaces:
         every, package = [*known, *self.unusable], name.partition("/")[0]
         if near := _suggestions(name, every):
             return InterfaceError(f"{why}; did you mean {' or '.join(near)}?")
-        if "/" not in name or any(one.startswith(f"{package}/") for one in every):
+        if "/" not in name or any(type_name.startswith(f"{package}/") for type_name in every):
             return InterfaceError(why)
         hint = f"there is no package {package}: its folder must be among the panel's `interfaces`"
         return InterfaceError(f"{why}; {hint}", package=package)
@@ -239,19 +239,21 @@ def _suggestions(name: str, known: Sequence[str]) -> list[str]:
     """Names similar to an unknown one: in its package or a similar package; then the same name in other
     packages."""
     package, _, rest = name.partition("/")
-    packages = {one.partition("/")[0] for one in known}
+    packages = {known_name.partition("/")[0] for known_name in known}
     near: list[str] = []
     for each in get_close_matches(package, packages, n=1, cutoff=PACKAGE_SIMILARITY):
-        own = [one.partition("/")[2] for one in known if one.startswith(f"{each}/")]
+        own = [
+            known_name.partition("/")[2] for known_name in known if known_name.startswith(f"{each}/")
+        ]
         near += [f"{each}/{one}" for one in _similar(rest, own)]
-    same = [one for one in known if one.endswith(f"/{rest}")]
+    same = [known_name for known_name in known if known_name.endswith(f"/{rest}")]
     near += get_close_matches(name, same, n=MAX_SUGGESTIONS, cutoff=0)
     return list(dict.fromkeys(near))[:MAX_SUGGESTIONS]
 
 
 def _similar(rest: str, known: Sequence[str]) -> list[str]:
     """The names whose last part is similar."""
-    last = {one.rpartition("/")[2]: one for one in known}
+    last = {known_name.rpartition("/")[2]: known_name for known_name in known}
     return [
         last[match] for match in get_close_matches(rest.rpartition("/")[2], last, n=MAX_SUGGESTIONS)
     ]

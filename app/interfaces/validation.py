@@ -48,7 +48,7 @@ def format_value(value: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
             )
             return f"{{{_join_limited(items, len(value))}}}"
         case list() | tuple():
-            elements = (format_value(one, depth - 1) for one in value[:MAX_SHOWN_ELEMENTS])
+            elements = (format_value(element, depth - 1) for element in value[:MAX_SHOWN_ELEMENTS])
             return f"[{_join_limited(elements, len(value))}]"
     return _shortener.repr(value)
 

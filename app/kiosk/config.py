@@ -104,7 +104,9 @@ def _checked(name: str, value: Any) -> tuple[str, Any]:
         raise SettingsError(f"{name} is not a key of a kiosk's file: {hint}")
     kind = get_type_hints(KioskConfig)[name]
     if get_origin(kind) is tuple:
-        if not isinstance(value, (list, tuple)) or not all(isinstance(one, str) for one in value):
+        if not isinstance(value, (list, tuple)) or not all(
+            isinstance(element, str) for element in value
+        ):
             raise SettingsError(f"{name} must be a list of texts")
         return name, tuple(value)
     if type(value) is not kind:

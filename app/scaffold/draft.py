@@ -122,7 +122,7 @@ def _check(topic: SurveyedTopic, interfaces: Interfaces) -> None:
     if len(topic.types) > 1:
         raise InterfaceError(f"it has several types: {', '.join(topic.types)}")
     interfaces.require(topic.type)
-    hashes = {one.type_hash for one in (*topic.publishers, *topic.subscribers)} - {""}
+    hashes = {endpoint.type_hash for endpoint in (*topic.publishers, *topic.subscribers)} - {""}
     if hashes and interfaces.type_hash(topic.type) not in hashes:
         raise InterfaceError(
             f"the robot's {topic.type} has another definition than the one known here: give its package"

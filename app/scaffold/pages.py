@@ -86,8 +86,8 @@ def _room(entries: Sequence[DraftWidget], live: bool) -> int:
 
 
 def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
-    counted = [one for one in _in_order(entries) if live or not one.control]
-    comments = [one for one in _in_order(entries) if one.control and not live]
+    counted = [entry for entry in _in_order(entries) if live or not entry.control]
+    comments = [entry for entry in _in_order(entries) if entry.control and not live]
     first, *others = (counted[n : n + MOST_WIDGETS] for n in range(0, len(counted), MOST_WIDGETS))
     return [[*first, *comments], *others]
 

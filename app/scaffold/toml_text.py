@@ -122,7 +122,7 @@ def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Ite
 def _key(key: str, value: Any) -> Iterator[str]:
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
         yield f"{key} = ["
-        yield from (f"  {_value(one)}," for one in value)
+        yield from (f"  {_value(element)}," for element in value)
         yield "]"
     else:
         yield f"{key} = {_value(value)}"

@@ -48,7 +48,7 @@ def _declared(several: list[widgets.Parameter], entry: Any) -> Parameter:
     options = tuple(option.value for option in first.options) if len(several) == 1 else ()
     value = entry if entry is not None else _value(first, limits, options)
     if first.element_type == "double":
-        value = [float(one) for one in value] if first.is_list else float(value)
+        value = [float(element) for element in value] if first.is_list else float(value)
     return Parameter(TYPES[first.type], value, limits=limits, options=options)
 
 

@@ -38,7 +38,7 @@ def permitting(
     """A field of the base type `kind` that satisfies its interlocks, and then does not; `others` are
     further values that the field may have. Where no value satisfies all, each has its turn."""
     values = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others))
-    candidates = [one for one in values if _fits(one, kind)]
+    candidates = [choice for choice in values if _fits(choice, kind)]
     met = [sum(satisfies(interlock, candidate) for interlock in interlocks) for candidate in candidates]
     best, least = max(met), min(met)
     good = [one for one, count in zip(candidates, met, strict=True) if count == best]
@@ -66,7 +66,8 @@ def satisfies(interlock: Interlock, value: Any) -> bool:
         ("equals" not in comparisons or same_value(value, interlock.equals))
         and ("not_equals" not in comparisons or not same_value(value, interlock.not_equals))
         and (
-            "one_of" not in comparisons or any(same_value(value, one) for one in comparisons["one_of"])
+            "one_of" not in comparisons
+            or any(same_value(value, comparison) for comparison in comparisons["one_of"])
         )
         and ("min" not in comparisons or value >= comparisons["min"])
         and ("max" not in comparisons or value <= comparisons["max"])

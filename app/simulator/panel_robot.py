@@ -207,7 +207,7 @@ class PanelRobot:
 
     def _declared(self, declared: Iterable[Declared]) -> dict[str, NodeParameters]:
         """The nodes. The `system_controller` keeps its own parameters, where the types are equal."""
-        found = declared_by((one.widget for one in declared), self._panel.demo)
+        found = declared_by((parameter.widget for parameter in declared), self._panel.demo)
         given = self._panel.demo.get(NODE, NO_ENTRY).parameters
         own = {
             name: one

@@ -97,8 +97,8 @@ def simulated_topics(
     """Each topic that the panel listens to, but those `skipped` (topic → type), which are simulated
     elsewhere. `phase` sets several robots apart."""
     by_topic: dict[str, list[Shown]] = {}
-    for one in shown:
-        by_topic.setdefault(one.topic, []).append(one)
+    for shown_field in shown:
+        by_topic.setdefault(shown_field.topic, []).append(shown_field)
     fields = PanelFields(panel, interfaces, phase)
     found = {}
     for topic, type_name in panel.listened().items():
@@ -138,5 +138,7 @@ def _hz(
     still = made and not any(one.moving for one in made)
     hz = OTHERS_HZ if still or type_name in SLOW else MOVING_HZ
     locks = (interlock.max_age_s for interlock in fields.panel.interlocks if interlock.topic == topic)
-    ages = [age for age in (*locks, *(one.max_age_s for one in shown)) if age is not None]
+    ages = [
+        age for age in (*locks, *(shown_field.max_age_s for shown_field in shown)) if age is not None
+    ]
     return max([hz, *(TIMES_WITHIN_AGE / age for age in ages)])

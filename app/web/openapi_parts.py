@@ -32,7 +32,7 @@ PAGE: Final = {"text/html": {"schema": TEXT}}
 def errors(*statuses: int) -> Described:
     """The error responses of a route; each may be answered 429."""
     content = {JSON: {"schema": ErrorAnswer.model_json_schema()}, **PAGE}
-    return {one: {"description": REASONS[one], "content": content} for one in (*statuses, 429)}
+    return {status: {"description": REASONS[status], "content": content} for status in (*statuses, 429)}
 
 
 def described_body(

@@ -38,7 +38,9 @@ def limit_server_log(debug: bool) -> RepeatedRecords:
     for name in LOGGERS:
         logger = logging.getLogger(name)
         for before in [
-            one for one in logger.filters if isinstance(one, (ClientFaults, RepeatedRecords))
+            log_filter
+            for log_filter in logger.filters
+            if isinstance(log_filter, (ClientFaults, RepeatedRecords))
         ]:
             logger.removeFilter(before)
         if not debug:

@@ -39,9 +39,9 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
             inner = value if isinstance(value, list) else [value]
             if _by_name(tables[name]["properties"].get(key, {})):
                 inner = list(value.values())
-            for one in inner:
-                if isinstance(one, dict) and (part := of_kind(one.get("kind")) or key) in tables:
-                    walk(part, one)
+            for field in inner:
+                if isinstance(field, dict) and (part := of_kind(field.get("kind")) or key) in tables:
+                    walk(part, field)
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))
     own: dict[str, Any] = WORDS["examples"]
@@ -76,7 +76,7 @@ def words(prop: Schema) -> str:
     if "const" in prop:
         return f"`{toml(prop['const'])}`"
     if "enum" in prop:
-        return ", ".join(f"`{toml(one)}`" for one in prop["enum"])
+        return ", ".join(f"`{toml(choice)}`" for choice in prop["enum"])
     if "$ref" in prop:
         return f"[table](#{_anchor(prop['$ref'])})"
     if "anyOf" in prop:

@@ -151,8 +151,8 @@ def _codes(found: Iterable[ast.AST]) -> Iterator[str]:
             ):
                 yield f"{begin}*"
             case ast.Call(args=arguments, keywords=keywords) if _may_say(node.func):
-                for one in (*arguments, *(word.value for word in keywords)):
-                    for inner in ast.walk(one):
+                for argument in (*arguments, *(word.value for word in keywords)):
+                    for inner in ast.walk(argument):
                         if isinstance(inner, ast.Constant) and inner.value in SENTENCES:
                             yield str(inner.value)
 

@@ -59,7 +59,7 @@ def of_cell_msgs(folder: Path, *topics: SurveyedTopic) -> str:
 def pages(text: str) -> dict[str, list[str]]:
     """The ids of each page's widgets."""
     return {
-        page["title"]: [one["id"] for one in page.get("widget", ())]
+        page["title"]: [widget["id"] for widget in page.get("widget", ())]
         for page in tomllib.loads(text)["page"]
     }
 

@@ -56,7 +56,7 @@ def text_of(controls: bool = False, base: Draft | None = None, **known: Any) -> 
 
 def widgets(text: str) -> dict[str, dict[str, Any]]:
     pages = tomllib.loads(text)["page"]
-    return {one["id"]: one for page in pages for one in page.get("widget", ())}
+    return {widget["id"]: widget for page in pages for widget in page.get("widget", ())}
 
 
 ENABLED = published("/operation_enabled", BOOL, transient_local=True)

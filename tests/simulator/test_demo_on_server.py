@@ -82,7 +82,7 @@ def test_an_example_is_alive(path: Path, servers: Servers) -> None:
     is_alive(panel, robot)
 
     def states() -> set[str]:
-        return {one["state"] for one in robot.snapshot()["widgets"].values() if "state" in one}
+        return {widget["state"] for widget in robot.snapshot()["widgets"].values() if "state" in widget}
 
     until(lambda: states() <= {"live", "waiting"}, "nothing is unknown")
 

@@ -11,10 +11,12 @@ def english(value: Any) -> Any:
     if isinstance(value, Text):
         return render(value)
     if isinstance(value, tuple):
-        return tuple(english(one) for one in value)
+        return tuple(english(element) for element in value)
     if isinstance(value, set | frozenset):
-        return {english(one) for one in value}
-    return [english(one) for one in value] if isinstance(value, list) else localized(value, "en")
+        return {english(element) for element in value}
+    return (
+        [english(element) for element in value] if isinstance(value, list) else localized(value, "en")
+    )
 
 
 def why(reason: TextLike | None) -> TextLike:

@@ -58,8 +58,8 @@ def _elements(value: Any, shape: Shape, indent: str) -> Iterator[str]:
     if not shape.lists or not len(value):
         yield f"{indent}{_one_line(value, shape)}"
         return
-    for one in value[: shape.most]:
-        first, *rest = _lines(one, shape, f"{indent}  ")
+    for element in value[: shape.most]:
+        first, *rest = _lines(element, shape, f"{indent}  ")
         yield f"{indent}- {first[len(indent) + 2 :]}"
         yield from rest
     if shape.most is not None and len(value) > shape.most:
@@ -118,8 +118,8 @@ def _scalars(value: Any, shape: Shape) -> Iterator[Any]:
     elif not shape.lists or not len(value):
         yield f"<{len(value)} elements>" if len(value) else ""
     else:
-        for one in value[: shape.most]:
-            yield from _scalars(one, shape)
+        for element in value[: shape.most]:
+            yield from _scalars(element, shape)
         if shape.most is not None and len(value) > shape.most:
             yield CUT
 

@@ -40,7 +40,7 @@ def group_runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
 
     for each, group in groupby(fields, size):
         together = list(group)
-        yield from [together] if each else ([one] for one in together)
+        yield from [together] if each else ([format_part] for format_part in together)
 
 
 def is_number(kind: Type) -> bool:

@@ -64,7 +64,7 @@ def value_reader(kind: Type, order: ByteOrder) -> Read:
 def _field_step(run: Sequence[Field], order: ByteOrder, nested: Callable[[str], Read]) -> ReadStep:
     kind = run[0].type
     if is_number(kind) and kind.container == "one":
-        return _numbers_step([one.type for one in run], order)
+        return _numbers_step([step.type for step in run], order)
     read = _field_reader(kind, order, nested)
 
     def one(data: "memoryview[int]", at: int, values: list[Any]) -> int:

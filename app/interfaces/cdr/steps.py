@@ -239,8 +239,8 @@ class _ProgramBuilder:
 def _keys_beside(inner: Mapping[str, Selection], types: Mapping[str, Type]) -> dict[str, Lookup]:
     """The lists by which elements of lists beside them are selected."""
     keys: dict[str, Lookup] = {}
-    for one in inner.values():
-        for name, values in one.by_sibling.items():
+    for inner_value in inner.values():
+        for name, values in inner_value.by_sibling.items():
             keys.setdefault(name, Lookup(types[name].element)).values.update(values)
     return keys
 

@@ -24,9 +24,9 @@ def message_writer(fields: Sequence[Field], nested: Callable[[str], Write]) -> W
 
 
 def _field_step(run: Sequence[Field], nested: Callable[[str], Write]) -> Write:
-    kind, names = run[0].type, [one.attribute for one in run]
+    kind, names = run[0].type, [step.attribute for step in run]
     if is_number(kind) and kind.container == "one":
-        return _numbers_writer([one.type for one in run], names)
+        return _numbers_writer([step.type for step in run], names)
     write, name = _field_writer(kind, nested), names[0]
     return lambda out, message: write(out, getattr(message, name))
 

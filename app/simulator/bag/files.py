@@ -180,7 +180,7 @@ class _Folder:
             replace(_of_connection(connection), count=0) for connection in self._reader.connections
         ]
         self.topics: Sequence[RecordedTopic] = [*named, *stored]
-        there, said = sum(one.count for one in stored), self._reader.metadata.message_count
+        there, said = sum(topic.count for topic in stored), self._reader.metadata.message_count
         missing = f"{path}: its files have {there} messages, its metadata.yaml names {said}"
         self.notes: Sequence[str] = [missing] if there < said else []
 

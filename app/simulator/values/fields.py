@@ -83,7 +83,7 @@ class _Field:
         self._topic = topic
         self._type = type_name
         self._path = path
-        self._shown = [one for one in shown if one.field == path]
+        self._shown = [shown_field for shown_field in shown if shown_field.field == path]
         self._message = message
         self._kind = of.interfaces.type_at(type_name, path)
         self._entry = of.entry(topic)
@@ -119,7 +119,7 @@ class _Field:
     @property
     def _values(self) -> tuple[Any, ...]:
         """The values that a widget distinguishes."""
-        return next((one.values for one in self._shown if one.values), ())
+        return next((shown_field.values for shown_field in self._shown if shown_field.values), ())
 
     @property
     def _round_s(self) -> float:
@@ -130,8 +130,8 @@ class _Field:
         """Each of a widget's values; the usual one is that of the message, if it has one."""
         if len(self._own) > 1:
             return None
-        usual = [one for one in self._values if one in self._own]
-        others = [one for one in self._values if one not in usual]
+        usual = [values_field for values_field in self._values if values_field in self._own]
+        others = [values_field for values_field in self._values if values_field not in usual]
         return self._with(cycle([*usual, *others], self._entry.period_s, self._phase))
 
     def _by_type(self) -> FieldSignal | None:
@@ -139,12 +139,14 @@ class _Field:
             return self._number()
         if self._own:
             return None
-        names = (self._path, *(one.label for one in self._shown), self._topic)
+        names = (self._path, *(shown_field.label for shown_field in self._shown), self._topic)
         return self._with(guessed(self._kind.name, self._kind.bound, *names))
 
     def _number(self) -> FieldSignal | None:
-        unit = next((one for one in self._shown if one.unit), None)
-        limited = any(one.low is not None or one.high is not None for one in self._shown)
+        unit = next((shown_field for shown_field in self._shown if shown_field.unit), None)
+        limited = any(
+            shown_field.low is not None or shown_field.high is not None for shown_field in self._shown
+        )
         if not self._limits and not limited:
             if self._own:
                 return None
@@ -158,7 +160,11 @@ class _Field:
         """By the entry, else by a widget's limits, else by its unit, else by names."""
         label = self._shown[0].label if self._shown else ""
         guess = span_of(unit.unit if unit else "", field_name(self._path), label, self._topic)
-        limits = (one for one in self._shown if one.low is not None or one.high is not None)
+        limits = (
+            shown_field
+            for shown_field in self._shown
+            if shown_field.low is not None or shown_field.high is not None
+        )
         if self._limits:
             return Span(self._limits[0], self._limits[1], guess.shape)
         if given := next(limits, None):
@@ -174,7 +180,7 @@ class _Field:
             return cycle(entry.values, self._round_s)
         if self._limits and (kind in INTEGER_RANGES or kind in FLOAT_TYPES):
             return moving(Span(self._limits[0], self._limits[1]), kind, entry.period_s, 0.0)
-        others = [value for one in self._shown for value in one.values]
+        others = [value for shown_field in self._shown for value in shown_field.values]
         others += [*self._constants, *interlocks[0].constants]
         offset = self._of.offsets[self._topic, self._path]
         return permitting(interlocks, kind, others, offset, entry.period_s)

@@ -79,12 +79,12 @@ def choices(now: Display) -> list[Choice]:
             label=say(f"display_{name}"),
             options=[
                 Option(
-                    value=one,
-                    label=say(f"display_{name}_{one}"),
-                    chosen=one == getattr(now, name),
+                    value=choice,
+                    label=say(f"display_{name}_{choice}"),
+                    chosen=choice == getattr(now, name),
                     lang="",
                 )
-                for one in values
+                for choice in values
             ],
         )
         for name, values in CHOICES.items()
