@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
 
 from app.audit.entry import Entry, Kind, Origin, new_entry
 from app.audit.queries import OpenPress
@@ -10,6 +11,19 @@ from app.errors import LogError
 from app.i18n import TextLike, render, say
 from app.permission.principal import Principal
 from app.robot.command_status import Outcome
+
+PressAction = Literal["press", "hold", "cancel"]
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedPress:
+    """A press as the log has it. `inputs` are those that its widget uses."""
+
+    id: str
+    widget: str
+    inputs: Mapping[str, Any]
+    origin: Origin
+    action: PressAction = "press"
 
 
 class Log(Protocol):
@@ -102,27 +116,18 @@ class PressLog:
         """Counts a refusal without an entry."""
         self._log.suppress(origin)
 
-    async def pressed(
-        self,
-        widget: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        origin: Origin,
-        action: str = "press",
-    ) -> PendingEntry:
+    async def pressed(self, press: LoggedPress) -> PendingEntry:
         """Writes the entry of a press before it is sent; LogError and Repeated as in `Log.pressed`."""
-        entry = new_entry("pressed", origin, inputs, **self._columns(widget, press_id, action))
+        entry = new_entry("pressed", press.origin, press.inputs, **self._columns(press))
         written = await self._log.pressed(entry)
         return PendingEntry(self._log, written, self._view_version, self._log.fault)
 
-    async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
+    async def canceled(self, cancel: LoggedPress) -> PendingEntry:
         """Writes the entry of a cancel if possible: a failing log never blocks a cancel."""
-        entry = new_entry("pressed", origin, {}, **self._columns(widget, "", "cancel"))
         try:
-            written = await self._log.pressed(entry)
+            return await self.pressed(cancel)
         except LogError as error:
             return PendingEntry(self._log, None, self._view_version, error.text)
-        return PendingEntry(self._log, written, self._view_version, self._log.fault)
 
     @property
     def is_bypassed(self) -> bool:
@@ -133,22 +138,16 @@ class PressLog:
         self, widgets: Collection[str], since: int
     ) -> list[tuple[OpenPress, PendingEntry]]:
         """Presses without a known end, as in `Log.open_presses`, each with its log entry to correct."""
-        found = await self._log.open_presses(self._robot, widgets, since)
-        return [(one, PendingEntry(self._log, one.press, self._view_version)) for one in found]
+        presses = await self._log.open_presses(self._robot, widgets, since)
+        return [(open, PendingEntry(self._log, open.press, self._view_version)) for open in presses]
 
-    async def refused(
-        self,
-        widget: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        origin: Origin,
-        reason: TextLike,
-        action: str = "press",
-    ) -> TextLike:
+    async def refused(self, press: LoggedPress, reason: TextLike) -> TextLike:
         """Writes a refusal before the permission check. Returns "" when it is on the disk, else why it
         is not."""
-        about = self._columns(widget, press_id, action)
-        entry = new_entry("refused", origin, inputs, outcome="refused", reason=reason, **about)
+        about = self._columns(press)
+        entry = new_entry(
+            "refused", press.origin, press.inputs, outcome="refused", reason=reason, **about
+        )
         return await self._log.closed(entry)
 
     async def acted(
@@ -162,16 +161,21 @@ class PressLog:
         values: Mapping[str, Any],
     ) -> TextLike:
         """Writes an operator's act. Returns "" when it is on the disk, else why it is not."""
-        about = self._columns("", act_id, action)
+        about = {"press": act_id, "action": action, "robot": self._robot}
         entry = new_entry(kind, origin, values, outcome=outcome, reason=reason, **about)
         return await self._log.closed(entry)
 
     def note(self, action: str, origin: Origin, reason: TextLike) -> None:
         """Writes a change of control that no act made, without waiting."""
-        self._log.add(new_entry("control", origin, {}, reason=reason, **self._columns("", "", action)))
+        self._log.add(new_entry("control", origin, reason=reason, action=action, robot=self._robot))
 
-    def _columns(self, widget: str, press_id: str, action: str) -> dict[str, str]:
-        return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
+    def _columns(self, press: LoggedPress) -> dict[str, str]:
+        return {
+            "widget": press.widget,
+            "press": press.id,
+            "action": press.action,
+            "robot": self._robot,
+        }
 
 
 def origin_of(who: Principal, seen: str = "") -> Origin:

@@ -2,12 +2,11 @@
 
 import asyncio
 import time
-from collections.abc import Callable
 
-from app.audit import Origin
 from app.audit.press_record import PressLog
 from app.clock import format_time
 from app.commands.actions.goals import GoalTracker
+from app.commands.press import Press
 from app.commands.receipts import Receipt, close_entry, origin_text, receipt_of
 from app.commands.refusals import EarlyRefusals
 from app.concurrency import CancellableWaits
@@ -24,34 +23,30 @@ class Cancels:
 
     def __init__(
         self,
-        widget_of: Callable[[str], PressCommand],
         goals: GoalTracker,
         press_log: PressLog,
         early_refusals: EarlyRefusals,
         waits: CancellableWaits,
         log: RobotLog,
     ) -> None:
-        """`widget_of` returns the command widget with an id; NotFound for every other id."""
-        self._widget_of = widget_of
         self._goals = goals
         self._press_log = press_log
         self._early_refusals = early_refusals
         self._waits = waits
         self._log = log
 
-    async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
-        """Asks the robot to cancel the goal of a press; without a press id, the running goal."""
-        widget = self._widget_of(widget_id)
+    async def cancel(self, cancel: Press[PressCommand], press_id: str) -> Receipt:
+        """Asks the robot to cancel the goal of a press; with the id "", the running goal. NotFound for
+        widgets that are not actions."""
+        widget, origin = cancel.widget, cancel.origin
         if not isinstance(widget, Action):
-            raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
+            raise NotFound(f'"{widget.id}" is not an action: there is nothing to cancel')
         if (why := self._goals.no_goal_reason(widget, press_id)) and not self._press_log.has_room(
             origin
         ):
-            answer = Outcome("refused", why)
-            return self._early_refusals.count_only(
-                receipt_of(widget, {}, "", answer, "interlock"), origin
-            )
-        writing = asyncio.ensure_future(self._press_log.canceled(widget_id, origin))
+            receipt = receipt_of(cancel, Outcome("refused", why), "interlock")
+            return self._early_refusals.count_only(receipt, origin)
+        writing = asyncio.ensure_future(self._press_log.canceled(cancel.logged("cancel")))
         try:
             # A slow or failing disk must not delay a cancel.
             answer, cause = await self._canceled(widget, press_id)
@@ -60,10 +55,9 @@ class Cancels:
             raise
         pending = await writing
         self._log.info(
-            "cancel of %s by %s: %s: %s", widget_id, origin_text(origin), answer.outcome, answer.text
+            "cancel of %s by %s: %s: %s", widget.id, origin_text(origin), answer.outcome, answer.text
         )
-        receipt = receipt_of(widget, {}, "", answer, cause)
-        return await close_entry(pending, receipt)
+        return await close_entry(pending, receipt_of(cancel, answer, cause))
 
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:

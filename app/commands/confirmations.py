@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.clock import format_time
+from app.commands.press import PressHandle
 from app.i18n import TextLike, joined, number, say
 from app.panel.values import same_value
 from app.panel.widgets.publish import Confirm, PublishPress
-from app.robot.command_status import CommandStatus, OnCorrection, Outcome
+from app.robot.command_status import CommandStatus, Outcome
 from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
@@ -26,18 +27,35 @@ LATE_S: Final = 60.0  # after the time limit, a confirmation still corrects the 
 FLOAT_TOLERANCE: Final = 1e-6  # relative: a float32 field holds the nearest float32
 
 
-@dataclass(eq=False, slots=True)
-class _Waiting:
-    """An unconfirmed command, sent at `since` (monotonic seconds). `confirmed` is done with the wall
-    time of the confirmation; `late` is true after the time limit."""
+@dataclass(frozen=True, slots=True)
+class Unconfirmed:
+    """A command that was sent at `since` (monotonic seconds) and has the effect that the field of
+    `confirm` is `expected`. `sentence` is the sentence about the sending."""
 
     widget: PublishPress
     confirm: Confirm
-    equals: Any
-    press_id: str
+    expected: Any
     since: float
+    sentence: TextLike
+
+
+@dataclass(eq=False, slots=True)
+class _Waiting:
+    """A command whose confirmation is awaited. `confirmed` is done with the wall time of the
+    confirmation; `late` is true after the time limit."""
+
+    command: Unconfirmed
+    handle: PressHandle
     confirmed: "asyncio.Future[float]"
     late: bool = False
+
+    @property
+    def widget(self) -> PublishPress:
+        return self.command.widget
+
+    @property
+    def confirm(self) -> Confirm:
+        return self.command.confirm
 
 
 class Confirmations:
@@ -57,25 +75,15 @@ class Confirmations:
             for key in self._robot.possible_keys(confirm.topic):
                 handlers.await_readings(key, self.is_awaited)
 
-    async def wait(
-        self,
-        widget: PublishPress,
-        equals: Any,
-        press_id: str,
-        since: float,
-        sent: TextLike,
-        corrected: OnCorrection,
-    ) -> Outcome:
-        """Waits for the confirmation of a command that was sent at `since` (monotonic seconds); `sent`
-        is the sentence about the sending. `corrected` is called for a late confirmation."""
-        confirm = widget.confirm
-        assert confirm is not None
+    async def wait(self, command: Unconfirmed, handle: PressHandle) -> Outcome:
+        """Waits for the confirmation of a command; a late one corrects the receipt."""
+        widget, confirm = command.widget, command.confirm
         future: asyncio.Future[float] = asyncio.get_running_loop().create_future()
-        waiting = _Waiting(widget, confirm, equals, press_id, since, future)
+        waiting = _Waiting(command, handle, future)
         for older in [w for w in self._waiting.get(self._robot.key(confirm.topic), []) if w.late]:
             self._forget(older)  # a message from now on may be the effect of the new command
         self._waiting.setdefault(self._robot.key(confirm.topic), []).append(waiting)
-        self._latest[widget.id] = press_id
+        self._latest[widget.id] = handle.press_id
         self._show(
             widget, CommandStatus(busy=True, text=say("confirmation_waiting", topic=confirm.topic))
         )
@@ -84,18 +92,18 @@ class Confirmations:
         except asyncio.CancelledError:
             self._forget(waiting)
             raise
-        answer = self._confirmed(waiting) if future.done() else self._time_out(waiting, sent, corrected)
+        answer = self._confirmed(waiting) if future.done() else self._time_out(waiting)
         self._show_last(waiting, answer)
         return answer
 
-    def _time_out(self, waiting: _Waiting, sent: TextLike, corrected: OnCorrection) -> Outcome:
+    def _time_out(self, waiting: _Waiting) -> Outcome:
         confirm = waiting.confirm
         waiting.late = True
-        waiting.confirmed.add_done_callback(lambda _: self._confirm_late(waiting, corrected))
+        waiting.confirmed.add_done_callback(lambda _: self._confirm_late(waiting))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = number(f"{confirm.within_s:g}")
         missed = say("confirmation_missing", topic=confirm.topic, seconds=limit)
-        return Outcome("unknown", joined([sent, missed]))
+        return Outcome("unknown", joined([waiting.command.sentence, missed]))
 
     def is_awaited(self, key: str) -> bool:
         """Whether the next message of this topic may confirm a command."""
@@ -108,9 +116,9 @@ class Confirmations:
         for waiting in [w for w in self._waiting.get(key, []) if not w.confirmed.done()]:
             field = waiting.confirm.field
             own = reading.of_field(field, math.inf)
-            if waiting.widget.id in done or own.status != "message" or own.at < waiting.since:
+            if waiting.widget.id in done or own.status != "message" or own.at < waiting.command.since:
                 continue
-            if equal(own.value(field), waiting.equals):
+            if equal(own.value(field), waiting.command.expected):
                 waiting.confirmed.set_result(own.wall)
                 done.add(waiting.widget.id)
 
@@ -119,22 +127,22 @@ class Confirmations:
         at = format_time(waiting.confirmed.result())
         return Outcome("confirmed", say("confirmed", topic=waiting.confirm.topic, time=at))
 
-    def _confirm_late(self, waiting: _Waiting, corrected: OnCorrection) -> None:
+    def _confirm_late(self, waiting: _Waiting) -> None:
         if waiting.confirmed.cancelled():
             return
         answer = self._confirmed(waiting)
-        self._log.warning("press %s: late confirmation: %s", waiting.press_id, answer.text)
-        corrected(waiting.press_id, answer)
+        press_id = waiting.handle.press_id
+        self._log.warning("press %s: late confirmation: %s", press_id, answer.text)
+        waiting.handle.correct(answer)
         self._show_last(waiting, answer)
 
     def _forget(self, waiting: _Waiting) -> None:
         key = self._robot.key(waiting.confirm.topic)
-        left = [one for one in self._waiting.get(key, []) if one is not waiting]
-        self._waiting[key] = left
+        self._waiting[key] = [other for other in self._waiting.get(key, []) if other is not waiting]
         waiting.confirmed.cancel()
 
     def _show_last(self, waiting: _Waiting, answer: Outcome) -> None:
-        if self._latest.get(waiting.widget.id) == waiting.press_id:
+        if self._latest.get(waiting.widget.id) == waiting.handle.press_id:
             self._show(waiting.widget, CommandStatus(outcome=answer.outcome, text=answer.text))
 
     def _show(self, widget: PublishPress, progress: CommandStatus) -> None:

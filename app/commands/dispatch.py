@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 from app.clock import format_time
 from app.commands.actions.goals import GoalTracker
-from app.commands.confirmations import Confirmations, equal
+from app.commands.confirmations import Confirmations, Unconfirmed, equal
 from app.commands.parameters.sync import ParameterSync
+from app.commands.press import Press, PressHandle
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.errors import InputError, NotFound
@@ -23,8 +25,10 @@ from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.step import Step
 from app.permission.interlocks import reported_value
-from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.command_status import FinalCheck, Outcome
 from app.robot.state import RobotState
+
+AnyCommand = TypeVar("AnyCommand", bound=Command)
 
 
 async def assume_flushed() -> bool:
@@ -33,15 +37,12 @@ async def assume_flushed() -> bool:
 
 
 class PreparedPress(NamedTuple):
-    """A press to be sent: the checked `values` of its inputs, the `fields` of the filled-in template,
-    and the other arguments of `Dispatcher.send`."""
+    """A press to be sent: the checked `values` of its inputs, and the `fields` of the filled-in
+    template."""
 
     values: dict[str, Any]
     fields: dict[str, Any]
-    press_id: str
-    correct: OnCorrection
-    entry: str
-    final_check: FinalCheck
+    handle: PressHandle
 
 
 class Trackers(NamedTuple):
@@ -95,7 +96,7 @@ class Dispatcher:
             Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
-            Input: lambda widget, given: widget.check_value(given),
+            Input: lambda widget, value: widget.check_value(value),
             Parameter: self._parameters.check_value,
             Step: self._check_step,
         }
@@ -103,13 +104,13 @@ class Dispatcher:
         require_rows("refusal", self.refusals, PressCommand)
         require_rows("check of its entries", self.checks, EntryWidget)
 
-    def _check_step(self, widget: Step, given: Any) -> float:
+    def _check_step(self, widget: Step, value: Any) -> float:
         """The value of a press, which is one step from the one that the robot reports now: what the
         operator saw has not changed. InputError otherwise."""
         base, _ = reported_value(widget, self._robot, self._monotonic())
-        if isinstance(given, int | float) and not isinstance(given, bool) and base is not None:
+        if isinstance(value, int | float) and not isinstance(value, bool) and base is not None:
             for target in (widget.target(base, 1), widget.target(base, -1)):
-                if target is not None and equal(float(target), given):
+                if target is not None and equal(float(target), value):
                     return target
         known = "?" if base is None else number(f"{base:g}")
         raise InputError(say("step_value_changed", label=widget.label, value=known))
@@ -130,82 +131,68 @@ class Dispatcher:
         field = self._widgets.get(name)
         return field.parse_text(text, language) if isinstance(field, EntryWidget) else text
 
-    def needed_inputs(self, widget: PressCommand, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The inputs of a press that its widget uses."""
-        return {name: inputs[name] for name in self._input_ids[widget.id] if name in inputs}
-
-    def with_defaults(self, widget: Command, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The inputs of a press, with the panel file's defaults for those left out."""
-        fields = ((name, self._widgets[name]) for name in input_ids(widget) if name not in inputs)
+    def with_defaults(self, press: Press[AnyCommand]) -> Press[AnyCommand]:
+        """The press, with the panel file's defaults for the inputs left out."""
+        names = (name for name in input_ids(press.widget) if name not in press.inputs)
+        fields = ((name, self._widgets[name]) for name in names)
         missing = {
             name: field.default_value for name, field in fields if isinstance(field, EntryWidget)
         }
-        return {name: value for name, value in missing.items() if value is not None} | {**inputs}
+        defaults = {name: value for name, value in missing.items() if value is not None}
+        return replace(press, inputs=defaults | {**press.inputs})
 
-    async def send(
-        self,
-        widget: PressCommand,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        correct: OnCorrection,
-        entry: str = "",
-        final_check: FinalCheck = no_check,
-    ) -> Outcome:
-        """Sends a press and waits for its outcome; `correct` is called if the outcome changes later.
-        `entry` is the hash of the press's entry in the operator's log. `final_check` checks permission
-        right before sending.
+    async def send(self, press: Press[PressCommand], handle: PressHandle) -> Outcome:
+        """Sends a press and waits for its outcome.
 
         Does not await before sending. FieldError or InputError for bad input, LinkError if it could not
-        be sent, PressRefused from `final_check`.
+        be sent, PressRefused from the handle's `final_check`.
         """
-        values = self.check_inputs(self._input_ids[widget.id], inputs)
-        fields = fill(widget.template, add_now(values))
-        send = find_row(self.senders, widget)
-        return await send(widget, PreparedPress(values, fields, press_id, correct, entry, final_check))
+        values = self._checked_inputs(press)
+        fields = fill(press.widget.template, add_now(values))
+        send = find_row(self.senders, press.widget)
+        return await send(press.widget, PreparedPress(values, fields, handle))
 
-    def refusal(self, widget: PressCommand, inputs: Mapping[str, Any]) -> TextLike:
+    def refusal(self, press: Press[PressCommand]) -> TextLike:
         """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
-        values = self.check_inputs(self._input_ids[widget.id], inputs)
+        widget, values = press.widget, self._checked_inputs(press)
         return find_row(self.refusals, widget)(widget, fill(widget.template, add_now(values)))
 
-    async def _publish(self, widget: PublishPress, going: PreparedPress) -> Outcome:
+    def _checked_inputs(self, press: Press[PressCommand]) -> dict[str, Any]:
+        return self.check_inputs(self._input_ids[press.widget.id], press.inputs)
+
+    async def _publish(self, widget: PublishPress, prepared: PreparedPress) -> Outcome:
+        fields, handle = prepared.fields, prepared.handle
         if widget.confirm is None:
-            return await self._until_flushed(widget, self._put(widget, going.fields, going.final_check))
-        equals = self._expected(widget.confirm, going.values)
+            return await self._until_flushed(widget, self._put(widget, fields, handle.final_check))
+        expected = self._expected(widget.confirm, prepared.values)
         since = self._monotonic()
-        answer = self._put(widget, going.fields, going.final_check)
-        return await self._confirmations.wait(
-            widget, equals, going.press_id, since, answer.text, going.correct
-        )
+        answer = self._put(widget, fields, handle.final_check)
+        unconfirmed = Unconfirmed(widget, widget.confirm, expected, since, answer.text)
+        return await self._confirmations.wait(unconfirmed, handle)
 
     def _expected(self, confirm: Confirm, values: Mapping[str, Any]) -> Any:
         """The value of the field that confirms a press with these inputs."""
-        given = fill(confirm.equals, values)
-        return resolve_at(given, self._types[confirm.topic], confirm.field, self._interfaces)
+        expected = fill(confirm.equals, values)
+        return resolve_at(expected, self._types[confirm.topic], confirm.field, self._interfaces)
 
     def _check_message(self, widget: PublishPress, fields: dict[str, Any]) -> str:
         self._interfaces.encode(widget.type, fields)
         return ""
 
-    async def _call(self, widget: Call, going: PreparedPress) -> Outcome:
+    async def _call(self, widget: Call, prepared: PreparedPress) -> Outcome:
         request, _ = self._interfaces.service_types(widget.type)
-        payload = self._interfaces.encode(request, going.fields)
-        return await self._calls.call(widget, payload, going.press_id, going.correct, going.final_check)
+        payload = self._interfaces.encode(request, prepared.fields)
+        return await self._calls.call(widget, payload, prepared.handle)
 
     def _check_call(self, widget: Call, fields: dict[str, Any]) -> TextLike:
         self._interfaces.encode(self._interfaces.service_types(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
-    async def _start(self, widget: Action, going: PreparedPress) -> Outcome:
-        return await self.actions.start(
-            widget, going.fields, going.press_id, going.correct, going.entry, going.final_check
-        )
+    async def _start(self, widget: Action, prepared: PreparedPress) -> Outcome:
+        return await self.actions.start(widget, prepared.fields, prepared.handle)
 
-    async def _set(self, widget: Parameter, going: PreparedPress) -> Outcome:
-        value = going.fields["value"]
-        return await self._parameters.set(
-            widget, value, going.press_id, going.correct, going.final_check
-        )
+    async def _set(self, widget: Parameter, prepared: PreparedPress) -> Outcome:
+        return await self._parameters.set(widget, prepared.fields["value"], prepared.handle)
 
     def _put(self, widget: PublishPress, fields: dict[str, Any], final_check: FinalCheck) -> Outcome:
         payload = self._interfaces.encode(widget.type, fields)

@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.audit.press_record import PendingEntry
-from app.commands.press_context import PressContext
-from app.commands.receipts import MAX_FINAL_CHECKS
-from app.errors import Cause, PressRefused
-from app.i18n import TextLike, say
+from app.commands.press import Press
+from app.commands.press_guard import PressGuard
+from app.commands.receipts import MAX_FINAL_CHECKS, Refusal
+from app.errors import PressRefused
+from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.permission.press_permission import cause_of, judged
@@ -25,20 +26,31 @@ class PendingSamples:
     has_urgent: Callable[[], bool] = lambda: False
 
 
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Whether a press may be sent: the verdict of the permission's checks, and the `refusal`, None if
+    it may. A permitted press is refused if its page is outdated."""
+
+    verdict: Verdict
+    refusal: Refusal | None = None
+
+
 class PressJudge:
-    """Checks the permission of one robot's presses. Used on the event loop only. Callers must not await
-    between the check and sending."""
+    """Judges the presses and holds of one robot. Used on the event loop only. Callers must not await
+    between the judgement and sending."""
 
     def __init__(
         self,
         panel: Panel,
         robot: RobotState,
-        latest: PendingSamples,
+        guard: PressGuard,
+        arrivals: PendingSamples,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
+        self.arrivals = arrivals
         self._panel = panel
         self._robot = robot
-        self._arrivals = latest
+        self._guard = guard
         self._monotonic = monotonic
         self._closed = False
 
@@ -46,29 +58,36 @@ class PressJudge:
         """Refuses every press from now on."""
         self._closed = True
 
-    def verdict(self, widget: Command, context: PressContext) -> Verdict:
-        """The current verdict, after ingesting what has arrived."""
-        self._arrivals.ingest()
-        interlocks = self._panel.interlocks_of(widget)
-        return judged(widget, interlocks, self._robot, self._monotonic(), context.grounds())
+    def verdict(self, press: Press[Command], now: float) -> Verdict:
+        """The verdict of the permission's checks at `now` (monotonic seconds). Ingests nothing."""
+        interlocks = self._panel.interlocks_of(press.widget)
+        conditions = self._guard.conditions(press.principal)
+        return judged(press.widget, interlocks, self._robot, now, conditions)
 
-    def judge(self, widget: Command, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
-        """The current verdict, why the press may not be sent ("" if it may), and its receipt's
-        cause."""
-        verdict = self.verdict(widget, context)
+    def judge_at(self, press: Press[Command], now: float) -> Judgement:
+        """Whether a press or hold may be sent at `now` (monotonic seconds). Ingests nothing."""
+        verdict = self.verdict(press, now)
         if not verdict.permitted:
-            return verdict, verdict.reason or "", cause_of(verdict.code)
-        stale = say("press_during_shutdown") if self._closed else context.stale_reason()
-        return verdict, stale, "interlock"
+            return Judgement(verdict, Refusal(verdict.reason or "", cause_of(verdict.code)))
+        stale = self._guard.stale_reason(press)
+        return Judgement(verdict, Refusal(stale, "interlock") if stale else None)
 
-    def final_check(self, widget: Command, pending: PendingEntry, context: PressContext) -> None:
-        """Called right before sending: checks again if more has arrived since the verdict. PressRefused
-        if the press may not be sent."""
+    def judge(self, press: Press[Command]) -> Judgement:
+        """Whether a press may be sent now, after ingesting what has arrived."""
+        self.arrivals.ingest()
+        judgement = self.judge_at(press, self._monotonic())
+        if self._closed and judgement.verdict.permitted:
+            return replace(judgement, refusal=Refusal(say("press_during_shutdown"), "interlock"))
+        return judgement
+
+    def final_check(self, press: Press[Command], pending: PendingEntry) -> None:
+        """Called right before sending: judges again if more has arrived since the judgement.
+        PressRefused if the press may not be sent."""
         for _ in range(MAX_FINAL_CHECKS):
-            if not self._arrivals.has_urgent():
+            if not self.arrivals.has_urgent():
                 return
-            verdict, why, cause = self.judge(widget, context)
-            pending.set_verdict(verdict.code)
-            if why:
-                raise PressRefused(why, cause)
+            judgement = self.judge(press)
+            pending.set_verdict(judgement.verdict.code)
+            if judgement.refusal:
+                raise PressRefused(*judgement.refusal)
         raise PressRefused(say("link_catching_up"), "link")

@@ -6,19 +6,17 @@ browser's state does not count. Nothing is awaited between the check and sending
 
 import asyncio
 import logging
-import time
-from collections.abc import Coroutine, Iterator, Mapping
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from app.audit import Origin, Repeated
-from app.audit.press_record import PendingEntry, PressLog
-from app.clock import format_time
+from app.audit import Repeated
+from app.audit.press_record import LoggedPress, PendingEntry, PressLog
 from app.commands.cancels import Cancels
 from app.commands.dispatch import Dispatcher
-from app.commands.press_context import PressContext
+from app.commands.press import Press, PressHandle
 from app.commands.press_judge import PressJudge
 from app.commands.receipts import (
     GOOD_OUTCOMES,
@@ -26,18 +24,19 @@ from app.commands.receipts import (
     PressRecorder,
     Receipt,
     Receipts,
+    Refusal,
     close_entry,
     corrected,
-    fingerprint,
     origin_text,
     outcome_text,
     receipt_of,
+    refused_receipt,
 )
 from app.commands.refusals import EarlyRefusals
 from app.commands.repeated import RepeatedPresses
 from app.concurrency import CancellableWaits
-from app.errors import Cause, FieldError, InputError, LinkError, LogError, PressRefused
-from app.i18n import TextLike, say
+from app.errors import FieldError, InputError, LinkError, LogError, PressRefused
+from app.i18n import say
 from app.panel.widgets.families import PressCommand
 from app.robot.command_status import Outcome
 from app.ros_logging import RobotLog, rosout_extra
@@ -49,13 +48,16 @@ log = logging.getLogger("kiosk.presses")
 class _InFlightPress:
     """A press without a receipt yet."""
 
-    widget: str
-    inputs: Mapping[str, Any]
+    press: Press[PressCommand]
     receipt: "asyncio.Future[Receipt]"
 
     @property
+    def widget(self) -> str:
+        return self.press.widget.id
+
+    @property
     def fingerprint(self) -> str:
-        return fingerprint(self.inputs)
+        return self.press.fingerprint
 
 
 class Presses:
@@ -80,12 +82,7 @@ class Presses:
         self.early_refusals = EarlyRefusals(judge, dispatcher, press_log, self._receipts, self._log)
         self._repeated = RepeatedPresses(dispatcher, self.early_refusals, self._log)
         self._cancels = Cancels(
-            dispatcher.widget,
-            dispatcher.actions,
-            press_log,
-            self.early_refusals,
-            self._waits,
-            self._log,
+            dispatcher.actions, press_log, self.early_refusals, self._waits, self._log
         )
 
     def close(self) -> None:
@@ -100,134 +97,109 @@ class Presses:
         """The current receipt of a press; None for unknown ids."""
         return self._receipts.get(press_id)
 
-    async def press(
-        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, context: PressContext
-    ) -> Receipt:
+    async def press(self, press: Press[PressCommand]) -> Receipt:
         """Sends the widget's command, or refuses it. The same id again is the same press.
 
         Permission is checked at the moment of sending. Inputs with a default in the panel file may be
         left out.
         """
-        widget = self._dispatcher.widget(widget_id)
-        inputs = self._dispatcher.with_defaults(widget, inputs)
-        known = self._in_flight.get(press_id) or self._receipts.get_own(press_id)
-        if known is None and not self._receipts.is_past(press_id):
-            if left_out := self.early_refusals.unlogged_refusal(widget, inputs, press_id, context):
-                return left_out
-            work = self._press_logged(widget, inputs, press_id, context)
-            return await self._run_once(widget, inputs, press_id, work)
+        press = self._dispatcher.with_defaults(press)
+        known = self._in_flight.get(press.id) or self._receipts.get_own(press.id)
+        if known is None and not self._receipts.is_past(press.id):
+            if unlogged := self.early_refusals.unlogged_refusal(press):
+                return unlogged
+            return await self._run_once(press, self._press_logged(press))
         if known is None:
-            why = say("press_already_made", id=press_id)
-            return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
-        if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
-            why = say("press_id_reused", id=press_id)
-            return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
+            return await self.early_refusals.refuse(press, say("press_already_made", id=press.id))
+        if (known.widget, known.fingerprint) != (press.widget.id, press.fingerprint):
+            return await self.early_refusals.refuse(press, say("press_id_reused", id=press.id))
         if isinstance(known, _InFlightPress):
             return await asyncio.shield(known.receipt)
         return known
 
-    async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
+    async def cancel(self, cancel: Press[PressCommand], press_id: str = "") -> Receipt:
         """Asks the robot to cancel the goal of a press; without a press id, the running goal. Every
         client may, with or without control, at any time."""
-        return await self._cancels.cancel(widget_id, origin, press_id)
+        return await self._cancels.cancel(cancel, press_id)
 
     def cancel_all(self) -> None:
         """Ends all waiting for the robot; the outcome of these presses is unknown."""
         self._waits.cancel_all()
 
     async def _run_once(
-        self,
-        widget: PressCommand,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        work: Coroutine[Any, Any, Receipt],
+        self, press: Press[PressCommand], work: Coroutine[Any, Any, Receipt]
     ) -> Receipt:
         """Runs the work of a press; repetitions of the same id wait for its receipt."""
-        loop = asyncio.get_running_loop()
-        under_way = _InFlightPress(widget.id, inputs, loop.create_future())
-        self._in_flight[press_id] = under_way
+        in_flight = _InFlightPress(press, asyncio.get_running_loop().create_future())
+        self._in_flight[press.id] = in_flight
         try:
             receipt = await work
         except BaseException as error:
-            under_way.receipt.set_exception(error)
-            under_way.receipt.exception()  # retrieved: there may be no repetition that waits
+            in_flight.receipt.set_exception(error)
+            in_flight.receipt.exception()  # retrieved: there may be no repetition that waits
             raise
         finally:
-            del self._in_flight[press_id]
-        under_way.receipt.set_result(receipt)
-        if receipt.id == press_id:  # a refusal with an id of its own is kept already
+            del self._in_flight[press.id]
+        in_flight.receipt.set_result(receipt)
+        if receipt.id == press.id:  # a refusal with an id of its own is kept already
             self._receipts.keep(receipt)
         return receipt
 
-    async def _press_logged(
-        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
-    ) -> Receipt:
-        own = self._dispatcher.needed_inputs(widget, inputs)
+    async def _press_logged(self, press: Press[PressCommand]) -> Receipt:
+        logged = press.logged()
         try:
-            pending = await self._press_log.pressed(widget.id, own, press_id, context.origin)
+            pending = await self._press_log.pressed(logged)
         except Repeated as known:
-            return await self._repeated.receipt(widget, inputs, context.origin, known)
+            return await self._repeated.receipt(press, known)
         except LogError as error:
-            self._receipts.record_press(press_id, widget.id, context.origin, own)
-            text = say("refused", why=error.text, time=format_time(time.time()))
-            receipt = receipt_of(widget, inputs, press_id, Outcome("refused", text), "log")
+            self._receipts.record_press(logged)
+            receipt = refused_receipt(press, Refusal(error.text, "log"))
         else:
-            self._receipts.record_press(press_id, widget.id, context.origin, own)
+            self._receipts.record_press(logged)
             with _always_closed(pending):
-                receipt = await self._judge_and_send(widget, inputs, press_id, pending, context)
+                receipt = await self._judge_and_send(press, pending)
             receipt = await close_entry(pending, receipt)
-        level = logging.INFO if receipt.outcome in GOOD_OUTCOMES else logging.WARNING
-        who = origin_text(context.origin)
-        extra = rosout_extra(
-            f"press {press_id} of {widget.id} by {who}: {outcome_text(widget, receipt)}"
-        )
-        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
-                MAX_LOGGED_CHARS, own, receipt.outcome, receipt.reason, extra=extra)  # fmt: skip
+        self._log_receipt(press, logged, receipt)
         return receipt
 
-    def _correct(self, pending: PendingEntry, press_id: str, answer: Outcome) -> None:
+    def _log_receipt(self, press: Press[PressCommand], logged: LoggedPress, receipt: Receipt) -> None:
+        """Writes a receipt to the server's log and, without the inputs, to the robot's."""
+        level = logging.INFO if receipt.outcome in GOOD_OUTCOMES else logging.WARNING
+        who, outcome = origin_text(logged.origin), outcome_text(press.widget, receipt)
+        extra = rosout_extra(f"press {press.id} of {press.widget.id} by {who}: {outcome}")
+        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press.id, press.widget.id, who,
+                MAX_LOGGED_CHARS, logged.inputs, receipt.outcome, receipt.reason,
+                extra=extra)  # fmt: skip
+
+    def _correct(self, press_id: str, pending: PendingEntry, answer: Outcome) -> None:
         """Corrects the log entry and the receipt of a press."""
         pending.correct(answer)
         if old := self._receipts.get(press_id):
             self._receipts.keep(corrected(old, answer))
 
-    async def _judge_and_send(
-        self,
-        widget: PressCommand,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        pending: PendingEntry,
-        context: PressContext,
-    ) -> Receipt:
-        def receipt(answer: Outcome, cause: Cause = "") -> Receipt:
-            return receipt_of(widget, inputs, press_id, answer, cause)
-
-        def refused(sentence: str, why: TextLike, cause: Cause) -> Receipt:
-            now = format_time(time.time())
-            return receipt(Outcome("refused", say(sentence, why=why, time=now)), cause)
-
-        verdict, why, cause = self._judge.judge(widget, context)
-        pending.set_verdict(verdict.code)
-        if why:
-            return refused("refused", why, cause)
+    async def _judge_and_send(self, press: Press[PressCommand], pending: PendingEntry) -> Receipt:
+        judgement = self._judge.judge(press)
+        pending.set_verdict(judgement.verdict.code)
+        if judgement.refusal:
+            return refused_receipt(press, judgement.refusal)
+        correct = partial(self._correct, press.id, pending)
+        final_check = partial(self._judge.final_check, press, pending)
         try:
-            correct = partial(self._correct, pending)
-            final_check = partial(self._judge.final_check, widget, pending, context)
             async with self._waits.cancellable():
                 answer = await self._dispatcher.send(
-                    widget, inputs, press_id, correct, pending.hash, final_check
+                    press, PressHandle(press.id, correct, final_check, pending.hash)
                 )
         except TimeoutError:
-            return receipt(Outcome("unknown", say("press_unknown_at_shutdown")))
+            return receipt_of(press, Outcome("unknown", say("press_unknown_at_shutdown")))
         except (FieldError, InputError) as error:
-            return refused("press_not_encoded", error.text, "input")
+            return refused_receipt(press, Refusal(error.text, "input"), "press_not_encoded")
         except LinkError as error:
-            return refused("press_not_encoded", error.text, "link")
+            return refused_receipt(press, Refusal(error.text, "link"), "press_not_encoded")
         except PressRefused as error:
-            return refused("refused", error.reason, error.cause)
+            return refused_receipt(press, Refusal(error.reason, error.cause))
         if answer.outcome == "refused":
-            return refused("press_not_encoded", answer.text, "interlock")
-        return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+            return refused_receipt(press, Refusal(answer.text, "interlock"), "press_not_encoded")
+        return receipt_of(press, answer, "time" if answer.outcome == "timed_out" else "")
 
 
 @contextmanager

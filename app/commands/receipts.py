@@ -1,20 +1,20 @@
 """Receipts of presses and holds."""
 
-import hashlib
-import json
+import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, NamedTuple, Protocol, cast
 
 from app.audit import Entry, Origin
-from app.audit.press_record import PendingEntry
+from app.audit.press_record import LoggedPress, PendingEntry
+from app.clock import format_time
+from app.commands.press import Press
 from app.commands.reason_codes import reason_code
 from app.errors import Cause
 from app.i18n import TextLike, render, say
-from app.panel.template import needed_inputs
-from app.panel.widgets.families import Command, EntryWidget, PressCommand
+from app.panel.widgets.families import Command, EntryWidget
 from app.robot.command_status import Outcome, OutcomeCode
 
 RECEIPTS_KEPT: Final = 1000
@@ -23,7 +23,13 @@ PAST_IDS_KEPT: Final = 20_000  # ids of presses whose receipts are no longer kep
 MAX_LOGGED_CHARS: Final = 300
 MAX_KEPT_CHARS: Final = 4000  # characters of all inputs of a press
 GOOD_OUTCOMES: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
-_sorted: Final = json.JSONEncoder(sort_keys=True).encode
+
+
+class Refusal(NamedTuple):
+    """Why a press or hold is refused: the sentence, and its receipt's cause."""
+
+    reason: TextLike
+    cause: Cause
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +98,11 @@ class Receipts:
         """Whether this press was made, but its receipt is no longer kept."""
         return press_id in self._past_ids
 
-    def record_press(
-        self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]
-    ) -> None:
+    def record_press(self, press: LoggedPress) -> None:
         """Records a new press."""
         if self._recorder is not None:
-            self._recorder.record_press(press_id, widget, origin_text(origin), inputs)
+            who = origin_text(press.origin)
+            self._recorder.record_press(press.id, press.widget, who, press.inputs)
 
     def keep(self, receipt: Receipt) -> None:
         if receipt.recalled:
@@ -121,41 +126,38 @@ def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> list[str]:
     return [receipts.popitem(last=False)[0] for _ in range(len(receipts) - RECEIPTS_KEPT)]
 
 
-def receipt_of(
-    widget: Command,
-    inputs: Mapping[str, Any],
-    press_id: str,
-    answer: Outcome,
-    cause: Cause = "",
-) -> Receipt:
+def receipt_of(press: Press[Command], answer: Outcome, cause: Cause = "") -> Receipt:
     """A receipt for an outcome, dated now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
-    own, entered = ({**of} if _short(of) else {} for of in (needed_inputs(widget, inputs), inputs))
     outcome = answer.outcome, answer.text, at, cause
-    return Receipt(press_id, widget.id, *outcome, own, fingerprint(inputs), entered)
+    inputs = _if_short(press.needed_inputs)
+    return Receipt(
+        press.id, press.widget.id, *outcome, inputs, press.fingerprint, _if_short(press.inputs)
+    )
 
 
-def recalled_receipt(
-    widget: PressCommand, inputs: Mapping[str, Any], press: Entry, last: Entry | None, cause: Cause
-) -> Receipt:
-    """The receipt of a press from the operator's log; without a `last` entry the result is unknown."""
+def refused_receipt(press: Press[Command], refusal: Refusal, sentence: str = "refused") -> Receipt:
+    """The receipt of a refusal, dated now; `sentence` is the code of the sentence with the reason."""
+    text = say(sentence, why=refusal.reason, time=format_time(time.time()))
+    return receipt_of(press, Outcome("refused", text), refusal.cause)
+
+
+def recalled_receipt(press: Press[Command], entry: Entry, last: Entry | None, cause: Cause) -> Receipt:
+    """The receipt of a press from its entries in the operator's log, the first and the last one;
+    without a `last` entry the result is unknown."""
     if last is None:
-        answer, at = Outcome("unknown", say("press_unknown_server_ended")), press.at
+        answer, at = Outcome("unknown", say("press_unknown_server_ended")), entry.at
     else:
         answer, at = Outcome(cast(OutcomeCode, last.outcome), last.reason_text), last.at
-    receipt = receipt_of(widget, inputs, press.press, answer, cause)
     wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
-    return replace(receipt, at=wall, recalled=True)
+    return replace(receipt_of(press, answer, cause), at=wall, recalled=True)
 
 
-def fingerprint(inputs: Mapping[str, Any]) -> str:
-    """A hash of the inputs, which are JSON values."""
-    return hashlib.sha256(_sorted(inputs).encode()).hexdigest()
-
-
-def _short(inputs: Mapping[str, Any]) -> bool:
+def _if_short(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """The inputs if they are few and short, else none."""
     plain = all(isinstance(value, str | int | float) for value in inputs.values())
-    return plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= MAX_KEPT_CHARS
+    short = plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= MAX_KEPT_CHARS
+    return {**inputs} if short else {}
 
 
 def corrected(receipt: Receipt, answer: Outcome) -> Receipt:

@@ -2,23 +2,21 @@
 client whose refusals the log only counts."""
 
 import secrets
-import time
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from app.audit import Origin
 from app.audit.press_record import PressLog
-from app.clock import format_time
 from app.commands.dispatch import Dispatcher
-from app.commands.press_context import PressContext
+from app.commands.press import Press
 from app.commands.press_judge import PressJudge
 from app.commands.receipts import (
     Receipt,
     Receipts,
+    Refusal,
     origin_text,
     outcome_text,
     receipt_of,
+    refused_receipt,
     with_log_fault,
 )
 from app.errors import FieldError, InputError
@@ -45,34 +43,24 @@ class EarlyRefusals:
         self._receipts = receipts
         self._log = log
 
-    async def too_soon(
-        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, before: str, origin: Origin
-    ) -> Receipt:
+    async def too_soon(self, press: Press[PressCommand], before: str) -> Receipt:
         """Refuses a press that may be the second tap of an earlier one. `before` is the id of that
         press, "" without one; the reason includes its result."""
         why: TextLike = say("press_too_soon")
         if (last := self._receipts.get(before)) is not None:
             label = self._dispatcher.widget(last.widget).label
-            said = say("press_last_result", label=label, said=last.reason)
-            why = last.reason if ends_with(last.reason, why) else joined([said, why])
-        return await self.refuse(self._dispatcher.widget(widget_id), inputs, press_id, why, origin)
+            result = say("press_last_result", label=label, said=last.reason)
+            why = last.reason if ends_with(last.reason, why) else joined([result, why])
+        return await self.refuse(press, why)
 
     def limited(
-        self,
-        widget_id: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        sentence: str = "press_too_often",
-        *,
-        shown: bool = False,
+        self, press: Press[PressCommand], sentence: str = "press_too_often", *, shown: bool = False
     ) -> Receipt:
         """Refuses a press over the rate limit. The client may repeat it later with the same id.
         `shown`: the receipt is kept for a page without scripts."""
-        now = format_time(time.time())
-        answer = Outcome("refused", say("refused", why=say(sentence), time=now))
-        receipt = receipt_of(self._dispatcher.widget(widget_id), inputs, press_id, answer, "limit")
+        receipt = refused_receipt(press, Refusal(say(sentence), "limit"))
         if shown:
-            receipt = replace(receipt, id=_own_id(press_id))
+            receipt = replace(receipt, id=_own_id(press.id))
             self._receipts.keep_unlogged(receipt)
         return receipt
 
@@ -82,50 +70,45 @@ class EarlyRefusals:
         self._receipts.keep_unlogged(receipt)
         return receipt
 
-    def unlogged_refusal(
-        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
-    ) -> Receipt | None:
+    def unlogged_refusal(self, press: Press[PressCommand]) -> Receipt | None:
         """The receipt of a refusal that the log only counts; None for every other press.
 
         Applies only to a client that has used up the log's quota of refusals. Its permitted presses are
         still sent; its refusals push no other entry out of the log.
         """
-        if self._press_log.has_room(context.origin):
+        if self._press_log.has_room(press.origin):
             return None
-        _, why, cause = self._judge.judge(widget, context)
-        sentence = "refused" if why else "press_not_encoded"
-        if not why:
-            try:
-                why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
-            except (FieldError, InputError) as error:
-                why, cause = error.text, "input"
-        if not why:
+        if refusal := self._judge.judge(press).refusal:
+            receipt = refused_receipt(press, refusal)
+        elif refusal := self._not_encoded(press):
+            receipt = refused_receipt(press, refusal, "press_not_encoded")
+        else:
             return None
-        answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
-        return self.count_only(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
+        return self.count_only(receipt, press.origin)
 
-    async def refuse(
-        self,
-        widget: PressCommand,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        why: TextLike,
-        origin: Origin,
-    ) -> Receipt:
+    def _not_encoded(self, press: Press[PressCommand]) -> Refusal | None:
+        """Why a permitted press would not be sent; None if it would."""
+        try:
+            reason = self._dispatcher.refusal(press)
+        except (FieldError, InputError) as error:
+            return Refusal(error.text, "input")
+        return Refusal(reason, "interlock") if reason else None
+
+    async def refuse(self, press: Press[PressCommand], why: TextLike) -> Receipt:
         """Refuses a press. The receipt has an id of its own, because the press's id belongs to another
         press or may still be used for one."""
-        own_id = _own_id(press_id)
-        receipt = receipt_of(widget, inputs, own_id, Outcome("refused", why), "input")
-        if not self._press_log.has_room(origin):
-            return self.count_only(receipt, origin)
-        own = self._dispatcher.needed_inputs(widget, inputs)
-        self._receipts.record_press(own_id, widget.id, origin, own)
-        who = origin_text(origin)
-        extra = rosout_extra(f"press {own_id} of {widget.id} by {who}: {outcome_text(widget, receipt)}")
-        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=extra)
-        receipt = with_log_fault(
-            receipt, await self._press_log.refused(widget.id, own, own_id, origin, why)
+        press = replace(press, id=_own_id(press.id))
+        receipt = receipt_of(press, Outcome("refused", why), "input")
+        logged = press.logged()
+        if not self._press_log.has_room(logged.origin):
+            return self.count_only(receipt, logged.origin)
+        self._receipts.record_press(logged)
+        who, widget = origin_text(logged.origin), press.widget
+        extra = rosout_extra(
+            f"press {press.id} of {widget.id} by {who}: {outcome_text(widget, receipt)}"
         )
+        self._log.warning("press %s of %s by %s: %s", press.id, widget.id, who, why, extra=extra)
+        receipt = with_log_fault(receipt, await self._press_log.refused(logged, why))
         self._receipts.keep(receipt)
         return receipt
 

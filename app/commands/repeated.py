@@ -1,10 +1,8 @@
 """Presses that a client repeats after a restart of the server, answered from the operator's log."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from app.audit import Entry, Origin, Repeated, same_values
+from app.audit import Entry, Repeated, same_values
 from app.commands.dispatch import Dispatcher
+from app.commands.press import Press
 from app.commands.receipts import Receipt, origin_text, recalled_receipt
 from app.commands.refusals import EarlyRefusals
 from app.errors import Cause, FieldError, InputError
@@ -23,21 +21,17 @@ class RepeatedPresses:
         self._early_refusals = early_refusals
         self._log = log
 
-    async def receipt(
-        self, widget: PressCommand, inputs: Mapping[str, Any], origin: Origin, known: Repeated
-    ) -> Receipt:
+    async def receipt(self, press: Press[PressCommand], known: Repeated) -> Receipt:
         """The receipt from the log; a refusal if the id belongs to a different press."""
-        press, last = known.press, known.last_entry
-        own = self._dispatcher.needed_inputs(widget, inputs)
-        if press.widget != widget.id or not same_values(press.values, own):
-            why = say("press_id_reused", id=press.press)
-            return await self._early_refusals.refuse(widget, inputs, press.press, why, origin)
-        receipt = recalled_receipt(widget, inputs, press, last, self._cause(widget, inputs, last))
-        self._log.info("press %s of %s by %s repeats entry %d: %s: %s", press.press, widget.id,
-                origin_text(origin), press.seq, receipt.outcome, receipt.reason)  # fmt: skip
+        entry, last = known.press, known.last_entry
+        if entry.widget != press.widget.id or not same_values(entry.values, press.needed_inputs):
+            return await self._early_refusals.refuse(press, say("press_id_reused", id=press.id))
+        receipt = recalled_receipt(press, entry, last, self._cause(press, last))
+        self._log.info("press %s of %s by %s repeats entry %d: %s: %s", press.id, press.widget.id,
+                origin_text(press.origin), entry.seq, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
-    def _cause(self, widget: PressCommand, inputs: Mapping[str, Any], last: Entry | None) -> Cause:
+    def _cause(self, press: Press[PressCommand], last: Entry | None) -> Cause:
         """The cause of a refusal, as far as the entry shows it. Inputs that are invalid now were
         invalid then."""
         if last is None or last.outcome not in ("refused", "timed_out"):
@@ -47,7 +41,7 @@ class RepeatedPresses:
         if last.verdict not in PERMITTED_CODES:
             return cause_of(last.verdict or "log")
         try:
-            self._dispatcher.refusal(widget, inputs)
+            self._dispatcher.refusal(press)
         except (FieldError, InputError):
             return "input"
         return "interlock"

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Final
 
 from app.clock import format_time
+from app.commands.press import PressHandle
 from app.commands.transport import Transport
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
@@ -22,7 +23,7 @@ from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.template import RESPONSE_PLACEHOLDER, response_paths
 from app.panel.widgets.service_action import Call
 from app.printable import printable, without_terminal_codes
-from app.robot.command_status import CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.command_status import CommandStatus, Outcome
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog, rosout_extra
 
@@ -53,7 +54,7 @@ class _Waiting:
     """A call whose query is open; `cut` is done when the peer was lost in the meantime."""
 
     request: Request
-    press_id: str
+    handle: PressHandle
     answered: "asyncio.Future[bytes | None]"
     cut: "asyncio.Future[None]"
 
@@ -99,14 +100,7 @@ class ServiceCalls:
         """Marks a service as able to respond, because another service of its node did."""
         self._answering.add(service)
 
-    async def call(
-        self,
-        widget: Call,
-        payload: bytes,
-        press_id: str,
-        corrected: OnCorrection,
-        final_check: FinalCheck = no_check,
-    ) -> Outcome:
+    async def call(self, widget: Call, payload: bytes, handle: PressHandle) -> Outcome:
         """Calls the service of a widget; see `send_request`."""
         _, response_type = self._interfaces.service_types(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
@@ -115,33 +109,27 @@ class ServiceCalls:
         read = partial(_read_call, widget, success, message)
         to = (widget.id, widget.service, widget.type)
         request = Request(*to, payload, widget.timeout_s, paths, read)
-        return await self.send_request(request, press_id, corrected, final_check)
+        return await self.send_request(request, handle)
 
-    async def send_request(
-        self,
-        request: Request,
-        press_id: str,
-        corrected: OnCorrection,
-        final_check: FinalCheck = no_check,
-    ) -> Outcome:
-        """Sends a request and waits for its outcome; `corrected` is called with a late one."""
+    async def send_request(self, request: Request, handle: PressHandle) -> Outcome:
+        """Sends a request and waits for its outcome; a late one corrects the receipt."""
         key = self._robot.key(request.service)
         if why := self.full(request.service):
             return Outcome("refused", why)
         loop = asyncio.get_running_loop()
-        final_check()
+        handle.final_check()
         query = self._transport.query(key, request.payload, request.timeout_s + LATE_S)
-        waiting = _Waiting(request, press_id, query, loop.create_future())
+        waiting = _Waiting(request, handle, query, loop.create_future())
         number = id(waiting)
         self._open[number] = waiting
         query.add_done_callback(lambda _: self._open.pop(number, None))
-        self._latest[request.widget] = press_id
+        self._latest[request.widget] = handle.press_id
         self._show(request, CommandStatus(busy=True, text=say("call_waiting")))
-        answer = await self._response(waiting, corrected)
+        answer = await self._response(waiting)
         self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
         return answer
 
-    async def _response(self, waiting: _Waiting, corrected: OnCorrection) -> Outcome:
+    async def _response(self, waiting: _Waiting) -> Outcome:
         request, sentences = waiting.request, self._robot.traits.sentences
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
         await asyncio.wait(ends, timeout=request.timeout_s, return_when=asyncio.FIRST_COMPLETED)
@@ -150,9 +138,7 @@ class ServiceCalls:
         if waiting.answered.done():  # without a reply: the peer's token may end a little later
             await asyncio.wait({waiting.cut}, timeout=self._robot.traits.loss_delay_s)
         else:
-            waiting.answered.add_done_callback(
-                lambda done: self._on_late_response(waiting, done, corrected)
-            )
+            waiting.answered.add_done_callback(partial(self._on_late_response, waiting))
         if waiting.cut.done() or not self._robot.graph.peers:
             return Outcome("unknown", say("call_connection_lost"))
         if waiting.answered.done():
@@ -161,22 +147,20 @@ class ServiceCalls:
         sentence = say("timed_out", seconds=number(f"{request.timeout_s:g}"))
         return Outcome("timed_out", joined([sentence, advice]))
 
-    def _on_late_response(
-        self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: OnCorrection
-    ) -> None:
+    def _on_late_response(self, waiting: _Waiting, done: "asyncio.Future[bytes | None]") -> None:
         if done.cancelled() or (reply := done.result()) is None:
             return
-        task = spawn_logged(self._correct(waiting, reply, corrected), self._log, LATE_FAILED)
+        task = spawn_logged(self._correct(waiting, reply), self._log, LATE_FAILED)
         self._correcting.add(task)
         task.add_done_callback(self._correcting.discard)
 
-    async def _correct(self, waiting: _Waiting, reply: bytes, corrected: OnCorrection) -> None:
-        request = waiting.request
+    async def _correct(self, waiting: _Waiting, reply: bytes) -> None:
+        request, handle = waiting.request, waiting.handle
         answer = await self._read(request, reply)
-        line = f"press {waiting.press_id}: late response: {answer.outcome}"
+        line = f"press {handle.press_id}: late response: {answer.outcome}"
         self._log.warning("%s: %s", line, answer.text, extra=rosout_extra(line))
-        corrected(waiting.press_id, answer)
-        if self._latest.get(request.widget) == waiting.press_id:
+        handle.correct(answer)
+        if self._latest.get(request.widget) == handle.press_id:
             self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
 
     async def _read(self, request: Request, reply: bytes) -> Outcome:

@@ -49,7 +49,7 @@ class Outcome:
     text: TextLike
 
 
-OnCorrection = Callable[[str, Outcome], None]  # (press id, its new outcome)
+OnCorrection = Callable[[Outcome], None]  # called with the new outcome of a press
 FinalCheck = Callable[
     [], None
 ]  # called right before sending; raises PressRefused if no longer permitted

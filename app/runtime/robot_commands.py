@@ -11,6 +11,7 @@ from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
 from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
+from app.commands.press_guard import PressGuard
 from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
@@ -29,6 +30,7 @@ class RobotCommands:
         self,
         context: RobotContext,
         peer: Peer,
+        press_guard: PressGuard,
         press_log: PressLog,
         recorder: "Recorder | None",
     ) -> None:
@@ -52,14 +54,14 @@ class RobotCommands:
             flushed=peer.flushed,
         )
         arrivals = PendingSamples(context.signals.judging.emit, lambda: link.has_immediate)
-        judge = PressJudge(panel, robot, arrivals)
+        judge = PressJudge(panel, robot, press_guard, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(
             panel,
             robot,
+            judge,
             HoldMessages(interfaces, robot, link, self.dispatcher.check_inputs),
             asyncio.get_running_loop(),
-            arrivals,
             changed=changed,
             recorder=recorder,
         )

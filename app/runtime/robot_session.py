@@ -15,7 +15,7 @@ from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActRunner
 from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
-from app.commands.press_context import PressGuard
+from app.commands.press_guard import PressGuard
 from app.commands.presses import Presses
 from app.errors import LinkError
 from app.i18n import TextLike

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
-from app.commands.press_context import PressGuard
+from app.commands.press_guard import PressGuard
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
@@ -86,7 +86,7 @@ def wire_session(
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
-    commands = RobotCommands(context, peer, press_log, recorder)
+    commands = RobotCommands(context, peer, press_guard, press_log, recorder)
     ingest = Ingest(
         panel,
         robot,

@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, Valid
 
 from app.commands.holds.deflection import Deflection
 from app.commands.holds.receipts import RELEASED
-from app.commands.press_context import EVENT_ID
+from app.commands.press import EVENT_ID
 from app.errors import InputError
 from app.web.request_body import json_of
 

@@ -12,30 +12,33 @@ import pytest
 from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin
 from app.audit.press_record import Log, PressLog
 from app.audit.queries import rows
-from app.commands.press_context import PressContext
 from app.commands.receipts import Receipt
 from app.errors import LogError
-from app.i18n import say
 from app.panel.model import Panel
 from app.panel.template import needed_inputs
 from app.panel.widgets.hold import Hold
+from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.robot.command_status import IDLE
 from tests.support.builders import (
     COUNT,
     GUARDED,
     INTERFACES,
     MESSAGE,
+    VIEW,
     FakeTransport,
     panel_of,
     permits,
+    press_of,
+    press_widget,
     presses_of,
     robot_there,
     small_panel,
 )
 from tests.support.operator_log import DISK_WITHIN_S
 
-KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
-FROM = PressContext(KIM)
+KIM = Principal(Client("b1", "10.0.0.7", False, 1), user="Kim")
+SEEN = f"{VIEW}-1"
 SET = {
     "id": "light",
     "kind": "call",
@@ -134,7 +137,11 @@ class Bench(FakeTransport):
         return self.queries[-1]
 
     async def press(self, widget: str = "guarded", press_id: str = "p1", **inputs: Any) -> Receipt:
-        return await self.presses.press(widget, inputs or {"message": "hi"}, press_id, FROM)
+        inputs = inputs or {"message": "hi"}
+        return await press_widget(self.presses, widget, inputs, press_id, KIM, SEEN)
+
+    async def cancel(self, widget: str) -> Receipt:
+        return await self.presses.cancel(press_of(self.presses.widget(widget), {}, "", KIM))
 
 
 def slow(
@@ -253,7 +260,7 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
         log.written.set()
         log.fails = True
         bench.robot.command_status["count"] = IDLE
-        receipt = await bench.presses.cancel("count", KIM)
+        receipt = await bench.cancel("count")
         assert "nothing is in progress" in str(receipt.reason)
         assert "Not safely in the operator's log" in str(receipt.reason)
 
@@ -276,7 +283,7 @@ def test_a_cancel_does_not_wait_for_the_log() -> None:
         assert (await press).outcome == "accepted"
         log.written.clear()
         bench.happened.clear()
-        cancel = asyncio.create_task(bench.presses.cancel("count", KIM))
+        cancel = asyncio.create_task(bench.cancel("count"))
         await log.begun.acquire()
         await bench.queried.acquire()
         assert sorted(bench.happened) == ["sent", "written"]  # its entry is still being written
@@ -324,7 +331,7 @@ def test_log_entry_names_client_command_widget_and_state(tmp_path: Path) -> None
     opened, closed = real(tmp_path, work)
     for entry in (opened, closed):
         assert (entry.address, entry.browser, entry.who, entry.seen) == (
-            "10.0.0.7", "b1", "Kim", "boot-7",
+            "10.0.0.7", "b1", "Kim", SEEN,
         )  # fmt: skip
         assert (entry.robot, entry.press, entry.widget, entry.action) == (
             "arm", "p1", "guarded", "press",
@@ -367,8 +374,7 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
         permits(bench.robot, False)
         await bench.press("guarded", "p2")
         await bench.press("free", "p2")
-        by = PressContext(KIM, stale_reason=lambda: say("press_seen_before_restart"))
-        await bench.presses.press("free", {"message": "hi"}, "p3", by)
+        await press_widget(bench.presses, "free", {"message": "hi"}, "p3", KIM, "0ther-7")
 
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]
     assert [entry.outcome for entry in entries] == ["refused"] * 4

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.audit import Entry, Filter, Limits, OperatorLog, Origin, audit_log
-from app.audit.press_record import PressLog
+from app.audit.press_record import PressLog, origin_of
 from app.audit.queries import rows
 from app.audit.refusal_quota import (
     MAX_BROWSERS,
@@ -20,10 +20,11 @@ from app.audit.refusal_quota import (
 )
 from app.audit.store import Store
 from app.audit.verify import verify
-from app.commands.press_context import PressContext
 from app.commands.presses import Presses
 from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
+from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.rate_limit import MAX_BUCKETS
 from app.robot.state import RobotState
 from tests.support.builders import (
@@ -31,6 +32,8 @@ from tests.support.builders import (
     FakeTransport,
     panel_of,
     permits,
+    press_of,
+    press_widget,
     presses_of,
     robot_there,
     small_panel,
@@ -41,8 +44,9 @@ from tests.support.servers import demo_server
 from tests.support.words import english
 from tests.web.test_hold_socket import opened
 
-KIM = Origin(address="10.0.0.7", browser="b1", who="Panel 1")
-LEE = Origin(address="10.0.0.8", browser="b2", who="Panel 2")
+PANEL_1 = Principal(Client("b1", "10.0.0.7", False, 1))
+PANEL_2 = Principal(Client("b2", "10.0.0.8", False, 2))
+KIM, LEE = origin_of(PANEL_1), origin_of(PANEL_2)
 ENOUGH = 2 * int(OF_BROWSER.burst)
 DRIVE = """
 [[page.widget]]
@@ -155,9 +159,9 @@ class Cell(FakeTransport):
     def put(self, key: str, payload: bytes) -> None:
         self.sent += 1
 
-    async def press(self, press_id: str, origin: Origin = KIM, **inputs: Any) -> Receipt:
-        by = PressContext(origin)
-        return await self.presses.press("guarded", inputs or {"message": "hi"}, press_id, by)
+    async def press(self, press_id: str, who: Principal = PANEL_1, **inputs: Any) -> Receipt:
+        inputs = inputs or {"message": "hi"}
+        return await press_widget(self.presses, "guarded", inputs, press_id, who)
 
 
 def written(folder: Path, work: Callable[[Cell], Any], limits: Limits | None = None) -> list[Entry]:
@@ -185,7 +189,7 @@ def test_a_flood_of_refused_presses_leaves_the_log_as_it_was(tmp_path: Path) -> 
             assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
             assert "does not permit operation" in str(receipt.reason)
         assert cell.log.left_out == 2000 - OF_BROWSER.burst
-        assert (await cell.press("other", LEE)).outcome == "refused"
+        assert (await cell.press("other", PANEL_2)).outcome == "refused"
 
     entries = written(tmp_path, work)
     assert len(entries) < 2 * OF_BROWSER.burst + 10
@@ -271,7 +275,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
             panel_of(COUNT), robot_there(panel_of(COUNT)), cell, press_log=cell.logbook
         )
         for _ in range(ENOUGH):
-            receipt = await presses.cancel("count", KIM)
+            receipt = await presses.cancel(press_of(presses.widget("count"), {}, "", PANEL_1))
             assert english(receipt.reason) == "nothing is in progress"
         assert cell.log.left_out == ENOUGH - OF_BROWSER.burst
 
@@ -296,7 +300,7 @@ def test_while_the_log_is_broken_they_are_kept_for_a_summary(
         for number in range(int(OF_BROWSER.burst)):
             await cell.press(f"f{number}")
         broken.set()
-        assert (await cell.press("p", LEE)).cause == "log"
+        assert (await cell.press("p", PANEL_2)).cause == "log"
         cell.log.suppress(KIM)
         await asyncio.sleep(0.1)
         broken.clear()

@@ -14,16 +14,20 @@ from playwright.sync_api import Browser, Page, expect
 
 from app import clock
 from app.audit import NullLog
-from app.commands.press_context import PressGuard
+from app.commands.press_guard import PressGuard
 from app.i18n import Text
-from app.panel.model import Panel
-from app.permission.clients import anonymous
 from app.permission.control_authority import ControlAuthority
-from app.permission.principal import Principal
 from app.view.publisher import ViewPublisher
-from app.view.refresh import NoOtherRobots, ViewRefresher, ViewSources
 from app.view.view import build_view
-from tests.support.builders import NOW, Table, permits, robot_there, small_panel
+from tests.support.builders import (
+    NOW,
+    Table,
+    guard_of,
+    permits,
+    press_of,
+    robot_there,
+    small_panel,
+)
 from tests.support.parts import (
     REFERENCE,
     TAP_AGAIN_MS,
@@ -133,13 +137,6 @@ def test_a_press_has_its_time_and_the_panel_says_how_long(
     assert (answer.status_code, words in answer.json()["reason"]) == (status, True), answer.json()
 
 
-def guard_of(panel: Panel) -> PressGuard:
-    control = ControlAuthority(panel.control, "", log_line=lambda *_: None)
-    sources = ViewSources(control, NullLog(), NoOtherRobots())
-    publisher = ViewRefresher(panel, robot_there(panel), "r1", sources).publisher
-    return PressGuard(publisher, control, NullLog(), panel.press_expires_s, lambda: ())
-
-
 @pytest.mark.parametrize(
     ("panel", "later_s", "words"),
     [
@@ -155,7 +152,8 @@ def guard_of(panel: Panel) -> PressGuard:
 def test_the_limits_of_the_time_of_a_press(
     monkeypatch: pytest.MonkeyPatch, panel: Table, later_s: float, words: str
 ) -> None:
-    guard = guard_of(small_panel(**panel))
+    limits = small_panel(**panel)
+    guard = guard_of(limits, robot_there(limits))
     monkeypatch.setattr(clock, "server_now", lambda: NOW)
     why = english(guard.late(NOW + later_s))
     assert words in why
@@ -171,10 +169,10 @@ def test_a_press_of_a_page_that_showed_the_lock_before_it_changed_is_stale() -> 
     publisher = ViewPublisher(build_view(panel, robot, NOW).view, "r1")
     control = ControlAuthority(panel.control, "", log_line=lambda *_: None)
     guard = PressGuard(publisher, control, NullLog(), 3.0, lambda: ())
-    who = Principal(anonymous("10.0.0.1"))
 
     def reason(widget: str, seen: str) -> str:
-        stale = guard.context_for(widget, who, seen).stale_reason()
+        command = next(command for command in panel.commands if command.id == widget)
+        stale = guard.stale_reason(press_of(command, {}, seen=seen))
         return stale.code if isinstance(stale, Text) else ""
 
     seen = publisher.id

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from app.commands.actions.goals import GoalTracker
+from app.commands.press import PressHandle
 from app.commands.service_calls import LATE_S, MAX_VALUE_CHARS, ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
@@ -90,15 +91,15 @@ class Bench:
         assert isinstance(goal, Action)
         self.reset, self.count = call, goal
 
-    def correct(self, press_id: str, answer: Outcome) -> None:
-        self.corrected.append((press_id, answer))
+    def handle(self, press_id: str) -> PressHandle:
+        return PressHandle(press_id, lambda answer: self.corrected.append((press_id, answer)))
 
     def call(self, press_id: str = "p1") -> "asyncio.Task[Outcome]":
         request = INTERFACES.encode(f"{TRIGGER}_Request", {})
-        return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
+        return asyncio.create_task(self.calls.call(self.reset, request, self.handle(press_id)))
 
     def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Outcome]":
-        goal = self.actions.start(self.count, {"order": 3}, press_id, self.correct)
+        goal = self.actions.start(self.count, {"order": 3}, self.handle(press_id))
         return asyncio.create_task(goal)
 
     @property

@@ -22,12 +22,12 @@ from tests.support.builders import (
     BOOL,
     BRIDGE,
     FREE,
-    FROM,
     HEARD,
     INTERFACES,
     MESSAGE,
     TEXT,
     faults_text,
+    press_widget,
     presses_of,
     robot_there,
     says,
@@ -59,7 +59,7 @@ class Desk:
         self._seq = itertools.count(1)
 
     async def press(self, text: str = "on", press_id: str = "p1") -> Receipt:
-        return await self.presses.press("free", {"message": text}, press_id, FROM)
+        return await press_widget(self.presses, "free", {"message": text}, press_id)
 
     def says(self, text: str, at: float) -> None:
         says(self.robot, "/heard", text, at=at, seq=next(self._seq))
@@ -94,7 +94,7 @@ def test_the_name_of_a_constant_confirms_by_its_value() -> None:
 
     async def pressed() -> Receipt:
         desk = Desk(panel_with(select, press))
-        task = asyncio.create_task(desk.presses.press("free", {"level": "WARN"}, "p1", FROM))
+        task = asyncio.create_task(press_widget(desk.presses, "free", {"level": "WARN"}, "p1"))
         await asyncio.sleep(0)
         payload = INTERFACES.encode(status, {"level": 1})
         desk.robot.update("heard", Sample(payload, 9, 100.2, 100.2, BRIDGE))

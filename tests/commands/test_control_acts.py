@@ -10,7 +10,7 @@ from app.audit import Entry, NullLog
 from app.audit.press_record import PressLog
 from app.commands.acts import ActContext, ActReceipt, ActRequest, ActRunner
 from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN, log_hand_over
-from app.commands.press_context import PressGuard
+from app.commands.press_guard import PressGuard
 from app.errors import NotFound
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous

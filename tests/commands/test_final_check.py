@@ -22,13 +22,13 @@ from tests.support.builders import (
     BRIDGE,
     COUNT,
     FREE,
-    FROM,
     GUARDED,
     MESSAGE,
     FakeTransport,
     Table,
     panel_of,
     permits,
+    press_widget,
     presses_of,
     robot_there,
     small_panel,
@@ -94,7 +94,7 @@ def robot_permits() -> RobotState:
 
 def pressed(widget: str, way: Way, late: Late, robot: RobotState) -> Receipt:
     presses = presses_of(PANEL, robot, way, catch_up=late.catch_up, news=late.news)
-    return asyncio.run(presses.press(widget, {"message": "x"}, "p1", FROM))
+    return asyncio.run(press_widget(presses, widget, {"message": "x"}, "p1"))
 
 
 @pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
@@ -170,7 +170,7 @@ async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
     number = 0
     while not over():
         number += 1
-        await kiosk.presses.press("guarded", {"message": "x"}, f"p{number}", FROM)
+        await press_widget(kiosk.presses, "guarded", {"message": "x"}, f"p{number}")
         await asyncio.sleep(0)
     await kiosk.stop()
 

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import secrets
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -15,7 +16,7 @@ from app.commands.holds.controller import HoldController
 from app.commands.holds.lease import LEASE_S, MAX_AHEAD_S, Lease, sent_at
 from app.commands.holds.messages import HoldMessages
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_judge import PendingSamples
+from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
@@ -28,15 +29,17 @@ from tests.support.builders import (
     BOOL,
     BRIDGE,
     ENABLED,
-    FROM,
     INTERFACES,
     NOW,
+    PROGRAM,
     TEXT,
     FakeTransport,
     Table,
     endpoint,
+    guard_of,
     panel_of,
     permits,
+    press_of,
     robot_there,
     sending_of,
 )
@@ -63,7 +66,7 @@ HALF: Final[Table] = {"speed": 0.5}
 MOVES: Final = (0.5, 0.0, 0.0)
 STOPS: Final = (0.0, 0.0, 0.0)
 A_POINT: Final = INTERFACES.encode(POINT, {"x": 0, "y": 0, "z": 0})
-WHO: Final = "127.0.0.1"
+WHO: Final = str(PROGRAM)
 FORBIDS: Final = say("interlock_not_permitted", name="operation")
 
 
@@ -143,10 +146,12 @@ class Bench:
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.news: Callable[[], bool] = lambda: bool(self.pending)
+        arrivals = PendingSamples(self.take, lambda: self.news())
+        judge = PressJudge(self.panel, self.robot, guard_of(self.panel, self.robot), arrivals)
+        messages = HoldMessages(INTERFACES, self.robot, self.way, checked)
         self.holds = HoldController(
-            self.panel, self.robot, HoldMessages(INTERFACES, self.robot, self.way, checked),
-            self.loop, PendingSamples(self.take, lambda: self.news()), changed=lambda: None,
-        )  # fmt: skip
+            self.panel, self.robot, judge, messages, self.loop, changed=lambda: None
+        )
 
     def take(self) -> None:
         pending, self.pending = self.pending, []
@@ -157,7 +162,8 @@ class Bench:
         self, widget: str = "jog", inputs: Mapping[str, Any] = HALF, age_s: float = 0.0
     ) -> Receipt | ActiveHold:
         sent = self.loop.now - age_s
-        return self.holds.begin(widget, inputs, sent, FROM, self.receipts.append)
+        press = press_of(self.holds.widget(widget), inputs, secrets.token_hex(8))
+        return self.holds.begin(press, sent, self.receipts.append)
 
     def begun(self, widget: str = "jog") -> ActiveHold:
         holding = self.begin(widget)

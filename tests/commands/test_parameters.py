@@ -11,6 +11,7 @@ import pytest
 from app.commands.parameters import client, sync
 from app.commands.parameters.sync import ParameterSync
 from app.commands.parameters.values import check_value
+from app.commands.press import PressHandle
 from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
@@ -466,7 +467,7 @@ def test_parameter_is_read_back_after_setting() -> None:
         corrected: list[tuple[str, Outcome]] = []
         setting = asyncio.create_task(
             bench.parameters.set(
-                one, 0.7, "p1", lambda press, answer: corrected.append((press, answer))
+                one, 0.7, PressHandle("p1", lambda answer: corrected.append(("p1", answer)))
             )
         )
         await bench.queried(3)
@@ -488,7 +489,7 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
         bench.offer()
         await bench.tell(1, 0.5)
         (one,) = bench.panel.parameters()
-        setting = asyncio.create_task(bench.parameters.set(one, 0.7, "p1", lambda *_: None))
+        setting = asyncio.create_task(bench.parameters.set(one, 0.7, PressHandle("p1", lambda _: None)))
         await bench.answer(3, SET, results=[])
         assert (await setting).outcome == "unknown"
 

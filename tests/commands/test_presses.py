@@ -10,18 +10,14 @@ from typing import Any
 
 import pytest
 
-from app.audit.press_record import origin_of
-from app.commands.press_context import PressContext
 from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.rules import ControlRules
-from app.permission.clients import Clients, anonymous
+from app.permission.clients import Clients
 from app.permission.control_authority import ControlAuthority
-from app.permission.press_permission import ServerConditions
 from app.permission.principal import Principal
-from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
@@ -33,12 +29,16 @@ from tests.support.builders import (
     INTERFACES,
     MESSAGE,
     NOW,
+    PROGRAM,
     TEXT,
     FakeTransport,
     Table,
     endpoint,
+    guard_of,
     panel_of,
     permits,
+    press_of,
+    press_widget,
     presses_of,
     robot_there,
     sending_of,
@@ -70,20 +70,17 @@ class Way(FakeTransport):
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
-PROGRAM = Principal(anonymous("127.0.0.1"))
-
-
 class Bench:
     """Presses on a robot that is there and permits, at a time that is set."""
 
-    def __init__(self, panel: Panel | None = None) -> None:
+    def __init__(self, panel: Panel | None = None, control: ControlAuthority | None = None) -> None:
         panel = panel or small_panel()
         self.now = NOW
         self.way = Way()
         self.robot = robot_there(panel)
         permits(self.robot)
-        self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
-        self.may_press: Callable[[Principal], Verdict] = lambda _: PERMITTED
+        guard = guard_of(panel, self.robot, control)
+        self._presses = presses_of(panel, self.robot, self.way, guard=guard, monotonic=lambda: self.now)
         self.receipt = self._presses.receipt
         self.typed = sending_of(panel, self.robot, self.way).parse_form
 
@@ -94,12 +91,11 @@ class Bench:
         press_id: str = "p1",
         who: Principal = PROGRAM,
     ) -> Receipt:
-        given = {"message": "hello"} if inputs is None else inputs
-        by = PressContext(origin_of(who), lambda: ServerConditions(self.may_press(who)))
-        return asyncio.run(self._presses.press(widget, given, press_id, by))
+        inputs = {"message": "hello"} if inputs is None else inputs
+        return asyncio.run(press_widget(self._presses, widget, inputs, press_id, who))
 
     def cancel(self, widget: str) -> Receipt:
-        return asyncio.run(self._presses.cancel(widget, origin_of(PROGRAM)))
+        return asyncio.run(self._presses.cancel(press_of(self._presses.widget(widget), {}, "")))
 
 
 @pytest.fixture
@@ -432,11 +428,10 @@ class Locked:
     """Presses of a robot that another browser has control of."""
 
     def __init__(self) -> None:
-        self.bench = Bench()
         self.other = Principal(Clients().identify("0" * 32, "192.0.2.7"))
         control = ControlAuthority(ControlRules(required=True), "", monotonic=lambda: NOW)
         control.take(self.other)
-        self.bench.may_press = control.verdict
+        self.bench = Bench(control=control)
 
 
 def test_press_without_control_is_refused_with_the_holders_name() -> None:
@@ -483,8 +478,8 @@ def test_a_cancel_that_could_not_be_sent_has_a_receipt(monkeypatch: pytest.Monke
 
 
 def test_cancelling_needs_no_control() -> None:
-    bench = Bench(panel_of(MESSAGE, HOME))
-    bench.may_press = lambda _: locked("control_free", robot="the robot")
+    control = ControlAuthority(ControlRules(required=True), "", monotonic=lambda: NOW)
+    bench = Bench(panel_of(MESSAGE, HOME), control)
     assert bench.press("home").code == "control_free"
     assert bench.cancel("home").code == "cancel_nothing_in_progress"
 

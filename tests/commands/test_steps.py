@@ -18,10 +18,10 @@ from app.robot.state import RobotState
 from app.view.view import build_view
 from tests.commands.test_presses import Way
 from tests.support.builders import (
-    FROM,
     INTERFACES,
     faults_text,
     panel_of,
+    press_widget,
     presses_of,
     robot_there,
     says,
@@ -76,7 +76,7 @@ class Desk:
         return judged(step, (), self.robot, self.now).reason
 
     def press(self, value: Any, press_id: str = "p1") -> Receipt:
-        return asyncio.run(self.presses.press("speed", {"speed": value}, press_id, FROM))
+        return asyncio.run(press_widget(self.presses, "speed", {"speed": value}, press_id))
 
     def sent(self) -> list[float]:
         return [INTERFACES.decode(FLOAT, payload).data for _, payload in self.way.sent]
@@ -128,11 +128,11 @@ def test_step_without_a_known_value_is_locked_with_a_reason() -> None:
 
 def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_reported() -> None:
     async def pressed(desk: Desk) -> tuple[Receipt, Receipt]:
-        first = asyncio.create_task(desk.presses.press("speed", {"speed": 50}, "p1", FROM))
+        first = asyncio.create_task(press_widget(desk.presses, "speed", {"speed": 50}, "p1"))
         while not desk.sent():
             await asyncio.sleep(0)
         assert (desk.shown()["enabled"], desk.reason()) == (False, say("press_in_progress"))
-        second = await desk.presses.press("speed", {"speed": 50}, "p2", FROM)
+        second = await press_widget(desk.presses, "speed", {"speed": 50}, "p2")
         desk.reports(50.0)
         return await first, second
 

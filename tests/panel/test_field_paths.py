@@ -23,13 +23,13 @@ from tests.support.builders import (
     BRIDGE,
     ENABLED,
     FREE,
-    FROM,
     HEARD,
     INTERFACES,
     MESSAGE,
     NOW,
     Table,
     panel_of,
+    press_widget,
     presses_of,
     robot_there,
 )
@@ -153,7 +153,7 @@ def test_an_element_by_its_key_confirms(level: int, outcome: str) -> None:
     presses = presses_of(panel, robot, way, confirmations=confirmations)
 
     async def test() -> None:
-        press = asyncio.create_task(presses.press("free", {"message": "x"}, "p1", FROM))
+        press = asyncio.create_task(press_widget(presses, "free", {"message": "x"}, "p1"))
         while not confirmations.is_awaited("heard"):
             await asyncio.sleep(0)
         payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(("a", 1), ("fan", level)))

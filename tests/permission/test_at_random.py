@@ -26,7 +26,6 @@ from tests.support.builders import (
     BRIDGE,
     DIALECT,
     ENABLED,
-    FROM,
     GUARDED,
     INTERFACES,
     KIOSK,
@@ -37,6 +36,7 @@ from tests.support.builders import (
     FakeTransport,
     endpoint,
     panel_of,
+    press_widget,
     presses_of,
 )
 from tests.support.form import several
@@ -301,7 +301,7 @@ class Panels(RuleBasedStateMachine):
         self.pressed_last = (press_id, widget, text)
         puts, queries = len(self.way.put_texts), len(self.way.queries)
         inputs = {"message": text}
-        self.pending.append(self.loop.create_task(self.presses.press(widget, inputs, press_id, FROM)))
+        self.pending.append(self.loop.create_task(press_widget(self.presses, widget, inputs, press_id)))
         self.loop.spin()
         if len(self.way.put_texts) > puts:
             assert self.grounds.hold(self.now), "sent without its grounds"

@@ -14,7 +14,8 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from rosbags.typesys import get_types_from_msg
 
-from app.commands.receipts import Receipt, fingerprint
+from app.commands.press import fingerprint
+from app.commands.receipts import Receipt
 from app.errors import PanelError
 from app.interfaces import Structure
 from app.panel import load_panel

@@ -38,7 +38,16 @@ from app.survey.model import (
 from app.transport.admin_space import GraphLink
 from app.transport.peer import RobotAccess, RobotContext
 from app.transport.zenoh_config import config_to
-from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFACES, MESSAGE, panel_of
+from tests.support.builders import (
+    BOOL,
+    ENABLED,
+    GUARDED,
+    HEARD,
+    INTERFACES,
+    MESSAGE,
+    panel_of,
+    press_widget,
+)
 
 TRIGGER = "std_srvs/srv/Trigger"
 CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
@@ -245,14 +254,14 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
         await when(lambda: robot.say(True) and shown.view["interlocks"]["operation"]["enabled"])
         await when(lambda: session.link.has_reader("go"))
         for number, text in enumerate(("one", "two"), 1):
-            receipt = await session.presses.press("go", {"message": text}, text, FROM)
+            receipt = await press_widget(session.presses, "go", {"message": text}, text)
             assert receipt.outcome == "published", receipt.reason
             await when(partial(robot.has_heard, number))
         zid = session.link.zid.encode()
         assert robot.heard == [("one", b"1 of " + zid), ("two", b"2 of " + zid)]
 
         await when(lambda: session.publisher.view["widgets"]["reset"]["enabled"])
-        receipt = await session.presses.press("reset", {}, "p3", FROM)
+        receipt = await press_widget(session.presses, "reset", {}, "p3")
         assert receipt.outcome == "succeeded", receipt.reason
         assert robot.attachments == [b"1 of " + zid]
         own = {

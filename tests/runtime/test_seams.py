@@ -12,7 +12,6 @@ import pytest
 from app.audit import NullLog
 from app.commands.holds import controller, lease
 from app.commands.holds.receipts import ActiveHold
-from app.commands.press_context import PressContext
 from app.commands.receipts import MAX_KEPT_CHARS, Receipt
 from app.commands.service_calls import with_fields
 from app.panel.model import Panel
@@ -39,13 +38,15 @@ from tests.support.builders import (
     BRIDGE,
     COUNT,
     ENABLED,
-    FROM,
     HEARD,
     INTERFACES,
     NOW,
     endpoint,
+    guard_of,
     panel_of,
     permits,
+    press_of,
+    press_widget,
     presses_of,
     robot_there,
     small_panel,
@@ -222,15 +223,14 @@ def test_a_press_in_doubt_is_not_answered_with_another_press() -> None:
     panel = small_panel()
     robot = robot_there(panel)
     permits(robot)
-    presses = presses_of(panel, robot, Way())
-    late = PressContext(FROM.origin, stale_reason=lambda: "the page showed another robot.")
+    presses = presses_of(panel, robot, Way(), guard=guard_of(panel, robot, other_views=["0ther"]))
 
     async def pressed() -> None:
-        first = await presses.press("free", {"message": "a"}, "p1", FROM)
-        other = await presses.press("guarded", {"message": "a"}, "p1", late)
+        first = await press_widget(presses, "free", {"message": "a"}, "p1")
+        other = await press_widget(presses, "guarded", {"message": "a"}, "p1", seen="0ther-1")
         assert (first.outcome, other.outcome, other.widget) == ("published", "refused", "guarded")
         assert "already used" in str(other.reason)
-        new = await presses.press("guarded", {"message": "a"}, "p2", late)
+        new = await press_widget(presses, "guarded", {"message": "a"}, "p2", seen="0ther-1")
         assert (new.outcome, new.cause) == ("refused", "interlock")
         assert "another robot" in str(new.reason)
 
@@ -318,7 +318,9 @@ def test_replacing_the_session_ends_holds_first(
             async with asyncio.timeout(ENOUGH_S):
                 while not session.publisher.view["widgets"]["jog"]["enabled"]:
                     await asyncio.sleep(0.05)
-                hold = session.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
+                hold = session.holds.begin(
+                    press_of(session.holds.widget("jog"), HALF), time.monotonic(), ended.append
+                )
                 assert isinstance(hold, ActiveHold)
                 lost = session.robot.key("/last_heard")
                 monkeypatch.setattr(
@@ -340,9 +342,9 @@ def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
         session = session_of(small_panel(), "tcp/127.0.0.1:1")
         permits(session.robot)
-        by = session.press_guard.context_for("free", Principal(anonymous("192.0.2.1")))
-        assert not by.grounds().ending
+        who = Principal(anonymous("192.0.2.1"))
+        assert not session.press_guard.conditions(who).ending
         await session.stop()
-        assert by.grounds().ending
+        assert session.press_guard.conditions(who).ending
 
     asyncio.run(pressed())

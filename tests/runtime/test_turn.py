@@ -29,12 +29,13 @@ from tests.support.builders import (
     BOOL,
     BRIDGE,
     FREE,
-    FROM,
     HEARD,
     INTERFACES,
     MESSAGE,
     TEXT,
     panel_of,
+    press_of,
+    press_widget,
 )
 
 SAMPLES = 5_000
@@ -75,7 +76,9 @@ class Cell:
 
     def hold(self, widget: str) -> None:
         inputs = HALF if widget == "jog" else {}
-        hold = self.session.holds.begin(widget, inputs, time.monotonic(), FROM, self.ended.append)
+        hold = self.session.holds.begin(
+            press_of(self.session.holds.widget(widget), inputs), time.monotonic(), self.ended.append
+        )
         assert isinstance(hold, ActiveHold)
 
     def note_the_order(self) -> None:
@@ -120,7 +123,7 @@ def test_a_view_that_can_not_be_built_keeps_no_hold_from_its_end(
                 == codes(shown["widgets"]["free"])
                 == (False, "view_failed")
             )
-            assert (await cell.session.presses.press("free", {"message": "x"}, "p", FROM)).outcome
+            assert (await press_widget(cell.session.presses, "free", {"message": "x"}, "p")).outcome
         async with asyncio.timeout(20):  # and it is built again
             while codes(cell.session.publisher.view["widgets"]["jog"]) == (False, "view_failed"):
                 await asyncio.sleep(0.01)
@@ -175,7 +178,9 @@ def test_a_false_that_came_and_went_in_a_flood_ends_a_hold(monkeypatch: pytest.M
 def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene() -> None:
         cell = Cell(monkeypatch)
-        press = asyncio.ensure_future(cell.session.presses.press("free", {"message": "on"}, "p", FROM))
+        press = asyncio.ensure_future(
+            press_widget(cell.session.presses, "free", {"message": "on"}, "p")
+        )
         async with asyncio.timeout(20):
             while not cell.session.commands.confirmations.is_awaited("heard"):
                 await asyncio.sleep(0.001)

@@ -1,18 +1,20 @@
 """Builders for unit tests: a panel, a robot that is connected, its messages."""
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any, Final, TypeVar
 
-from app.audit import NullLog, Origin
+from app.audit import NullLog
 from app.audit.press_record import PressLog
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.parameters.sync import ParameterSync
-from app.commands.press_context import PressContext
+from app.commands.press import Press
+from app.commands.press_guard import PressGuard
 from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
+from app.commands.receipts import Receipt
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.dialect import bridge_dialect
@@ -23,9 +25,16 @@ from app.errors import PanelError
 from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
 from app.panel.model import Panel
+from app.panel.widgets.families import Command
+from app.permission.clients import anonymous
+from app.permission.control_authority import ControlAuthority
+from app.permission.principal import Principal
 from app.robot.state import RobotState, Sample
+from app.view.publisher import ViewPublisher
+from app.view.view import build_view
 
 Table = Mapping[str, Any]
+Widget = TypeVar("Widget", bound=Command)
 
 INTERFACES: Final = load_interfaces("jazzy")
 DIALECT: Final = BridgeDialect()
@@ -36,8 +45,9 @@ BRIDGE: Final = "b1"
 KIOSK: Final = "c1"
 ENABLED: Final = "/operation_enabled"
 NOW: Final = 1000.0  # monotonic seconds
-FROM: Final = PressContext(Origin(address="127.0.0.1"))
+PROGRAM: Final = Principal(anonymous("127.0.0.1"))
 NOTHING: Final[Table] = {}
+VIEW: Final = "5eed"  # the instance id of the guard's view
 
 INTERLOCK: Final[Table] = {"id": "operation", "topic": ENABLED}
 MESSAGE: Final[Table] = {"id": "message", "kind": "text", "label": "Message", "max_length": 8}
@@ -174,12 +184,44 @@ def sending_of(
     )
 
 
+def guard_of(
+    panel: Panel,
+    robot: RobotState,
+    control: ControlAuthority | None = None,
+    other_views: Collection[str] = (),
+) -> PressGuard:
+    """The conditions for presses; `other_views` are the instance ids of other robots' views."""
+    control = control or ControlAuthority(panel.control, robot.title, log_line=lambda *_: None)
+    publisher = ViewPublisher(build_view(panel, robot, NOW).view, "r1")
+    publisher.instance_id = VIEW
+    return PressGuard(publisher, control, NullLog(), panel.press_expires_s, lambda: other_views)
+
+
+def press_of(
+    widget: Widget,
+    inputs: Mapping[str, Any],
+    press_id: str = "p1",
+    principal: Principal = PROGRAM,
+    seen: str = "",
+) -> Press[Widget]:
+    """A press by a program on the kiosk."""
+    return Press(press_id, widget, inputs, principal, seen)
+
+
+async def press_widget(
+    presses: Presses, widget: str, inputs: Mapping[str, Any], *about: Any, **more: Any
+) -> Receipt:
+    """The receipt of a press; the further arguments are those of `press_of`."""
+    return await presses.press(press_of(presses.widget(widget), inputs, *about, **more))
+
+
 def presses_of(
     panel: Panel,
     robot: RobotState,
     transport: Transport,
     *,
     press_log: PressLog | None = None,
+    guard: PressGuard | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
     catch_up: Callable[[], None] = lambda: None,
     news: Callable[[], bool] = lambda: False,
@@ -187,5 +229,6 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, transport, monotonic=monotonic, **more)
-    judge = PressJudge(panel, robot, PendingSamples(catch_up, news), monotonic)
+    guard = guard or guard_of(panel, robot)
+    judge = PressJudge(panel, robot, guard, PendingSamples(catch_up, news), monotonic)
     return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

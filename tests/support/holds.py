@@ -64,8 +64,8 @@ def permit(
 
 def ended(server: Server) -> list[tuple[str, str]]:
     """(code, sentence) of every end in the log."""
-    found = map(ENDED.search, list(server.process.lines))
-    return [(one[1], one[2]) for one in found if one]
+    matches = map(ENDED.search, list(server.process.lines))
+    return [(match[1], match[2]) for match in matches if match]
 
 
 def codes(server: Server, after: int = 0) -> list[str]:

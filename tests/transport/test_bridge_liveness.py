@@ -20,7 +20,14 @@ from app.transport.bridge_liveness import (
     BridgeLiveness,
     LivenessDetector,
 )
-from tests.support.builders import BRIDGE, FROM, FakeTransport, presses_of, robot_there, small_panel
+from tests.support.builders import (
+    BRIDGE,
+    FakeTransport,
+    press_widget,
+    presses_of,
+    robot_there,
+    small_panel,
+)
 
 LAN_S = 0.001
 
@@ -222,7 +229,7 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
         presses = presses_of(small_panel(), robot, line, flushed=mine.flushed)
 
         async def press(press_id: str) -> str:
-            receipt = await presses.press("free", {"message": "hi"}, press_id, FROM)
+            receipt = await press_widget(presses, "free", {"message": "hi"}, press_id)
             return f"{receipt.outcome}: {receipt.reason}"
 
         assert (await press("p1")).startswith("published: Sent on /free")

@@ -6,7 +6,7 @@ States and their order: action_msgs/msg/GoalStatus.
 import asyncio
 import math
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,7 @@ from app.commands.service_calls import with_fields
 from app.i18n import TextLike, joined, say
 from app.interfaces import Fields
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import CommandStatus, Outcome, OutcomeCode
+from app.robot.command_status import CommandStatus, OnCorrection, Outcome, OutcomeCode
 
 FEEDBACK: Final = "feedback."  # prefix of the feedback's fields in the feedback message
 UNKNOWN: Final = 0
@@ -50,7 +50,7 @@ class Goal:
     press_id: str
     id: uuid.UUID
     cut: "asyncio.Future[TextLike]"
-    corrected: Callable[[str, Outcome], None]
+    correct: OnCorrection
     state: int | None = None
     known: bool = False
     doubt: TextLike = ""

@@ -14,13 +14,14 @@ from app.clock import format_time
 from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
 from app.commands.actions.results import ResultWaiter
+from app.commands.press import PressHandle
 from app.commands.transport import Transport
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
 from app.panel.template import response_paths
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import IDLE, CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.command_status import IDLE, CommandStatus, Outcome
 from app.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.robot.state import Reading, RobotState, Sample
 from app.robot.topics import Topic
@@ -77,26 +78,17 @@ class GoalTracker:
         """Ends the tasks. The goals continue on the robot."""
         await self._results.stop()
 
-    async def start(
-        self,
-        widget: Action,
-        fields: dict[str, Any],
-        press_id: str,
-        corrected: OnCorrection,
-        entry: str = "",
-        final_check: FinalCheck = no_check,
-    ) -> Outcome:
-        """Sends a goal and waits for its acceptance; `corrected` is called with the result. `entry` is
-        the hash of the press's entry in the operator's log. FieldError for bad fields, LinkError if the
-        goal could not be sent."""
-        own_id = goal_id(entry)
+    async def start(self, widget: Action, fields: dict[str, Any], handle: PressHandle) -> Outcome:
+        """Sends a goal and waits for its acceptance; its result corrects the receipt. FieldError for
+        bad fields, LinkError if the goal could not be sent."""
+        own_id = goal_id(handle.entry)
         request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
             return Outcome("refused", why)
-        final_check()
+        handle.final_check()
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
-        goal = Goal(widget, press_id, own_id, cut, corrected)
+        goal = Goal(widget, handle.press_id, own_id, cut, handle.correct)
         self._latest[widget.id] = goal
         self._show(goal, CommandStatus(busy=True, text=say("call_waiting")))
         answer = self._services.goal_response(goal, await self._services.reply(goal, query))
@@ -252,7 +244,7 @@ class GoalTracker:
         if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
             answer = Outcome("accepted", say("goal_still_in_progress", time=format_time(time.time())))
-            goal.corrected(goal.press_id, answer)
+            goal.correct(answer)
 
     def _apply_feedback(self, goal: Goal, message: Fields) -> None:
         goal.apply_feedback(message)
@@ -265,7 +257,7 @@ class GoalTracker:
     def _cut_off(self, goal: Goal, why: TextLike) -> None:
         """The goal may still be running on the robot. No other goal is sent until that is known."""
         self._show_doubt(goal, why)
-        goal.corrected(goal.press_id, Outcome("unknown", why))
+        goal.correct(Outcome("unknown", why))
 
     def _show_doubt(self, goal: Goal, why: TextLike) -> None:
         goal.doubt = why
@@ -275,7 +267,7 @@ class GoalTracker:
         """Shows a goal's result, or that it is unknown, and corrects the receipt."""
         goal.doubt = ""
         self._show(goal, goal.end_status(answer))
-        goal.corrected(goal.press_id, answer)
+        goal.correct(answer)
 
     def _show(self, goal: Goal, progress: CommandStatus) -> None:
         if self._set_status(goal, progress):

@@ -20,7 +20,7 @@ from app.errors import LogError
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import IDLE, CommandStatus, Outcome
+from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 
@@ -115,9 +115,6 @@ class GoalRecovery:
             self._log.warning("press %s: its goal is not tracked again: %s", press.press, why)
             return
 
-        def corrected(press_id: str, answer: Outcome) -> None:
-            pending.correct(answer)
-
         cut = asyncio.get_running_loop().create_future()
         cut.set_result("")  # until its server is offered
         at = press.at / 1000
@@ -126,5 +123,5 @@ class GoalRecovery:
         own = goal_id(press.hash)
         self._log.info("press %s: tracking goal %s again: %s", press.press, own, doubt)
         self._actions.resume(
-            Goal(widget, press.press, own, cut, corrected, UNKNOWN, open_press.accepted, doubt)
+            Goal(widget, press.press, own, cut, pending.correct, UNKNOWN, open_press.accepted, doubt)
         )

@@ -7,26 +7,28 @@ sent at all.
 """
 
 import asyncio
-import secrets
 import time
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
 from app.clock import format_time
 from app.commands.holds.deflection import Deflection, moved
 from app.commands.holds.lease import LEASE_S, Lease
 from app.commands.holds.messages import HoldMessages, Values
-from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
-from app.commands.press_context import PressContext
-from app.commands.press_judge import PendingSamples
-from app.commands.receipts import MAX_FINAL_CHECKS, PressRecorder, Receipt
-from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
+from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts
+from app.commands.press import Press
+from app.commands.press_judge import PressJudge
+from app.commands.receipts import (
+    MAX_FINAL_CHECKS,
+    PressRecorder,
+    Receipt,
+    Refusal,
+    refused_receipt,
+)
+from app.errors import FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import TextLike, say
 from app.panel.model import Panel
-from app.panel.template import needed_inputs
 from app.panel.widgets.hold import HoldCommand
-from app.permission.press_permission import cause_of, judged
-from app.permission.verdict import Verdict
 from app.robot.state import RobotState
 
 
@@ -44,20 +46,20 @@ class HoldController:
         self,
         panel: Panel,
         robot: RobotState,
+        judge: PressJudge,
         messages: HoldMessages,
         loop: Clock,
-        latest: PendingSamples,
         *,
         changed: Callable[[], None],
         recorder: PressRecorder | None = None,
     ) -> None:
         """`changed` is called when a hold begins or ends."""
-        self._panel = panel
         self._robot = robot
         self._loop = loop
         self._messages = messages
         self._receipts = HoldReceipts(robot.name, robot.traits.sentences, recorder)
-        self._arrivals = latest
+        self._judge = judge
+        self._arrivals = judge.arrivals
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, HoldCommand)}
         self._held: dict[str, ActiveHold] = {}
@@ -75,95 +77,61 @@ class HoldController:
         return self._widgets[widget_id]
 
     def begin(
-        self,
-        widget_id: str,
-        inputs: Mapping[str, Any],
-        sent: float,
-        context: PressContext,
-        on_end: Callable[[Receipt], None],
-        hold_id: str = "",
+        self, press: Press[HoldCommand], sent: float, on_end: Callable[[Receipt], None]
     ) -> Receipt | ActiveHold:
         """Begins a hold, or returns the receipt of a refusal. `sent` is the latest time at which the
-        browser can have sent the request. `on_end` is called with the receipt when the hold ends. A
-        hold without an id gets one."""
+        browser can have sent the request. `on_end` is called with the receipt when the hold ends."""
         self._arrivals.ingest()
         self.judge()
-        widget, now = self.widget(widget_id), self._loop.time()
-        ready = self._prepare(widget, inputs, sent, context, now)
-        if isinstance(ready, Refusal):
-            return self._receipts.record_refusal(widget, inputs, context, ready, hold_id)
-        lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
+        widget, now = press.widget, self._loop.time()
+        values = self._prepare(press, sent, now)
+        if isinstance(values, Refusal):
+            return self._receipts.record_refusal(press, values)
+        lease = Lease.begun(press.id, widget.period_s, sent, now)
         since = say("hold_since", time=format_time(time.time()))
-        own = needed_inputs(widget, inputs)
-        holding = ActiveHold(widget, lease, context, own, ready, on_end, since)
-        self._held[widget_id] = holding
-        self._robot.held_since[widget_id] = since
+        holding = ActiveHold(press.with_needed_inputs(), lease, values, on_end, since)
+        self._held[widget.id] = holding
+        self._robot.held_since[widget.id] = since
         self._receipts.record_begin(holding)
         self._changed()
         self.step()
         return holding
 
-    def refuse(
-        self,
-        widget_id: str,
-        context: PressContext,
-        why: TextLike,
-        cause: Cause = "interlock",
-        *,
-        hold_id: str = "",
-        trace: bool = True,
-    ) -> Receipt:
-        """Refuses a hold without checking permission; with `trace`, the refusal is logged and
+    def refuse(self, press: Press[HoldCommand], refusal: Refusal, *, recorded: bool = True) -> Receipt:
+        """Refuses a hold without checking permission; with `recorded`, the refusal is logged and
         recorded."""
-        widget = self.widget(widget_id)
-        refusal = Refusal(why, cause)
-        if trace:
-            return self._receipts.record_refusal(widget, {}, context, refusal, hold_id)
-        return refused(widget, {}, refusal, hold_id)
+        if recorded:
+            return self._receipts.record_refusal(press, refusal)
+        return refused_receipt(press.with_needed_inputs(), refusal)
 
-    def refusal(
-        self, widget_id: str, inputs: Mapping[str, Any], sent: float, context: PressContext
-    ) -> Receipt | None:
+    def refusal(self, press: Press[HoldCommand], sent: float) -> Receipt | None:
         """The receipt of the refusal if `begin` would refuse now, else None. Not logged or recorded."""
         self._arrivals.ingest()
         self.judge()
-        widget = self.widget(widget_id)
-        ready = self._prepare(widget, inputs, sent, context, self._loop.time())
-        return refused(widget, inputs, ready) if isinstance(ready, Refusal) else None
+        values = self._prepare(press, sent, self._loop.time())
+        return self.refuse(press, values, recorded=False) if isinstance(values, Refusal) else None
 
-    def _prepare(
-        self,
-        widget: HoldCommand,
-        inputs: Mapping[str, Any],
-        sent: float,
-        context: PressContext,
-        now: float,
-    ) -> Values | Refusal:
+    def _prepare(self, press: Press[HoldCommand], sent: float, now: float) -> Values | Refusal:
         """The values to publish, or the reason why the hold may not begin now."""
-        why, cause = self._refusal_reason(widget, sent, context, now)
-        if why:
-            return Refusal(why, cause)
+        if refusal := self._not_permitted(press, sent, now):
+            return refusal
         try:
-            return self._messages.values(widget, inputs)
+            return self._messages.values(press.widget, press.inputs)
         except (FieldError, InputError) as error:
             return Refusal(say("with_stop", said=error.text), "input")
 
-    def _refusal_reason(
-        self, widget: HoldCommand, sent: float, context: PressContext, now: float
-    ) -> tuple[TextLike, Cause]:
-        """Why the hold may not begin now ("" if it may), and the receipt's cause."""
+    def _not_permitted(self, press: Press[HoldCommand], sent: float, now: float) -> Refusal | None:
+        """Why the hold may not begin now, None if it may."""
         if self._closed:
-            return say("hold_by_shutdown"), "interlock"
-        if other := next(
-            (one for one in self._held.values() if one.widget.topic == widget.topic), None
-        ):
-            code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
-            return say(code, label=other.widget.label, topic=widget.topic), "interlock"
+            return Refusal(say("hold_by_shutdown"), "interlock")
+        topic = press.widget.topic
+        others = (holding.widget for holding in self._held.values())
+        if other := next((widget for widget in others if widget.topic == topic), None):
+            code = "hold_elsewhere" if other is press.widget else "hold_same_topic"
+            return Refusal(say(code, label=other.label, topic=topic), "interlock")
         if now >= sent + LEASE_S:
-            return say("hold_press_too_late"), "interlock"
-        if not (verdict := self._verdict(widget, context, now)).permitted:
-            return verdict.reason or "", cause_of(verdict.code)
-        return context.stale_reason(), "interlock"
+            return Refusal(say("hold_press_too_late"), "interlock")
+        return self._judge.judge_at(press, now).refusal
 
     def beat(
         self, holding: ActiveHold, number: int, sent: float, deflection: Deflection | None = None
@@ -205,7 +173,7 @@ class HoldController:
                 continue  # ended in the meantime: the end of another hold triggered this
             if code := holding.lease.end_code(now):
                 self._end(holding, code, say(code))
-            elif not (verdict := self._verdict(holding.widget, holding.context, now)).permitted:
+            elif not (verdict := self._judge.verdict(holding.press, now)).permitted:
                 self._end(holding, verdict.code, verdict.reason or "")
 
     def step(self) -> None:
@@ -220,21 +188,21 @@ class HoldController:
     def _is_active(self, holding: ActiveHold) -> bool:
         return self._held.get(holding.widget.id) is holding
 
-    def _verdict(self, widget: HoldCommand, context: PressContext, now: float) -> Verdict:
-        interlocks = self._panel.interlocks_of(widget)
-        return judged(widget, interlocks, self._robot, now, context.grounds())
-
     def _schedule(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         now = self._loop.time()
-        whens = [
-            min(one.lease.next_at, one.lease.until, self._verdict(one.widget, one.context, now).until)
-            for one in self._held.values()
+        times = [
+            min(
+                holding.lease.next_at,
+                holding.lease.until,
+                self._judge.verdict(holding.press, now).until,
+            )
+            for holding in self._held.values()
         ]
-        if whens:
-            self._timer = self._loop.call_at(min(whens), self.step)
+        if times:
+            self._timer = self._loop.call_at(min(times), self.step)
 
     def _send(self, holding: ActiveHold) -> None:
         widget = holding.widget

@@ -10,6 +10,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final, Literal
 
@@ -18,6 +19,7 @@ from app.commands.parameters.known import KnownParameters
 from app.commands.parameters.node import Node, within
 from app.commands.parameters.setting import set_request
 from app.commands.parameters.values import check_value
+from app.commands.press import PressHandle
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.concurrency import spawn_logged
@@ -29,7 +31,7 @@ from app.interfaces.names import PARAMETER_EVENTS
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, EVENTS, GET, SET, Parameter, Value
 from app.permission.servers import parameters_offered
-from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.command_status import Outcome
 from app.robot.parameter_state import read_parameter_state
 from app.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.robot.state import RobotState, Sample
@@ -228,23 +230,16 @@ class ParameterSync:
         """The value to set; InputError with the label and the limits."""
         return check_value(widget, self._known.state(widget), given)
 
-    async def set(
-        self,
-        widget: Parameter,
-        value: Value,
-        press_id: str,
-        corrected: OnCorrection,
-        final_check: FinalCheck = no_check,
-    ) -> Outcome:
+    async def set(self, widget: Parameter, value: Value, handle: PressHandle) -> Outcome:
         """Sets a parameter by a service call, then queries the node, whatever the outcome."""
         request = set_request(self._interfaces, widget, value)
         node = self._nodes[widget.node]
 
-        def late(press_id: str, answer: Outcome) -> None:
+        def correct(answer: Outcome) -> None:
             node.request_query()
-            corrected(press_id, answer)
+            handle.correct(answer)
 
-        answer = await self._calls.send_request(request, press_id, late, final_check)
+        answer = await self._calls.send_request(request, replace(handle, correct=correct))
         node.request_query()
         return answer
 

@@ -9,7 +9,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.commands.acts import ActReceipt, ActRequest
 from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
-from app.commands.press_context import PRESS_ID
+from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
 from app.i18n import localized

@@ -7,7 +7,7 @@ import secrets
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import partial
+from dataclasses import replace
 from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -16,11 +16,11 @@ from starlette.types import Message as Received
 from app.audit.press_record import PendingEntry
 from app.commands.holds.lease import sent_at
 from app.commands.holds.receipts import ActiveHold
-from app.commands.press_context import PressContext
-from app.commands.receipts import Receipt, with_log_fault
-from app.errors import InputError, LogError
-from app.i18n import localized, say
-from app.panel.template import needed_inputs
+from app.commands.press import Press
+from app.commands.receipts import Receipt, Refusal, with_log_fault
+from app.errors import Cause, InputError, LogError
+from app.i18n import TextLike, localized, say
+from app.panel.widgets.hold import HoldCommand
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import principal_of
@@ -44,37 +44,44 @@ CLOSE: Final[Mapping[str, int]] = {
 
 @router.websocket("/widgets/{widget}/hold")
 async def hold(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
-    session.holds.widget(widget)
+    command = session.holds.widget(widget)
     await socket.accept()
-    served = _HoldSocket(socket, state, session, widget)
+    press = Press(secrets.token_hex(8), command, {}, principal_of(socket, state))
+    served = _HoldSocket(socket, state, session, press)
     with suppress(WebSocketDisconnect), state.in_flight.track():
-        receipt = await served.run(widget)
+        receipt = await served.run()
         if receipt.cause != "limit":
             state.metrics.pressed(receipt.outcome)
 
 
 class _HoldSocket:
-    """One socket and its one hold."""
+    """One socket and its one hold. The press has no inputs, and the event that the operator saw only
+    after the message that begins the hold."""
 
-    def __init__(self, socket: WebSocket, state: AppState, session: RobotSession, widget: str) -> None:
+    def __init__(
+        self,
+        socket: WebSocket,
+        state: AppState,
+        session: RobotSession,
+        press: Press[HoldCommand],
+    ) -> None:
         self._socket = socket
         self._limits = state.limits
         self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._who = principal_of(socket, state)
         self._language = language_of(socket)
-        self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._context = session.press_guard.context_for(widget, self._who)
-        self._room = session.press_log.has_room(self._context.origin)
+        self._press = press
+        session.press_guard.receive(press)
+        self._room = session.press_log.has_room(press.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
         self._next: asyncio.Future[Received] | None = None  # the browser's next message
 
-    async def run(self, widget: str) -> Receipt:
+    async def run(self) -> Receipt:
         """From the first message to the end; the receipt of the hold, of a refusal too."""
         await self._say()
-        begun = await self._begun(widget)
+        begun = await self._begun()
         if self._pending is not None:
             self._pending.set_verdict("permitted" if isinstance(begun, ActiveHold) else begun.cause)
         if isinstance(begun, Receipt):
@@ -92,41 +99,47 @@ class _HoldSocket:
             await asyncio.gather(sending, return_exceptions=True)
         return self._receipt or self._ended.result()
 
-    async def _begun(self, widget: str) -> Receipt | ActiveHold:
-        holds, by = self._session.holds, self._context
-        refuse = partial(holds.refuse, widget, hold_id=self._id, trace=self._room)
+    async def _begun(self) -> Receipt | ActiveHold:
         try:
             async with asyncio.timeout(BEGIN_WITHIN_S):
-                said = await self._read()
+                message = await self._read()
         except TimeoutError:
-            return refuse(by, say("hold_press_too_late"))
-        if not self._limits.admit(self._who):
-            return refuse(by, say("press_too_often"), "limit", trace=False)
-        if isinstance(said, End):
-            return refuse(by, say("hold_released_early"))
-        if not isinstance(said, Begin):
-            return refuse(by, say("hold_by_invalid_message"))
-        sent = self._sent(said)
-        inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
-        try:
-            by = self._context = self._session.press_guard.context_for(widget, self._who, said.seen)
-            if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
-                return left_out
-            still_held = await self._log_begin(widget, inputs, by)
-        except InputError as error:
-            return refuse(by, say("with_stop", said=error.text), "input")
-        except LogError as error:
-            return refuse(by, error.text, "log")
-        if not still_held:
-            return refuse(by, say("hold_released_early"))
-        return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
+            return self._refuse(say("hold_press_too_late"))
+        if not self._limits.admit(self._press.principal):
+            refusal = Refusal(say("press_too_often"), "limit")
+            return self._session.holds.refuse(self._press, refusal, recorded=False)
+        if isinstance(message, End):
+            return self._refuse(say("hold_released_early"))
+        if not isinstance(message, Begin):
+            return self._refuse(say("hold_by_invalid_message"))
+        return await self._begin(message, self._sent(message))
 
-    async def _log_begin(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
+    async def _begin(self, message: Begin, sent: float) -> Receipt | ActiveHold:
+        """Begins the hold, sent at `sent` (monotonic seconds) at the latest."""
+        holds, seen = self._session.holds, replace(self._press, seen=message.seen)
+        press = self._session.dispatcher.with_defaults(replace(seen, inputs=message.inputs))
+        try:
+            self._session.press_guard.receive(press)
+            self._press = seen
+            if not self._room and (unlogged := holds.refusal(press, sent)):
+                return unlogged
+            still_held = await self._log_begin(press)
+        except InputError as error:
+            return self._refuse(say("with_stop", said=error.text), "input")
+        except LogError as error:
+            return self._refuse(error.text, "log")
+        if not still_held:
+            return self._refuse(say("hold_released_early"))
+        return holds.begin(press, sent, self._ended.set_result)
+
+    def _refuse(self, reason: TextLike, cause: Cause = "interlock") -> Receipt:
+        """Refuses the hold without checking permission."""
+        refusal = Refusal(reason, cause)
+        return self._session.holds.refuse(self._press, refusal, recorded=self._room)
+
+    async def _log_begin(self, press: Press[HoldCommand]) -> bool:
         """Writes the log entry of the press; False if a message, as of an end, arrived before that."""
-        own = needed_inputs(self._session.holds.widget(widget), inputs)
-        writing = asyncio.ensure_future(
-            self._session.press_log.pressed(widget, own, self._id, context.origin, "hold")
-        )
+        writing = asyncio.ensure_future(self._session.press_log.pressed(press.logged("hold")))
         self._next = asyncio.ensure_future(self._received())
         await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
         let_go = self._next.done()
@@ -140,12 +153,10 @@ class _HoldSocket:
         if receipt.cause == "limit":
             return receipt
         if not self._room:
-            self._session.press_log.count_unlogged(self._context.origin)
+            self._session.press_log.count_unlogged(self._press.origin)
             return receipt
-        why = await self._session.press_log.refused(
-            receipt.widget, receipt.inputs, receipt.id, self._context.origin, receipt.reason, "hold"
-        )
-        return with_log_fault(receipt, why)
+        fault = await self._session.press_log.refused(self._press.logged("hold"), receipt.reason)
+        return with_log_fault(receipt, fault)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
         """Logs the end of the hold, on the disk before the receipt is sent."""
@@ -158,24 +169,24 @@ class _HoldSocket:
         with suppress(TimeoutError, WebSocketDisconnect):
             while True:
                 async with asyncio.timeout(SILENCE_S):
-                    said = await self._read()
-                if self._process(said, holding):
-                    self._session.control.touch(self._who)
+                    message = await self._read()
+                if self._process(message, holding):
+                    self._session.control.touch(self._press.principal)
                     await self._say(state="held", **_deflection_texts(holding))
-                elif isinstance(said, Beat) and self._receipt is not None:
+                elif isinstance(message, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
 
-    def _process(self, said: Message | None, holding: ActiveHold) -> bool:
+    def _process(self, message: Message | None, holding: ActiveHold) -> bool:
         """Applies a message to the hold; False once it has ended."""
         holds = self._session.holds
-        if isinstance(said, End) and said.lease in ("", holding.lease.id):
-            holds.end(holding, END_REASONS.get(said.why, "hold_by_invalid_message"))
+        if isinstance(message, End) and message.lease in ("", holding.lease.id):
+            holds.end(holding, END_REASONS.get(message.why, "hold_by_invalid_message"))
             return False
-        if not isinstance(said, Beat) or said.lease != holding.lease.id:
+        if not isinstance(message, Beat) or message.lease != holding.lease.id:
             holds.end(holding, "hold_by_invalid_message")
             return False
-        return holds.beat(holding, said.number, self._sent(said), said.deflection)
+        return holds.beat(holding, message.number, self._sent(message), message.deflection)
 
     async def _received(self) -> Received:
         return await received(self._socket)
@@ -190,8 +201,8 @@ class _HoldSocket:
             raise WebSocketDisconnect(message.get("code", 1000))
         return read_message(message.get("text") or "")
 
-    def _sent(self, said: HoldMessage) -> float:
-        return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
+    def _sent(self, message: HoldMessage) -> float:
+        return sent_at(self._opened_at, message.stamp, message.after, time.monotonic())
 
     async def _send_end(self) -> None:
         """Waits for the end of the hold, whatever ends it, and sends its receipt."""
@@ -202,10 +213,10 @@ class _HoldSocket:
         with suppress(WebSocketDisconnect, RuntimeError):
             await self._say(state="ended", **receipt.as_json())
 
-    async def _say(self, **what: Any) -> None:
+    async def _say(self, **fields: Any) -> None:
         stamp = round(1000 * (time.monotonic() - self._opened_at), 1)
-        said = localized({"stamp": stamp, **what}, self._language)
-        await self._socket.send_text(json.dumps(said, ensure_ascii=False))
+        message = localized({"stamp": stamp, **fields}, self._language)
+        await self._socket.send_text(json.dumps(message, ensure_ascii=False))
 
     async def _close(self, code: int) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster

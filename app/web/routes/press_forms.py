@@ -3,16 +3,18 @@
 import math
 import re
 import secrets
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 from urllib.parse import quote
 
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app import clock
-from app.commands.press_context import PRESS_ID
+from app.commands.press import PRESS_ID, Press
 from app.errors import InputError
 from app.i18n import say
 from app.panel.layout import Page
+from app.panel.widgets.families import PressCommand
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
@@ -28,77 +30,79 @@ class Reader(NamedTuple):
     display: Display
 
 
+@dataclass(frozen=True, slots=True)
+class PressForm:
+    """A form that presses a widget. `fields` are the texts of inputs, and fields of the page, whose
+    names begin with "_"; the latter are removed as they are read."""
+
+    widget: PressCommand
+    principal: Principal
+    fields: dict[str, str]
+    reader: Reader
+
+
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 QUESTION_LIFE_S: Final = 30.0  # the answer is a press, and no later one
 
 
-async def pressed_by_form(
-    state: AppState,
-    session: RobotSession,
-    who: Principal,
-    widget: str,
-    inputs: dict[str, str],
-    reader: Reader,
-) -> Response:
+async def pressed_by_form(state: AppState, session: RobotSession, form: PressForm) -> Response:
     """The response to a press: a redirect to the page with its receipt, or the question before the
     press."""
-    too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
-    shown_on = inputs.pop("_page", "")
-    asks = session.presses.widget(widget).confirm_press
-    if asks and (inputs.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(state, session, widget, inputs, reader, shown_on)
-    # One rendered page has one id for all its buttons, and each button is a press of its own.
-    page_id = inputs.pop("_id", secrets.token_hex(8))
+    fields, refusals = form.fields, session.presses.early_refusals
+    too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
+    shown_on = fields.pop("_page", "")
+    if form.widget.confirm_press and (fields.pop(CONFIRMED, "") != "yes" or too_soon):
+        return _ask(state, session, form, shown_on)
+    press = _press_of(state, session, form)
+    if not state.limits.admit(press.principal):
+        receipt = refusals.limited(press, shown=True)
+    else:
+        session.press_guard.receive(press)
+        work = refusals.too_soon(press, before) if too_soon else session.presses.press(press)
+        receipt = await state.counted(work)
+    path = page_after(session, press.widget.id, receipt.id, shown_on)
+    return RedirectResponse(path, status_code=303)
+
+
+def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[PressCommand]:
+    """The press of a form. One rendered page has one id for all its buttons, and each button is a press
+    of its own."""
+    fields, widget = form.fields, form.widget
+    page_id = fields.pop("_id", secrets.token_hex(8))
     if not re.fullmatch(PRESS_ID, page_id):
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
-    press_id = f"{page_id}.{widget}"
-    seen, until = inputs.pop("_seen", ""), _until(inputs)
-    typed = session.dispatcher.parse_form(inputs, _language(state, inputs, reader))
-    if not state.limits.admit(who):
-        receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
-        return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)
-    by = session.press_guard.context_for(widget, who, seen, until)
-    if too_soon:
-        work = session.presses.early_refusals.too_soon(widget, typed, press_id, before, by.origin)
-    else:
-        work = session.presses.press(widget, typed, press_id, by)
-    receipt = await state.counted(work)
-    return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)
+    seen, until = fields.pop("_seen", ""), _until(fields)
+    language = _language(state, form)
+    inputs = session.dispatcher.parse_form(fields, language)
+    return Press(f"{page_id}.{widget.id}", widget, inputs, form.principal, seen, until)
 
 
-def _ask(
-    state: AppState,
-    session: RobotSession,
-    widget: str,
-    inputs: dict[str, str],
-    reader: Reader,
-    shown_on: str,
-) -> Response:
+def _ask(state: AppState, session: RobotSession, form: PressForm, shown_on: str) -> Response:
     """The page that asks before a press; its answer is the press."""
-    pressed = session.presses.widget(widget)
+    widget = form.widget
     html = state.templates.render(
         "ask.html",
-        reader.language,
+        form.reader.language,
         site=state,
-        display=reader.display,
+        display=form.reader.display,
         panel=session.panel,
         banner=session.publisher.view["notice"]["banner"],
-        question=ask_of(session, pressed),
-        action=f"{session.base}/widgets/{widget}",
-        back=page_after(session, widget, "", shown_on),
+        question=ask_of(session, widget),
+        action=f"{session.base}/widgets/{widget.id}",
+        back=page_after(session, widget.id, "", shown_on),
         fields={
-            **inputs,
+            **form.fields,
             "_page": shown_on,
             CONFIRMED: "yes",
             "_seen": session.publisher.id,
             "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
-        entries=printable_texts(inputs),
+        entries=printable_texts(form.fields),
         no=say("back"),
         empty=say("empty"),
-        label=pressed.label,
+        label=widget.label,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -106,47 +110,47 @@ def _ask(
 def _page_of(session: RobotSession, widget: str, shown_on: str) -> Page:
     """The page of a widget; of one in the frame the page that it was `shown_on`, else the first."""
     panel = session.panel
-    if any(one.id == widget for one in panel.frame.widgets):
+    if any(shown.id == widget for shown in panel.frame.widgets):
         return panel.page(shown_on) or panel.pages[0]
-    return next(page for page in panel.pages if any(one.id == widget for one in page.widgets))
+    return next(page for page in panel.pages if any(shown.id == widget for shown in page.widgets))
 
 
-def _until(inputs: dict[str, str]) -> float | None:
+def _until(fields: dict[str, str]) -> float | None:
     """When a page without scripts should have reloaded, if that is over, else now.
 
     It can't say when it was pressed, but a page that does not reload itself is none to press on.
     """
-    until = _moment(inputs, "_until")
+    until = _moment(fields, "_until")
     return until if until is None else min(until, clock.server_now())
 
 
-def _language(state: AppState, inputs: dict[str, str], reader: Reader) -> str:
+def _language(state: AppState, form: PressForm) -> str:
     """The language of the page whose form this is: another page of the browser may have changed its
     language since. A program's form has the language of its request."""
-    language = inputs.pop("_language", reader.language)
+    language = form.fields.pop("_language", form.reader.language)
     panel = state.fleet.panel
     if language not in (*panel.readers_languages, panel.language):
         raise InputError(f'_language: "{language:.40}" is not a language of this panel')
     return language
 
 
-def _is_second_tap(inputs: dict[str, str]) -> bool:
+def _is_second_tap(fields: dict[str, str]) -> bool:
     """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
     brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
-    shown_at = _moment(inputs, "_since")
+    shown_at = _moment(fields, "_since")
     return shown_at is not None and clock.server_now() - shown_at < TAP_AGAIN_S
 
 
-def _moment(inputs: dict[str, str], name: str) -> float | None:
-    given = inputs.pop(name, None)
-    if given is None:
+def _moment(fields: dict[str, str], name: str) -> float | None:
+    text = fields.pop(name, None)
+    if text is None:
         return None
     try:
-        moment = float(given)
+        moment = float(text)
     except ValueError:
         moment = math.nan
     if not math.isfinite(moment):
-        raise InputError(f'{name}: "{given:.40}" is not that of a page')
+        raise InputError(f'{name}: "{text:.40}" is not that of a page')
     return moment
 
 

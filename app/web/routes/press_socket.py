@@ -21,14 +21,14 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field
 from starlette.types import Message
 
-from app.commands.press_context import PRESS_ID
+from app.commands.press import PRESS_ID
 from app.errors import InputError, KioskError
 from app.i18n import TextLike, localized, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import caller
 from app.web.language import language_of
 from app.web.request_body import as_model, json_of, received
-from app.web.routes.presses import STATUS, Press, receipt_of_press
+from app.web.routes.presses import STATUS, PressBody, receipt_of_press
 
 log = logging.getLogger("kiosk.presses")
 
@@ -42,7 +42,7 @@ POLICY_VIOLATION: Final = 1008  # RFC 6455
 PLACE: Final = "the message"
 
 
-class SocketPress(Press):
+class SocketPress(PressBody):
     """The message of one press."""
 
     widget: str
@@ -59,14 +59,14 @@ async def presses(socket: WebSocket, state: CurrentState, session: CurrentSessio
 class _PressSocket:
     """One socket and its presses. Each press names the view that its page shows."""
 
-    __slots__ = ("_caller", "_language", "_refused", "_socket", "_state", "_under_way")
+    __slots__ = ("_caller", "_in_flight", "_language", "_refused", "_socket", "_state")
 
     def __init__(self, socket: WebSocket, state: AppState) -> None:
         self._socket = socket
         self._state = state
         self._caller = caller(socket)
         self._language = language_of(socket)
-        self._under_way: set[asyncio.Task[None]] = set()
+        self._in_flight: set[asyncio.Task[None]] = set()
         self._refused = 0  # one after the other
 
     async def run(self) -> None:
@@ -78,55 +78,56 @@ class _PressSocket:
                     await self._socket.close(POLICY_VIOLATION)
                     break
         finally:
-            await asyncio.gather(*self._under_way)
+            await asyncio.gather(*self._in_flight)
 
     async def _begin(self, message: Message) -> None:
         """Starts the press of a message, without waiting for its receipt."""
-        given: Any = None
+        fields: Any = None
         try:
             text = message.get("text")
             if text is None:
                 raise InputError(f"{PLACE} is not text")
-            given = json_of(text, PLACE)
-            said = as_model(SocketPress, given, PLACE)
+            fields = json_of(text, PLACE)
+            body = as_model(SocketPress, fields, PLACE)
         except InputError as error:
-            await self._refuse(_id_in(given), error.status, error.text)
+            await self._refuse(_press_id(fields), error.status, error.text)
             return
-        if len(self._under_way) >= MOST_AT_ONCE:
-            await self._refuse(said.id, 429, say("press_too_many_pending", most=MOST_AT_ONCE))
+        if len(self._in_flight) >= MOST_AT_ONCE:
+            await self._refuse(body.id, 429, say("press_too_many_pending", most=MOST_AT_ONCE))
             return
-        task = asyncio.create_task(self._press(said))
-        self._under_way.add(task)
-        task.add_done_callback(self._under_way.discard)
+        task = asyncio.create_task(self._press(body))
+        self._in_flight.add(task)
+        task.add_done_callback(self._in_flight.discard)
 
-    async def _press(self, said: SocketPress) -> None:
+    async def _press(self, body: SocketPress) -> None:
         state, socket = self._state, self._socket
         try:
             session = state.fleet.session(socket.path_params.get("robot"))
             who = self._caller.principal(state)
-            receipt = await receipt_of_press(state, session, who, said.widget, said)
+            press = body.press(session.presses.widget(body.widget), who)
+            receipt = await receipt_of_press(state, session, press)
         except KioskError as error:
-            await self._answer(said.id, error.status, error=error.text)
+            await self._answer(body.id, error.status, error=error.text)
         except Exception:
-            log.exception("press %s broke off", said.id)
-            await self._answer(said.id, 500, error=say("press_server_error"))
+            log.exception("press %s broke off", body.id)
+            await self._answer(body.id, 500, error=say("press_server_error"))
         else:
             self._refused = self._refused + 1 if receipt.cause == "limit" else 0
-            await self._answer(said.id, STATUS[receipt.cause], **receipt.as_json())
+            await self._answer(body.id, STATUS[receipt.cause], **receipt.as_json())
 
     async def _refuse(self, press_id: str | None, status: int, error: TextLike) -> None:
         self._refused += 1
         await self._answer(press_id, status, error=error)
         await asyncio.sleep(0)  # much may come in one piece: others have their turn
 
-    async def _answer(self, press_id: str | None, status: int, **what: TextLike | None) -> None:
-        said = localized({"press": press_id, "status": status, **what}, self._language)
-        text = json.dumps(said, ensure_ascii=False)
+    async def _answer(self, press_id: str | None, status: int, **fields: TextLike | None) -> None:
+        answer = localized({"press": press_id, "status": status, **fields}, self._language)
+        text = json.dumps(answer, ensure_ascii=False)
         with suppress(WebSocketDisconnect, RuntimeError):  # the client is gone
             await self._socket.send_text(text)
 
 
-def _id_in(given: object) -> str | None:
-    """The id of what is no press otherwise, if it has one."""
-    found = given.get("id") if isinstance(given, dict) else None
-    return found if isinstance(found, str) and re.fullmatch(PRESS_ID, found) else None
+def _press_id(fields: object) -> str | None:
+    """The press id in an invalid message, None without one."""
+    press_id = fields.get("id") if isinstance(fields, dict) else None
+    return press_id if isinstance(press_id, str) and re.fullmatch(PRESS_ID, press_id) else None

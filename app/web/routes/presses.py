@@ -8,12 +8,12 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.audit.press_record import origin_of
-from app.commands.press_context import EVENT_ID, MAX_ID_LENGTH, PRESS_ID
+from app.commands.press import EVENT_ID, MAX_ID_LENGTH, PRESS_ID, Press
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.receipts import Receipt
 from app.errors import InputError
 from app.i18n import localized
+from app.panel.widgets.families import PressCommand
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
@@ -32,7 +32,7 @@ from app.web.openapi_parts import (
 )
 from app.web.rendering.display_choice import display_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.press_forms import Reader, page_after, pressed_by_form
+from app.web.routes.press_forms import PressForm, Reader, page_after, pressed_by_form
 
 router = APIRouter()
 
@@ -51,15 +51,21 @@ STATUS: Final[Mapping[str, int]] = {
 INPUTS: Final = {"type": "object", "description": "values by the ids of inputs"}
 
 
-class Press(BaseModel):
+class PressBody(BaseModel):
     """What a client posts as JSON; only `inputs` is needed."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", title="Press")
 
     inputs: Annotated[dict[str, JsonValue], WithJsonSchema(INPUTS)]
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(pattern=EVENT_ID)] | None = None
     at: AwareDatetime | None = None
+
+    def press(self, widget: PressCommand, principal: Principal) -> Press[PressCommand]:
+        """The press of a widget by a client. A press without an id gets one."""
+        at = self.at.timestamp() if self.at else None
+        press_id = self.id or secrets.token_hex(8)
+        return Press(press_id, widget, self.inputs, principal, self.seen or "", at)
 
 
 class Cancel(BaseModel):
@@ -106,22 +112,22 @@ RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
         504: {"model": ReceiptAnswer, "description": "no answer in time"},
     },
     openapi_extra=described_body(
-        Press, {"type": "object", "additionalProperties": TEXT}, required=True
+        PressBody, {"type": "object", "additionalProperties": TEXT}, required=True
     ),
 )
 async def press(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
-    session.presses.widget(widget)
+    command = session.presses.widget(widget)
     who = principal_of(request, state)
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
-        receipt = await receipt_of_press(state, session, who, widget, as_model(Press, json_of(body)))
-        return _answer(request, receipt)
+        pressed = as_model(PressBody, json_of(body)).press(command, who)
+        return _answer(request, await receipt_of_press(state, session, pressed))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        return await pressed_by_form(state, session, who, widget, form_of(body), reader)
+        return await pressed_by_form(state, session, PressForm(command, who, form_of(body), reader))
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
@@ -135,35 +141,34 @@ async def press(
 async def cancel(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
-    session.presses.widget(widget)
+    command = session.presses.widget(widget)
     who = principal_of(request, state)
     body, kind = await body_of(request), kind_of(request)
     form = kind == FORM
-    of = ""
+    press_id = ""
     if form:
-        of = form_of(body).get("_press", "")
+        press_id = form_of(body).get("_press", "")
     elif kind == JSON and body:
-        of = as_model(Cancel, json_of(body)).press
-    if state.limits.admit_cancel(who, session.base, widget, of[:MAX_ID_LENGTH]):
-        receipt = await state.counted(session.presses.cancel(widget, origin_of(who), of))
+        press_id = as_model(Cancel, json_of(body)).press
+    canceling = Press("", command, {}, who)
+    if state.limits.admit_cancel(who, session.base, widget, press_id[:MAX_ID_LENGTH]):
+        receipt = await state.counted(session.presses.cancel(canceling, press_id))
     else:
-        receipt = session.presses.early_refusals.limited(widget, {}, "", "cancel_too_often", shown=form)
+        refusals = session.presses.early_refusals
+        receipt = refusals.limited(canceling, "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
     return _answer(request, receipt)
 
 
 async def receipt_of_press(
-    state: AppState, session: RobotSession, who: Principal, widget: str, given: Press
+    state: AppState, session: RobotSession, press: Press[PressCommand]
 ) -> Receipt:
     """The receipt of a press in JSON, from HTTP or from a WebSocket."""
-    session.presses.widget(widget)
-    press_id = given.id or secrets.token_hex(8)
-    if not state.limits.admit(who):
-        return session.presses.early_refusals.limited(widget, given.inputs, press_id)
-    at = given.at.timestamp() if given.at else None
-    by = session.press_guard.context_for(widget, who, given.seen or "", at)
-    return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
+    if not state.limits.admit(press.principal):
+        return session.presses.early_refusals.limited(press)
+    session.press_guard.receive(press)
+    return await state.counted(session.presses.press(press))
 
 
 def _answer(request: Request, receipt: Receipt) -> Response:
