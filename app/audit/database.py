@@ -163,10 +163,10 @@ class Files:
         """LogGone if a file was removed, renamed or replaced; LogCorrupt if it was emptied."""
         for path, known in self._known.items():
             try:
-                found = _inode(path)
+                inode = _inode(path)
             except OSError:
-                found = None
-            if found != known:
+                inode = None
+            if inode != known:
                 name = os.path.basename(path)
                 raise LogGone(say("log_file_removed", name=name), itself=name == self._main)
         if not os.stat(next(iter(self._known))).st_size:
@@ -178,8 +178,8 @@ def _paths(folder: Path, name: str = NAME) -> list[Path]:
 
 
 def _inode(path: str) -> tuple[int, int]:
-    found = os.stat(path)
-    return found.st_dev, found.st_ino
+    status = os.stat(path)
+    return status.st_dev, status.st_ino
 
 
 def make_room(folder: Path) -> str:

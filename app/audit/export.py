@@ -32,11 +32,11 @@ def csv_chunks(
 ) -> Iterator[bytes]:
     """All entries that match before the entry number `before`, with reasons in a language; LogError."""
     cells = partial(_cells, language)
-    found = rows(folder, wanted, before, ROWS_AT_ONCE)
-    yield "\ufeff".encode() + _csv([FIELDS, *map(cells, found)])
-    while len(found) == ROWS_AT_ONCE:
-        found = rows(folder, wanted, found[-1].entry.seq, ROWS_AT_ONCE)
-        yield _csv(map(cells, found))
+    batch = rows(folder, wanted, before, ROWS_AT_ONCE)
+    yield "\ufeff".encode() + _csv([FIELDS, *map(cells, batch)])
+    while len(batch) == ROWS_AT_ONCE:
+        batch = rows(folder, wanted, batch[-1].entry.seq, ROWS_AT_ONCE)
+        yield _csv(map(cells, batch))
 
 
 def gzipped(pieces: Iterable[bytes]) -> Iterator[bytes]:
@@ -48,10 +48,18 @@ def gzipped(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def _cells(language: str, row: Row) -> tuple[str | int | None, ...]:
-    of = row.entry
-    times = (of.seq, _time(of.at), of.boot, of.monotonic, of.kind, of.of, _time(row.pressed_at))
-    shown = of._replace(reason=of.reason_in(language))
-    return (*times, *(_text(getattr(shown, name)) for name in LATER), _text(of.text))
+    entry = row.entry
+    times = (
+        entry.seq,
+        _time(entry.at),
+        entry.boot,
+        entry.monotonic,
+        entry.kind,
+        entry.of,
+        _time(row.pressed_at),
+    )
+    shown = entry._replace(reason=entry.reason_in(language))
+    return (*times, *(_text(getattr(shown, name)) for name in LATER), _text(entry.text))
 
 
 def _time(ms: int | None) -> str | None:
@@ -65,7 +73,7 @@ def _text(text: str) -> str:
     return f"'{shown}" if shown.startswith(FORMULA) else shown
 
 
-def _csv(found: Iterable[tuple[str | int | None, ...]]) -> bytes:
+def _csv(cells: Iterable[tuple[str | int | None, ...]]) -> bytes:
     text = io.StringIO()
-    csv.writer(text).writerows(found)
+    csv.writer(text).writerows(cells)
     return text.getvalue().encode()

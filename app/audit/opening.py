@@ -53,9 +53,9 @@ class Opening:
 
     def _clear_and_explain(self, head: Head | None) -> TextLike:
         with as_log_error():
-            found = make_room(self._folder)
+            kept = make_room(self._folder)
         gone = say("log_began_after_removal", last=head.seq if head else 0)
-        why = joined([gone, say("log_found_file_kept", name=found) if found else ""])
+        why = joined([gone, say("log_found_file_kept", name=kept) if kept else ""])
         log.error("%s", why)
         return why
 
@@ -64,13 +64,13 @@ class Opening:
 
         `first` in the first entry of a file is that entry's own number: its chain may begin there.
         """
-        found = store.head
-        if not found.count and (self._new_file_reason or found.seq or store.opened_before):
-            why = self._new_file_reason or say("log_began_empty", last=found.seq)
-            return [new_entry("began", values={"first": found.seq + 1}, reason=why)]
-        if head is None or head.seq <= found.seq:
+        newest = store.head
+        if not newest.count and (self._new_file_reason or newest.seq or store.opened_before):
+            why = self._new_file_reason or say("log_began_empty", last=newest.seq)
+            return [new_entry("began", values={"first": newest.seq + 1}, reason=why)]
+        if head is None or head.seq <= newest.seq:
             return []
-        gone = say("log_entries_lost", first=found.seq + 1, last=head.seq)
+        gone = say("log_entries_lost", first=newest.seq + 1, last=head.seq)
         log.error("%s", gone)
         return [new_entry("resumed", reason=gone)]
 

@@ -109,10 +109,10 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
           AND latest IN ('', 'accepted', 'unknown', 'timed_out')
         ORDER BY p.seq DESC
     """
-    found = _fetch(folder, query, {"robot": robot, "since": since, **names})
+    rows = _fetch(folder, query, {"robot": robot, "since": since, **names})
     return [
         OpenPress(Entry(*row[:-4]), outcome, reason, text, bool(accepted))
-        for row in found
+        for row in rows
         for outcome, reason, text, accepted in (row[-4:],)
     ]
 
@@ -135,8 +135,8 @@ def _fetch(
 
 
 def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[str, Any]]:
-    given = {name: value for name, value in asdict(wanted).items() if value not in (None, "")}
-    conditions = [CONDITIONS[name] for name in given if name in CONDITIONS]
+    values = {name: value for name, value in asdict(wanted).items() if value not in (None, "")}
+    conditions = [CONDITIONS[name] for name in values if name in CONDITIONS]
     if not wanted.every:
         conditions.append(CLOSED_CONDITION)
     if before is not None:
@@ -147,7 +147,7 @@ def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[st
         f"SELECT {columns}, p.at FROM entry e LEFT JOIN entry p ON p.seq = e.of {where}"
         " ORDER BY e.seq DESC LIMIT :count"
     )
-    return query, given | {"pattern": _pattern(wanted.text), "before": before, "count": count}
+    return query, values | {"pattern": _pattern(wanted.text), "before": before, "count": count}
 
 
 def _pattern(text: str) -> str:

@@ -41,9 +41,9 @@ class ReadRequest:
 
 
 def parse_request(text: bytes) -> ReadRequest:
-    given = json.loads(text)
-    folder, wanted = Path(given.pop("folder")), Filter(**given.pop("wanted"))
-    return ReadRequest(folder, wanted, **given)
+    fields = json.loads(text)
+    folder, wanted = Path(fields.pop("folder")), Filter(**fields.pop("wanted"))
+    return ReadRequest(folder, wanted, **fields)
 
 
 def parse_rows(text: bytes) -> list[Row]:
@@ -54,15 +54,15 @@ def parse_rows(text: bytes) -> list[Row]:
 def read(request: ReadRequest) -> Iterator[bytes]:
     """The response, in chunks; LogError."""
     if request.count is not None:
-        found = rows(request.folder, request.wanted, request.before, request.count)
-        yield json.dumps([(row.entry, row.pressed_at) for row in found]).encode()
+        matching = rows(request.folder, request.wanted, request.before, request.count)
+        yield json.dumps([(row.entry, row.pressed_at) for row in matching]).encode()
         return
     pieces = csv_chunks(request.folder, request.wanted, request.before, request.language)
     yield from gzipped(pieces) if request.gzip else pieces
 
 
-def main(given: BinaryIO, out: BinaryIO) -> int:
-    request = parse_request(given.read())
+def main(source: BinaryIO, out: BinaryIO) -> int:
+    request = parse_request(source.read())
     with suppress(OSError):  # the unit's filter of system calls may forbid it
         os.nice(NICE_INCREMENT)
     try:

@@ -79,7 +79,7 @@ class RefusalQuota:
     def summary_due(self) -> list[Entry]:
         """The summary entries, one per browser; the counts begin at zero again."""
         suppressed, self._suppressed = self._suppressed, {}
-        return [_entry(one) for one in suppressed.values()]
+        return [_entry(refusals) for refusals in suppressed.values()]
 
     def _buckets(self, origin: HasOrigin) -> tuple[tuple[TokenBuckets, Hashable], ...]:
         return (

@@ -96,8 +96,8 @@ class Store:
     def has_outcome(self, seq: int) -> bool:
         """Whether a press without a known end has an outcome so far."""
         with as_log_error():
-            found = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
-        return bool(found and found[0])
+            row = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
+        return bool(row and row[0])
 
     def remove_old(self, days: float, size_mb: float, now_ms: int) -> bool:
         """Removes some of the oldest entries if they are too old or too many; returns whether it did.

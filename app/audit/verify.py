@@ -120,7 +120,7 @@ class _Chain:
 
 def _values(entry: Entry) -> dict[str, Any]:
     try:
-        found = json.loads(entry.values)
+        values = json.loads(entry.values)
     except ValueError:
         return {}
-    return found if isinstance(found, dict) else {}
+    return values if isinstance(values, dict) else {}

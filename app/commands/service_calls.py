@@ -180,11 +180,11 @@ class ServiceCalls:
 
 
 def field_of(
-    interfaces: Interfaces, type_name: str, given: str | None, usual: str, kind: str
+    interfaces: Interfaces, type_name: str, name: str | None, usual: str, kind: str
 ) -> str | None:
     """The field named in the panel file, else the `usual` one if the type has it with this type."""
-    if given is not None:
-        return given
+    if name is not None:
+        return name
     own = {field.name: str(field.type) for field in interfaces.structures[type_name].fields}
     return usual if own.get(usual) == kind else None
 
@@ -202,9 +202,9 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     return Outcome("rejected", with_reply(say("call_rejected", time=now), reply))
 
 
-def with_reply(said: Text, reply: TextLike) -> Text:
+def with_reply(sentence: Text, reply: TextLike) -> Text:
     """A sentence, followed by the robot's own text if there is one."""
-    return say("with_reply", said=said, reply=reply) if reply else say("with_stop", said=said)
+    return say("with_reply", said=sentence, reply=reply) if reply else say("with_stop", said=sentence)
 
 
 def with_fields(template: str | PanelText, fields: Fields, within: str = "") -> TextLike:
@@ -218,8 +218,8 @@ def with_fields(template: str | PanelText, fields: Fields, within: str = "") -> 
         text = printable(plain_text(value, MAX_VALUE_CHARS, without_terminal_codes))
         return number(text) if isinstance(value, float) else text
 
-    def filled(one: str) -> TextLike:
-        pieces = RESPONSE_PLACEHOLDER.split(one)  # text, path, text, …
+    def filled(text: str) -> TextLike:
+        pieces = RESPONSE_PLACEHOLDER.split(text)  # text, path, text, …
         return together(shown(piece) if n % 2 else piece for n, piece in enumerate(pieces))
 
     if isinstance(template, str):

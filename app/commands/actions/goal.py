@@ -69,8 +69,8 @@ class Goal:
         """Updates feedback text and progress from a feedback message."""
         widget = self.widget
         if widget.progress is not None:
-            found = message.get(FEEDBACK + widget.progress)
-            done = math.nan if found is None else float(found) / widget.progress_max
+            progress = message.get(FEEDBACK + widget.progress)
+            done = math.nan if progress is None else float(progress) / widget.progress_max
             self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         self.feedback_text = with_fields(widget.feedback, message, FEEDBACK)
 
@@ -82,8 +82,8 @@ class Goal:
     @property
     def running_status(self) -> CommandStatus:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
-        said = self.feedback_text
-        text = joined([sentence, said.rstrip() if isinstance(said, str) else said])
+        feedback = self.feedback_text
+        text = joined([sentence, feedback.rstrip() if isinstance(feedback, str) else feedback])
         return CommandStatus(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     @property

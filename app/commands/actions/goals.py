@@ -105,7 +105,7 @@ class GoalTracker:
     def resume(self, goal: Goal) -> None:
         """Tracks a goal that was sent before the server's start; its `cut` is done. Its widget shows it
         unless there is a newer goal."""
-        if any(goal.id == one.id for one in (*self._latest.values(), *self._results.goals)):
+        if any(goal.id == tracked.id for tracked in (*self._latest.values(), *self._results.goals)):
             return
         self._latest.setdefault(goal.widget.id, goal)
         self._results.begin(goal)
@@ -153,7 +153,7 @@ class GoalTracker:
     def _cancel_outcome(self, goal: Goal, response: Any) -> Outcome:
         """Only a goal in `goals_canceling` is being canceled: rclpy refuses with return code 0."""
         now = format_time(time.time())
-        if any(bytes(one.goal_id.uuid) == goal.id.bytes for one in response.goals_canceling):
+        if any(bytes(canceled.goal_id.uuid) == goal.id.bytes for canceled in response.goals_canceling):
             if goal.advance(CANCELING) and (
                 goal.doubt or self._robot.command_status[goal.widget.id].busy
             ):
@@ -212,9 +212,9 @@ class GoalTracker:
         if not goals:
             return
         message = self._decode(names.status(self._robot.key(action)), STATUS, sample)
-        for one in () if message is None else message.status_list:
-            goal = goals.get(bytes(one.goal_info.goal_id.uuid))
-            if goal is not None and goal.advance(one.status):
+        for status in () if message is None else message.status_list:
+            goal = goals.get(bytes(status.goal_info.goal_id.uuid))
+            if goal is not None and goal.advance(status.status):
                 self._advanced(goal)
 
     def _latest_goals(self, action: str) -> Iterator[Goal]:

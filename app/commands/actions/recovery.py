@@ -83,12 +83,12 @@ class GoalRecovery:
     async def _read(self) -> bool:
         since = round((time.time() - LOOK_BACK_S) * 1000)
         try:
-            found = await self._press_log.open_presses(self._widgets, since)
+            presses = await self._press_log.open_presses(self._widgets, since)
         except LogError as error:
             self._show_unreadable(error.text)
             return False
         self._show(IDLE)
-        for open_press, pending in found:
+        for open_press, pending in presses:
             if open_press.code not in FINAL and open_press.reason not in FINAL_SENTENCES:
                 self._resume(open_press, pending)
         return True

@@ -14,24 +14,24 @@ Deflection = tuple[float, float]
 CENTRE: Final[Deflection] = (0.0, 0.0)
 
 
-def moved(of: HoldCommand, before: Deflection, deflection: Deflection) -> Deflection:
+def moved(widget: HoldCommand, before: Deflection, deflection: Deflection) -> Deflection:
     """The deflection in the next message, if `before` was in the last one; none of a key."""
-    if not isinstance(of, Joystick):
+    if not isinstance(widget, Joystick):
         return CENTRE
-    x, y = shaped(of, deflection)
-    step = of.period_s / of.ramp_s if of.ramp_s else math.inf
+    x, y = shaped(widget, deflection)
+    step = widget.period_s / widget.ramp_s if widget.ramp_s else math.inf
     return ramped(before[0], x, step), ramped(before[1], y, step)
 
 
-def shaped(of: Joystick, deflection: Deflection) -> Deflection:
+def shaped(joystick: Joystick, deflection: Deflection) -> Deflection:
     """The deflection limited to the shape. It is zero in the dead zone and begins with zero outside."""
-    x, y = (max(-1.0, min(1.0, one)) for one in deflection)
-    if of.shape == "square":
-        return _beyond(x, of.dead_zone), _beyond(y, of.dead_zone)
+    x, y = (max(-1.0, min(1.0, axis)) for axis in deflection)
+    if joystick.shape == "square":
+        return _beyond(x, joystick.dead_zone), _beyond(y, joystick.dead_zone)
     far = math.hypot(x, y)
-    if far <= of.dead_zone:
+    if far <= joystick.dead_zone:
         return CENTRE
-    factor = _beyond(min(far, 1.0), of.dead_zone) / far
+    factor = _beyond(min(far, 1.0), joystick.dead_zone) / far
     return x * factor, y * factor
 
 
@@ -44,7 +44,7 @@ def ramped(before: float, wanted: float, step: float) -> float:
     return math.copysign(abs(before) + step, wanted)
 
 
-def _beyond(one: float, dead_zone: float) -> float:
-    if abs(one) <= dead_zone:
+def _beyond(axis: float, dead_zone: float) -> float:
+    if abs(axis) <= dead_zone:
         return 0.0
-    return math.copysign((abs(one) - dead_zone) / (1 - dead_zone), one)
+    return math.copysign((abs(axis) - dead_zone) / (1 - dead_zone), axis)

@@ -76,9 +76,9 @@ async def _each(
 ) -> dict[str, Any]:
     """The response by parameter name. If one of several is undeclared, rclcpp returns none, so they are
     requested one by one."""
-    found = await ask(names)
-    if len(found) == len(names):
-        return dict(zip(names, found, strict=True))
+    response = await ask(names)
+    if len(response) == len(names):
+        return dict(zip(names, response, strict=True))
     if len(names) == 1:
         return {}
     each: dict[str, Any] = {}

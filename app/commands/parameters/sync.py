@@ -146,8 +146,10 @@ class ParameterSync:
             node.query_needed.set()
 
     def _apply_event(self, node: Node, event: Any, wall: float) -> None:
-        redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
-        changed = {one.name: one.value for one in event.changed_parameters}
+        redeclared = {
+            parameter.name for parameter in (*event.new_parameters, *event.deleted_parameters)
+        }
+        changed = {parameter.name: parameter.value for parameter in event.changed_parameters}
         node.event_values |= {
             w.parameter: changed[w.parameter] for w in node.widgets if w.parameter in changed
         }
@@ -204,8 +206,8 @@ class ParameterSync:
         values |= node.event_values  # newer than the query
         for widget in node.widgets:
             name = widget.parameter
-            found = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
-            self._known.set(widget, found)
+            state = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
+            self._known.set(widget, state)
         self._changed()
         live = all(self._known.state(widget).state == "live" for widget in node.widgets)
         return "whole" if live else "partly"
@@ -226,9 +228,9 @@ class ParameterSync:
 
     # Setting.
 
-    def check_value(self, widget: Parameter, given: Any) -> Value:
+    def check_value(self, widget: Parameter, entered: Any) -> Value:
         """The value to set; InputError with the label and the limits."""
-        return check_value(widget, self._known.state(widget), given)
+        return check_value(widget, self._known.state(widget), entered)
 
     async def set(self, widget: Parameter, value: Value, handle: PressHandle) -> Outcome:
         """Sets a parameter by a service call, then queries the node, whatever the outcome."""

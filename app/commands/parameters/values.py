@@ -25,57 +25,62 @@ from app.robot.parameter_state import (
 WHOLE: Final = re.compile(r"-?(0|[1-9][0-9]{0,18})", re.ASCII)
 
 
-def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Value:
+def check_value(parameter: Parameter, known: ParameterState, entered: Any) -> Value:
     """The value to set; InputError with the label and the limits."""
     if parameter.options:
-        given = _chosen(parameter, given)
+        entered = _chosen(parameter, entered)
     if not parameter.is_list:
-        return _one(parameter, known, parameter.label, given)
-    several = _several(parameter, known, given)
-    if len(several) > MAX_LIST_LENGTH:
+        return _scalar(parameter, known, parameter.label, entered)
+    elements = _elements(parameter, known, entered)
+    if len(elements) > MAX_LIST_LENGTH:
         raise InputError(
             say(
                 "parameter_list_too_long",
                 label=parameter.label,
                 most=MAX_LIST_LENGTH,
-                count=len(several),
+                count=len(elements),
             )
         )
     named = (
-        say("parameter_list_element", label=parameter.label, number=i + 1) for i in range(len(several))
+        say("parameter_list_element", label=parameter.label, number=i + 1) for i in range(len(elements))
     )
-    return tuple(_one(parameter, known, name, one) for name, one in zip(named, several, strict=True))
+    return tuple(
+        _scalar(parameter, known, name, element) for name, element in zip(named, elements, strict=True)
+    )
 
 
-def _chosen(parameter: Parameter, given: Any) -> Any:
+def _chosen(parameter: Parameter, entered: Any) -> Any:
     """The value of an option, given by its value or its key."""
-    option = parameter.find_option(given) or next(
-        (one for one in parameter.options if one.key == given), None
+    option = parameter.find_option(entered) or next(
+        (choice for choice in parameter.options if choice.key == entered), None
     )
     if option is None:
-        options = tuple(one.label for one in parameter.options)
+        options = tuple(choice.label for choice in parameter.options)
         raise InputError(
             say(
-                "input_not_an_option", label=parameter.label, options=options, given=format_value(given)
+                "input_not_an_option",
+                label=parameter.label,
+                options=options,
+                given=format_value(entered),
             )
         )
     return option.value
 
 
-def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[Any]:
+def _elements(parameter: Parameter, known: ParameterState, entered: Any) -> list[Any]:
     """The elements of a list: from text with commas, or from a program's list."""
-    if isinstance(given, list):
-        return given
+    if isinstance(entered, list):
+        return entered
     try:
-        if not isinstance(given, str) or len(given) > MAX_TEXT:
+        if not isinstance(entered, str) or len(entered) > MAX_TEXT:
             raise ValueError
         if parameter.is_number_list:  # of a program: pages send JSON's own lists
-            return list(read_numbers(given, ENGLISH, whole=parameter.is_whole))
-        return [_entered(parameter, text) for text in split_list(given)]
+            return list(read_numbers(entered, ENGLISH, whole=parameter.is_whole))
+        return [_entered(parameter, text) for text in split_list(entered)]
     except ValueError:
         text = limits_text(parameter, allowed_range(parameter, known))
         raise InputError(
-            say("parameter_not_a_list", label=parameter.label, limits=text, given=format_value(given))
+            say("parameter_not_a_list", label=parameter.label, limits=text, given=format_value(entered))
         ) from None
 
 
@@ -89,65 +94,65 @@ def _entered(parameter: Parameter, text: str) -> Any:
 
 
 def _words(text: TextLike) -> list[str]:
-    return [one.lower() for one in each_language(text).values()]
+    return [word.lower() for word in each_language(text).values()]
 
 
-def _one(parameter: Parameter, known: ParameterState, label: TextLike, given: Any) -> Scalar:
+def _scalar(parameter: Parameter, known: ParameterState, label: TextLike, entered: Any) -> Scalar:
     match parameter.element_type:
         case "bool":
-            if isinstance(given, bool):
-                return given
+            if isinstance(entered, bool):
+                return entered
             raise InputError(
                 say(
                     "input_not_a_boolean",
                     label=label,
                     on=parameter.on,
                     off=parameter.off,
-                    given=format_value(given),
+                    given=format_value(entered),
                 )
             )
         case "string":
-            if isinstance(given, str) and len(given) <= MAX_TEXT:
-                return given
-            text = format_value(given)
+            if isinstance(entered, str) and len(entered) <= MAX_TEXT:
+                return entered
+            text = format_value(entered)
             raise InputError(say("parameter_not_a_text", label=label, most=MAX_TEXT, given=text))
-    return _number(parameter, known, label, given)
+    return _number(parameter, known, label, entered)
 
 
-def _number(parameter: Parameter, known: ParameterState, label: TextLike, given: Any) -> int | float:
+def _number(parameter: Parameter, known: ParameterState, label: TextLike, entered: Any) -> int | float:
     limits = allowed_range(parameter, known)
     text = each_text(parameter, limits)
-    if given == "" or given is None:
+    if entered == "" or entered is None:
         raise InputError(say("input_number_empty", label=label, limits=text))
-    value = _whole(given) if parameter.element_type == "integer" else _double(given)
+    value = _whole(entered) if parameter.element_type == "integer" else _double(entered)
     if value is None:
-        raise InputError(no_number(label, text, given, whole=parameter.is_whole))
-    for one in (limits, known.range):
-        if not one.contains(value):
-            text = each_text(parameter, one)
+        raise InputError(no_number(label, text, entered, whole=parameter.is_whole))
+    for allowed in (limits, known.range):
+        if not allowed.contains(value):
+            text = each_text(parameter, allowed)
             raise InputError(
                 say("input_outside_limits", label=label, limits=text, given=parameter.value_text(value))
             )
     return value
 
 
-def _whole(given: Any) -> int | None:
+def _whole(entered: Any) -> int | None:
     """An int64, given as a number, or as text beyond the exact range of a browser's numbers."""
-    if isinstance(given, str) and WHOLE.fullmatch(given):
-        given = int(given)
-    if isinstance(given, float) and given.is_integer():
-        given = int(given)
-    if isinstance(given, bool) or not isinstance(given, int):
+    if isinstance(entered, str) and WHOLE.fullmatch(entered):
+        entered = int(entered)
+    if isinstance(entered, float) and entered.is_integer():
+        entered = int(entered)
+    if isinstance(entered, bool) or not isinstance(entered, int):
         return None
     low, high = INTEGER_RANGES["int64"]
-    return given if low <= given <= high else None
+    return entered if low <= entered <= high else None
 
 
-def _double(given: Any) -> float | None:
-    if isinstance(given, bool) or not isinstance(given, int | float):
+def _double(entered: Any) -> float | None:
+    if isinstance(entered, bool) or not isinstance(entered, int | float):
         return None
     try:
-        value = float(given)
+        value = float(entered)
     except OverflowError:
         return None
     return value if math.isfinite(value) else None

@@ -87,10 +87,10 @@ class Wanted(BaseModel):
 
     def query(self, before: int | None = None) -> str:
         """The same filter as the query of an address."""
-        given = {k: v for k, v in self.model_dump(exclude={"before"}).items() if v}
+        fields = {k: v for k, v in self.model_dump(exclude={"before"}).items() if v}
         if before is not None:
-            given["before"] = before
-        return urlencode(given)
+            fields["before"] = before
+        return urlencode(fields)
 
 
 class LogContext(TypedDict):
@@ -245,11 +245,11 @@ def _shown(row: Row, language: str) -> Row:
     return replace(row, entry=Entry._make(cells))
 
 
-def _ms(name: str, given: str, fold: int = 0) -> int | None:
+def _ms(name: str, text: str, fold: int = 0) -> int | None:
     """`fold` is which of two times, where the clock shows a time twice: 1 for the later."""
-    if not given:
+    if not text:
         return None
     try:
-        return int(datetime.fromisoformat(given).replace(fold=fold).timestamp() * 1000)
+        return int(datetime.fromisoformat(text).replace(fold=fold).timestamp() * 1000)
     except (ValueError, OverflowError, OSError):
-        raise InputError(f'{name}: "{given}" is no time: it must be like 2026-11-21T10:00') from None
+        raise InputError(f'{name}: "{text}" is no time: it must be like 2026-11-21T10:00') from None

@@ -19,7 +19,10 @@ BODY: Final = {
     "type": "object",
     "properties": {
         "page": {**TEXT, "description": "the path of the panel's page to go back to; without one, /"},
-        **{name: {**TEXT, "description": f"one of {', '.join(of)}"} for name, of in CHOICES.items()},
+        **{
+            name: {**TEXT, "description": f"one of {', '.join(values)}"}
+            for name, values in CHOICES.items()
+        },
         LANGUAGE: {**TEXT, "description": "one of the panel's languages, such as en"},
     },
     "additionalProperties": TEXT,
@@ -36,13 +39,13 @@ BODY: Final = {
 )
 async def choose(request: Request, state: CurrentState) -> Response:
     """Keeps each choice that the form has; the others stay. Back to the form's `page`."""
-    given = form_of(await body_of(request))
-    page = given.get("page", "").removeprefix(state.root)
+    form = form_of(await body_of(request))
+    page = form.get("page", "").removeprefix(state.root)
     back = state.root + (page if OWN_PAGE.fullmatch(page) else "/")
     answer = RedirectResponse(back, status_code=303)
     known = {**CHOICES, LANGUAGE: state.fleet.panel.readers_languages}
     for name, values in known.items():
-        if given.get(name) in values:
+        if form.get(name) in values:
             cookie, path = COOKIE.format(name), state.root or "/"
-            answer.set_cookie(cookie, given[name], max_age=KEPT_S, path=path, samesite="strict")
+            answer.set_cookie(cookie, form[name], max_age=KEPT_S, path=path, samesite="strict")
     return answer

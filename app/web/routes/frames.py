@@ -93,11 +93,11 @@ async def frames(socket: WebSocket, widget: str, state: CurrentState, session: C
 async def _next(feed: Feed, camera: Camera, after: int) -> tuple[Frame, Picture]:
     """The next frame that can be shown."""
     while True:
-        found = await feed.newer(after)
+        frame = await feed.newer(after)
         try:
-            return found, await feed.picture(found, camera)
+            return frame, await feed.picture(frame, camera)
         except NoPicture:
-            after = found.number
+            after = frame.number
             await asyncio.sleep(BAD_PAUSE_S)
 
 

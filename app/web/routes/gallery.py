@@ -29,10 +29,10 @@ LINKS: Final = (("server", "ok", "ok"), ("bridge", "wait", "pending"), ("robot",
 @router.get("/gallery", response_class=HTMLResponse)
 async def gallery(request: Request, state: CurrentState) -> Response:
     """The query may have a `theme`, a `text_size` and a `hand`, as the menu has them."""
-    given = {
+    chosen = {
         name: value for name, value in request.query_params.items() if value in CHOICES.get(name, ())
     }
-    display = display_of(request, state.fleet.panel)._replace(**given)
+    display = display_of(request, state.fleet.panel)._replace(**chosen)
     language = language_of(request)
     cell = state.templates.environment(language).get_template("_cell.html")
     numbers, words = count(), _words()
@@ -47,12 +47,17 @@ async def gallery(request: Request, state: CurrentState) -> Response:
             (
                 part.title,
                 part.columns,
-                [(one.title, _html(one, next(numbers), cell, words)) for one in part.examples],
+                [
+                    (example.title, _html(example, next(numbers), cell, words))
+                    for example in part.examples
+                ],
             )
             for part in PARTS
         ],
-        states=[{"state": one, "text": say(f"state_{one}")} for one in STATES],
-        links={name: {"name": say(name), "state": of, "text": say(text)} for name, of, text in LINKS},
+        states=[{"state": word, "text": say(f"state_{word}")} for word in STATES],
+        links={
+            name: {"name": say(name), "state": lamp, "text": say(text)} for name, lamp, text in LINKS
+        },
         words=words,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
@@ -98,4 +103,4 @@ def _html(example: Example, number: int, cell: Template, words: dict[str, Any]) 
 def _urls(choice: Choice, display: Display) -> list[str]:
     """The address of each option of a choice, with the others as they are."""
     now = display._asdict()
-    return [f"?{urlencode(now | {choice['name']: one['value']})}" for one in choice["options"]]
+    return [f"?{urlencode(now | {choice['name']: option['value']})}" for option in choice["options"]]

@@ -53,11 +53,11 @@ async def lines(
     search: Text = "",
     after: Annotated[int, Query(ge=0)] = 0,
 ) -> Lines:
-    of = session.panel.widget(widget, LogView)
-    wanted = wanted_lines(of, level or of.level, node or of.node, search)
-    kept = session.robot.log_lines[session.robot.key(of.topic)]
-    found = await kept.find(wanted, after, of.lines)
+    view = session.panel.widget(widget, LogView)
+    wanted = wanted_lines(view, level or view.level, node or view.node, search)
+    kept = session.robot.log_lines[session.robot.key(view.topic)]
+    result = await kept.find(wanted, after, view.lines)
     language = language_of(request)
-    note = render(say("rosout_left_out", number=found.left_out), language) if found.left_out else ""
-    said = [LogLine.model_validate(line_values(*one, language)) for one in found.lines]
-    return Lines(lines=said, left_out=found.left_out, note=note, last=found.last)
+    note = render(say("rosout_left_out", number=result.left_out), language) if result.left_out else ""
+    shown = [LogLine.model_validate(line_values(*line, language)) for line in result.lines]
+    return Lines(lines=shown, left_out=result.left_out, note=note, last=result.last)

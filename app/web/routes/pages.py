@@ -58,10 +58,10 @@ async def first_page(request: Request, state: CurrentState) -> Response:
 async def named_page(page: str, request: Request, state: CurrentState) -> Response:
     if away := _to_a_robot(request, state, f"/pages/{page}"):
         return away
-    found = state.fleet.panel.page(page)
-    if found is None:
+    shown = state.fleet.panel.page(page)
+    if shown is None:
         raise NotFound(say("page_missing", page=page[:64]))
-    return _render(request, state, found)
+    return _render(request, state, shown)
 
 
 async def compiled(templates: Environment) -> None:

@@ -62,9 +62,9 @@ async def trend(
     points: Annotated[int, Query(ge=10, le=1000, description="how many columns")] = 300,
     since: Annotated[int, Query(ge=0, le=2**53, description="the first column that is asked for")] = 0,
 ) -> Response:
-    found = session.panel.widget(widget, Trend)
-    if span_s > found.keep_s:
-        raise InputError(f"span_s is {span_s:g}: this trend keeps {found.keep_s} s")
+    trend = session.panel.widget(widget, Trend)
+    if span_s > trend.keep_s:
+        raise InputError(f"span_s is {span_s:g}: this trend keeps {trend.keep_s} s")
     now = time.time()
     history = session.robot.history
     history.set_clock(time.monotonic(), now)
@@ -80,7 +80,7 @@ async def trend(
         "offset": shown_offset(until - span_s, until),
     }
     pens = []
-    for pen in found.pens:
+    for pen in trend.pens:
         columns = pen_columns(session.robot, pen, begin, until, width)
         pens.append(json.dumps(list(_compact(columns)), separators=(",", ":")))
         await asyncio.sleep(0)  # each pen takes some milliseconds
@@ -98,13 +98,13 @@ async def _packed(body: bytes, gzipped: bool) -> Response:
 
 
 def _compact(columns: Sequence[Column]) -> Iterator[list[float] | None]:
-    for one in columns:
-        if one.gap:
+    for column in columns:
+        if column.gap:
             yield None
-        if one.low == one.high:
-            yield [one.number, _short(one.last)]
+        if column.low == column.high:
+            yield [column.number, _short(column.last)]
         else:
-            yield [one.number, _short(one.low), _short(one.high), _short(one.last)]
+            yield [column.number, _short(column.low), _short(column.high), _short(column.last)]
 
 
 def _short(value: float) -> float:
