@@ -170,13 +170,12 @@ class Panel(Description):
 
     @cached_property
     def uniform_buttons(self) -> Mapping[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]:
-        """Buttons that publish, by their interlocks and whether they need control: these and the graph
-        decide whether they lock, and the lock is all that is shown of them. So many of them are judged
-        and shown as one."""
+        """Buttons that publish, by their interlocks and whether they stop: these and the graph decide
+        whether they lock, the lock is all that is shown of them, and many are judged as one."""
         groups: dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]] = {}
         for widget in self.commands:
             if isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time):
-                key = widget.interlocks, widget.needs_control
+                key = widget.interlocks, widget.role == "stop"
                 groups[key] = (*groups.get(key, ()), widget)
         return groups
 

@@ -15,6 +15,7 @@ from app.i18n import TextLike
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
+from app.panel.widgets.templated import needs_control
 from app.permission.interlocks import (
     LINK_CODES,
     blocked_buttons,
@@ -78,7 +79,7 @@ def _log(request: PermissionRequest) -> Verdict | None:
 
 def _control(request: PermissionRequest) -> Verdict:
     verdict = request.grounds.control
-    return verdict if verdict.permitted or request.widget.needs_control else WITHOUT_CONTROL
+    return verdict if verdict.permitted or needs_control(request.widget) else WITHOUT_CONTROL
 
 
 CHECKS: Final = (

@@ -1,12 +1,9 @@
-"""Who presses: a client, the user who is logged in there, and the user's role."""
+"""Who presses: a client, and the user who is logged in there."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 from app.i18n import TextLike, render
 from app.permission.clients import Client
-
-UserRole = Literal["operator"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,12 +11,11 @@ class Principal:
     """Who asks for something: permissions, limits and log entries are per principal.
 
     `client` is the browser or program. `user` is the name of the user who is logged in, "" while there
-    are no users; then everyone is an operator.
+    are no users.
     """
 
     client: Client
     user: str = ""
-    role: UserRole = "operator"
 
     @property
     def name(self) -> TextLike:

@@ -1,9 +1,9 @@
 """The latest view with a version, and the events that bring a browser from one to another.
 
 There is no queue: a stream keeps the view that it sent last and, when it can send, gets the difference
-to the newest. There is a view for each role in control. Events are encoded once for all streams of a
-reader and a role: streams at the same version share the bytes of the difference, all others those of
-each event that carries a whole section.
+to the newest. There is a view for each audience. Events are encoded once for all streams of an audience
+that show the same page: streams at the same version share the bytes of the difference, all others those
+of each event that carries a whole section.
 
 A page gets the attributes of its own widgets and of the frame's, with their locks, but not the
 interlocks behind them. A client that names no page gets everything.
@@ -18,10 +18,11 @@ from pydantic_core import to_json
 
 from app.i18n import ENGLISH, localized
 from app.permission.control_authority_view import Role
+from app.view.audience import EVERYONE, Audience
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
 from app.view.sections import PERMISSION_EVENT, Events, difference
-from app.view.view import View, for_role
+from app.view.view import View, for_audience
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
 NO_PAGES: Final[Mapping[str, Collection[str]]] = {}
@@ -38,14 +39,14 @@ def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
     return text
 
 
-class Reader(NamedTuple):
-    """What a client reads: the language, and the page that it shows; "" for the widgets of all."""
+class Variant(NamedTuple):
+    """What is encoded for some streams: the audience, the audience that the stream had before, the
+    version that it sent last, and the page that it shows; "" for the widgets of all pages."""
 
-    language: str = ENGLISH
-    page: str = ""
-
-
-EVERYTHING: Final = Reader()
+    audience: Audience
+    before: Audience
+    version: int
+    page: str
 
 
 class ViewPublisher:
@@ -70,11 +71,9 @@ class ViewPublisher:
         self._changed = asyncio.Event()
         self._latest_events: Events = {}  # from the view before to this one
         self._without_control = without_control
-        self._readers: dict[Reader, Reader] = {}
-        self._by_role: dict[Role, View] = {}
-        self._snapshots: dict[tuple[Reader, Role], bytes] = {}
-        # By the reader, the version before, and the roles then and now.
-        self._prepared: dict[tuple[Reader, int, Role, Role], bytes] = {}
+        self._views: dict[tuple[bool, Role], View] = {}  # by the audience without its language
+        self._snapshots: dict[tuple[Audience, str], bytes] = {}  # by the audience and the page
+        self._prepared: dict[Variant, bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._lock_changes: dict[str, int] = {}
         self.closed = False
@@ -94,7 +93,7 @@ class ViewPublisher:
             if "enabled" in changed:
                 self._lock_changes[widget] = self.version
         self.view, self._latest_events, self._without_control = view, events, without_control
-        self._by_role, self._snapshots, self._prepared, self._whole = {}, {}, {}, {}
+        self._views, self._snapshots, self._prepared, self._whole = {}, {}, {}, {}
         self.heartbeat.beat_early()
         self._wake()
 
@@ -116,45 +115,50 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def reader(self, language: str, page: str = "") -> Reader:
-        """A reader of a page's widgets; of all widgets if the panel does not have that page. It is one
-        object for all that read the same: with 300 streams, one each would take 4 % more CPU time."""
-        reader = Reader(language, page if page in self._pages else "")
-        return self._readers.setdefault(reader, reader)
+    def shown_page(self, page: str) -> str:
+        """The page whose widgets a client gets; "" for those of all if the panel does not have it."""
+        return page if page in self._pages else ""
 
-    def for_role(self, role: Role = "") -> View:
-        """The newest view for clients of this role."""
-        if not role:
+    def for_audience(self, audience: Audience = EVERYONE) -> View:
+        """The newest view for an audience."""
+        if not audience.role:
             return self.view
-        if role not in self._by_role:
-            self._by_role[role] = for_role(self.view, self._without_control, role)
-        return self._by_role[role]
+        key = audience.has_control, audience.role
+        if key not in self._views:
+            self._views[key] = for_audience(self.view, self._without_control, audience)
+        return self._views[key]
 
-    def snapshot(self, reader: Reader = EVERYTHING, role: Role = "") -> bytes:
+    def snapshot(self, audience: Audience = EVERYONE, page: str = "") -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        key = reader, role
+        key = audience, page
         if key not in self._snapshots:
-            view = self.for_role(role)
-            whole = {**view, "widgets": self._of_page(view["widgets"], reader.page)}
+            view = self.for_audience(audience)
+            whole = {**view, "widgets": self._of_page(view["widgets"], page)}
             about = {"id": self.id, "revision": self.revision}
-            self._snapshots[key] = self._event("snapshot", {**about, **whole}, reader.language)
+            self._snapshots[key] = self._event("snapshot", {**about, **whole}, audience.language)
         return self._snapshots[key]
 
     def events_since(
-        self, version: int, view: View, reader: Reader = EVERYTHING, was: Role = "", role: Role = ""
+        self,
+        version: int,
+        view: View,
+        audience: Audience = EVERYONE,
+        page: str = "",
+        before: Audience | None = None,
     ) -> bytes:
         """The events that bring a page from `view`, which was posted as `version` and sent to a client
-        of the role `was`, to the newest view for `role`."""
-        key = reader, version, was, role
+        of the audience `before` (None: the same), to the newest view for `audience`."""
+        before = before or audience
+        key = Variant(audience, before, version, page)
         prepared = self._prepared.get(key)
         if prepared is None:
-            latest = version == self.version - 1 and not (was or role)
-            events = self._latest_events if latest else difference(view, self.for_role(role))
+            latest = version == self.version - 1 and not (before.role or audience.role)
+            events = self._latest_events if latest else difference(view, self.for_audience(audience))
             prepared = self._prepared[key] = b"".join(
-                self._event(name, data, reader.language)
+                self._event(name, data, audience.language)
                 if name in ("update", "updates")
-                else self._shared_event(name, data, reader.language)
-                for name, data in self._shown(events, reader.page).items()
+                else self._shared_event(name, data, audience.language)
+                for name, data in self._shown(events, page).items()
             )
         return prepared
 

@@ -12,12 +12,12 @@ from typing import Any, Final, NamedTuple, TypedDict
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
-from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
-from app.permission.control_authority_view import for_role as control_for_role
+from app.permission.control_authority_view import NO_CONTROL, ControlView, for_role
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import NO_CONDITIONS, ServerConditions, permissions
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
+from app.view.audience import Audience
 from app.view.kinds import Attributes, AttributesUntil, Enabled, attributes_of, enabled
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 from app.view.robot_state import UNKNOWN, RobotWord, robot_word
@@ -194,15 +194,16 @@ def update_displays(
     return current._replace(view=view, displays=untils, failures=failures)
 
 
-def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:
-    """The view for clients of this role; without control, commands are locked."""
+def for_audience(view: View, without_control: Mapping[str, Attributes], audience: Audience) -> View:
+    """The view for an audience; without control, commands are locked."""
+    role = audience.role
     if not role:
         return view
     if role == "embedded":
         widgets = {name: _embedded(attributes) for name, attributes in view["widgets"].items()}
         return {**view, "control": {**NO_CONTROL, "role": role}, "widgets": widgets}
-    control = control_for_role(view["control"], role)
-    if role in IN_CONTROL:
+    control = for_role(view["control"], role)
+    if audience.has_control:
         return {**view, "control": control}
     return {**view, "control": control, "widgets": {**view["widgets"], **without_control}}
 

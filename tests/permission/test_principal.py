@@ -11,7 +11,7 @@ CLIENT = Clients().identify("1" * 32, "192.0.2.1")
 
 def test_without_users_a_principal_is_its_client() -> None:
     who = Principal(CLIENT)
-    assert (who.user, who.role) == ("", "operator")
+    assert who.user == ""
     assert (who.name, who.title, str(who)) == (CLIENT.name, CLIENT.title, str(CLIENT))
 
 

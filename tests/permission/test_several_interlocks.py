@@ -10,7 +10,8 @@ from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.press_permission import combined, judged
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
-from app.view.view import ViewContext, build_view, for_role
+from app.view.audience import audience
+from app.view.view import ViewContext, build_view, for_audience
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
 from tests.commands.test_holds import Bench as HoldBench
 from tests.commands.test_presses import Bench as PressBench
@@ -141,7 +142,7 @@ def test_without_control_that_is_the_only_reason() -> None:
     control: ControlView = {**NO_CONTROL, "required": True, "text": "Not in control."}
     lock = Verdict(False, "control_free", "Not in control.")
     built = build_view(panel, robot, NOW, ViewContext(control=control, control_lock=lock))
-    view = for_role(built.view, built.without_control, "free")
+    view = for_audience(built.view, built.without_control, audience("free"))
     assert view["widgets"]["guarded"] == {
         "enabled": False, "reason": "Not in control.", "reasons": "Not in control.", "more": "",
     }  # fmt: skip

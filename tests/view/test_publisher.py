@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from app.i18n import ENGLISH, localized
+from app.i18n import localized
 from app.i18n.catalogue import catalogues_in
 from app.printable import printable
 from app.robot.state import RobotState
+from app.view.audience import audience
 from app.view.publisher import ViewPublisher
 from app.view.view import View, ViewContext, build_view
 from tests.support.builders import GUARDED, NOW, panel_of, permits, robot_there, says, small_panel
@@ -94,22 +95,20 @@ def test_only_changed_attributes_of_a_widget_are_sent(
 def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
     pages = {"one": {"guarded"}, "two": {"heard"}}
     publisher = ViewPublisher(view_of(robot), "r1", pages=pages)
-    readers = {page: publisher.reader(ENGLISH, page) for page in ("one", "two", "")}
-    snapshots = {
-        page: events(publisher.snapshot(reader))["snapshot"] for page, reader in readers.items()
-    }
+    shown = ("one", "two", "")
+    snapshots = {page: events(publisher.snapshot(page=page))["snapshot"] for page in shown}
     assert {page: set(snapshots[page]["widgets"]) for page in pages} == pages
     assert set(snapshots[""]["widgets"]) == set(publisher.view["widgets"])
-    assert publisher.reader(ENGLISH, "gone") == readers[""]
+    assert [publisher.shown_page(page) for page in ("one", "gone")] == ["one", ""]
     old = publisher.view
     says(robot, "/heard", "one")
     publisher.post(view_of(robot))
-    sent = {page: events(publisher.events_since(1, old, reader)) for page, reader in readers.items()}
+    sent = {page: events(publisher.events_since(1, old, page=page)) for page in shown}
     assert sent["one"] == {}
     assert set(sent["two"]["update"]) == set(sent[""]["update"]) == {"heard"}
     permits(robot)
     publisher.post(view_of(robot))
-    late = events(publisher.events_since(1, old, readers["one"]))
+    late = events(publisher.events_since(1, old, page="one"))
     assert set(late["update"]) == {"guarded"}
     assert "operation-enabled-updated" not in late  # it shows that in its keys and its frame
 
@@ -120,7 +119,7 @@ def test_keys_change_before_the_frame_around_them_on_a_page_too(robot: RobotStat
     permits(robot)
     publisher.post(view_of(robot))
     for page in ("one", ""):
-        sent = list(events(publisher.events_since(1, old, publisher.reader(ENGLISH, page))))
+        sent = list(events(publisher.events_since(1, old, page=page)))
         permission = [] if page else ["operation-enabled-updated"]
         assert sent == [*permission, "update", "link"], page
 
@@ -229,13 +228,13 @@ def test_each_language_has_events_of_its_own_encoded_once(
     permits(robot)
     publisher.post(view_of(robot))
     with catalogues_in(tmp_path):
-        reader = publisher.reader("de")
-        german, sent = publisher.events_since(1, old, reader), publisher.events_since(1, old)
+        readers = audience("", "de")
+        german, sent = publisher.events_since(1, old, readers), publisher.events_since(1, old)
         assert events(german)["link"]["node"]["locks"] == "Sperrt nichts."
-        assert events(publisher.snapshot(reader))["snapshot"]["link"] == events(german)["link"]
+        assert events(publisher.snapshot(readers))["snapshot"]["link"] == events(german)["link"]
         assert events(sent)["link"]["node"]["locks"] == "Locks nothing."
         assert events(sent) == events(publisher.events_since(1, old))
-        assert publisher.events_since(1, old, reader) is german
+        assert publisher.events_since(1, old, readers) is german
 
 
 def test_subscriber_that_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:
@@ -314,7 +313,7 @@ def test_a_lock_of_many_buttons_is_sent_once_to_a_page() -> None:
         old = mine.view
         permits(robot)
         mine.post(build_view(panel, robot, NOW).view)
-        chunk = mine.events_since(1, old, mine.reader(ENGLISH, panel.pages[0].id))
+        chunk = mine.events_since(1, old, page=panel.pages[0].id)
         lock = {"enabled": True, "reason": None}
         sent = events(chunk)
         assert sent["updates"] == {

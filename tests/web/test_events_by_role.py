@@ -7,12 +7,13 @@ from typing import Any
 
 import pytest
 
+from app.i18n import ENGLISH
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients
 from app.permission.control_authority import ControlAuthority
-from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.view import publisher as module
+from app.view.audience import Audience, audience, audience_of
 from app.view.publisher import ViewPublisher
 from app.view.view import ViewContext, ViewWithDeadlines, build_view
 from app.web.metrics import Open
@@ -62,7 +63,10 @@ class Room:
     async def stream(self, number: int, until: AsyncExitStack) -> Client:
         client, who = Client(), self.who(number)
         stream = EventStream(
-            self.publisher, b"", Open(), role=lambda: role(self.publisher.view["control"], who, RULES)
+            self.publisher,
+            b"",
+            Open(),
+            audience=lambda: audience_of(who, self.publisher.view["control"], RULES, ENGLISH),
         )
         task = asyncio.create_task(stream(SCOPE, client.receive, client.send))
 
@@ -138,5 +142,9 @@ def test_500_streams_share_encoded_events(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_without_control_in_the_panel_file_all_streams_are_one() -> None:
     room = Room()
-    assert room.publisher.for_role("") is room.publisher.view
-    assert room.publisher.for_role("held") is room.publisher.for_role("held")
+    publisher = room.publisher
+    assert publisher.for_audience() is publisher.view
+    held = audience("held", "de")
+    assert held == Audience(has_control=False, role="held", language="de")
+    assert publisher.for_audience(held) is publisher.for_audience(audience("held", "ja"))
+    assert audience("asked").has_control

@@ -220,11 +220,6 @@ class Command(BaseWidget):
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
 
-    @property
-    def needs_control(self) -> bool:
-        """Whether only a client in control may press it, if the panel requires control."""
-        return True
-
     def sources(self) -> Iterator[TopicSource]:
         """The topics whose values it needs, beside its interlocks'."""
         yield from ()

@@ -8,18 +8,13 @@ from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.widgets.families import CheckContext, KeyCommand, PressCommand, SentMessage
+from app.panel.widgets.families import CheckContext, Command, KeyCommand, PressCommand, SentMessage
 
 
 class TemplateCommand(KeyCommand, PressCommand):
     """A press that sends a filled template of one type."""
 
     template_key: ClassVar[str]  # the key that holds the template
-
-    @property
-    def needs_control(self) -> bool:
-        """Stopping never needs control."""
-        return self.role != "stop"
 
     @property
     @abstractmethod
@@ -46,3 +41,9 @@ class TemplateCommand(KeyCommand, PressCommand):
     def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         """Faults of the keys about the response."""
         yield from ()
+
+
+def needs_control(widget: Command) -> bool:
+    """Whether only a client in control may press or hold it, if the panel requires control: all but a
+    press that stops."""
+    return not (isinstance(widget, TemplateCommand) and widget.role == "stop")

@@ -16,10 +16,10 @@ from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike
 from app.panel.layout import Page
 from app.panel.model import Panel
-from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
+from app.view.audience import audience, audience_of
 from app.view.sections import SECTIONS, Section
 from app.view.view import View
 from app.web.app_state import AppState
@@ -80,11 +80,12 @@ def page_context(
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     again |= {EMBED: 1} if embedded else {}
-    now_role = role(publisher.view["control"], who, rules)
-    if only_shows(session.panel.embed, embedded):
-        now_role = "embedded"
     now, wall = clock.server_now(), time.time()
     panel, language = state.fleet.panel, language_of(request)
+    if only_shows(session.panel.embed, embedded):
+        of_client = audience("embedded", language)
+    else:
+        of_client = audience_of(who, publisher.view["control"], rules, language)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     data = {
@@ -105,7 +106,7 @@ def page_context(
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=publisher.for_role(now_role),
+        view=publisher.for_audience(of_client),
         sections=SECTIONS,
         event_id=publisher.id,
         clock=format_time(wall),

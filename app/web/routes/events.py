@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from fastapi import APIRouter, Request
@@ -9,10 +10,10 @@ from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.panel.rules import ControlRules
-from app.permission.control_authority_view import Role, role
 from app.permission.principal import Principal
+from app.view.audience import EVERYONE, Audience, audience, audience_of
 from app.view.heartbeat import beat
-from app.view.publisher import EVERYTHING, Reader, ViewPublisher, client_id_event
+from app.view.publisher import ViewPublisher, client_id_event
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import server_send
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
@@ -47,38 +48,32 @@ async def events(
     frame; without one, or with one that the panel does not have, of all. `embed`: for a page in a
     frame."""
     publisher, rules = session.publisher, session.control.rules
-    embedded = embed or from_frame(request.scope)
-    who, token = None, ""
+    embedded, language = embed or from_frame(request.scope), language_of(request)
+    first, token, current = b"", "", partial(audience, "", language)
     if only_shows(state.fleet.panel.embed, embedded):
-        role_now = embedded_role
+        current = partial(audience, "embedded", language)
     elif rules.required:
         who, token = principal_with_new_token(request, state, embedded)
-        role_now = _role_of(who, publisher, rules)
-    else:
-        role_now = no_role
-    first = client_id_event(who.client.id) if who else b""
+        first = client_id_event(who.client.id)
+        current = partial(_audience_now, publisher, who, rules, language)
+    shown = publisher.shown_page(page)
     answer: Response
-    reader = publisher.reader(language_of(request), page)
     if once:
-        all_of_it = publisher.snapshot(reader, role_now()) + first + beat(reader.language)
-        answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
+        everything = publisher.snapshot(current(), shown) + first + beat(language)
+        answer = Response(everything, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(publisher, first, state.metrics.streams, reader, role_now)
+        answer = EventStream(publisher, first, state.metrics.streams, shown, current)
     return set_client_cookie(answer, request, token)
 
 
-def _role_of(who: Principal, publisher: ViewPublisher, rules: ControlRules) -> Callable[[], Role]:
-    return lambda: role(publisher.view["control"], who, rules)
+def _audience_now(
+    publisher: ViewPublisher, who: Principal, rules: ControlRules, language: str
+) -> Audience:
+    return audience_of(who, publisher.view["control"], rules, language)
 
 
-def no_role() -> Role:
-    """The role of all clients if control is not required."""
-    return ""
-
-
-def embedded_role() -> Role:
-    """The role of a page in a frame that may only show."""
-    return "embedded"
+def _everyone() -> Audience:
+    return EVERYONE
 
 
 class EventStream(Response):
@@ -92,16 +87,16 @@ class EventStream(Response):
         publisher: ViewPublisher,
         first: bytes,
         streams: Open,
-        reader: Reader = EVERYTHING,
-        role: Callable[[], Role] = no_role,
+        page: str = "",
+        audience: Callable[[], Audience] = _everyone,
     ) -> None:
-        """`first` is sent with the snapshot; `streams` counts the open streams; `role` returns the
-        client's role in control."""
+        """`first` is sent with the snapshot; `streams` counts the open streams; `page` is the page
+        whose widgets it sends, "" for all; `audience` returns that of the client now."""
         self._publisher = publisher
         self._first = first
         self._streams = streams
-        self._reader = reader
-        self._role = role
+        self._page = page
+        self._audience = audience
         self.status_code = 200
         self.background = None
         self.init_headers(HEADERS)
@@ -117,28 +112,28 @@ class EventStream(Response):
                 writing.cancel()
 
     async def _write(self, send: Send) -> None:
-        publisher, reader, role_now = self._publisher, self._reader, self._role
-        heartbeat, now = publisher.heartbeat, role_now()
-        version, view, beats = publisher.version, publisher.for_role(now), heartbeat.count
-        await send(_body(self._beginning(now)))
+        publisher, page = self._publisher, self._page
+        heartbeat, audience = publisher.heartbeat, self._audience()
+        version, view, beats = publisher.version, publisher.for_audience(audience), heartbeat.count
+        await send(_body(self._beginning(audience)))
         while not publisher.closed:
             await publisher.wait_for_change(version, beats)
             chunk = b""
             if publisher.version > version:
-                was, now = now, role_now()
-                chunk = publisher.events_since(version, view, reader, was, now)
-                version, view = publisher.version, publisher.for_role(now)
+                before, audience = audience, self._audience()
+                chunk = publisher.events_since(version, view, audience, page, before)
+                version, view = publisher.version, publisher.for_audience(audience)
             if heartbeat.count > beats:
-                chunk += heartbeat.event(reader.language)
+                chunk += heartbeat.event(audience.language)
                 beats = heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})
 
-    def _beginning(self, role: Role) -> bytes:
+    def _beginning(self, audience: Audience) -> bytes:
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        snapshot = self._publisher.snapshot(self._reader, role)
-        return retry + snapshot + self._first + beat(self._reader.language)
+        snapshot = self._publisher.snapshot(audience, self._page)
+        return retry + snapshot + self._first + beat(audience.language)
 
 
 def _body(chunk: bytes) -> Message:
