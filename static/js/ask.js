@@ -1,6 +1,10 @@
-// The dialog that confirms a press: the action and its values. Its "yes" is the press.
+// The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press. The
+// frame around the page stays live behind it: a stop button is never covered, and never waits for an answer.
 import { entryText } from "./number-inputs.js";
 import { TAP_AGAIN_MS } from "./press.js";
+
+const NOT_NOW_MS = 15_000; // without an answer the question goes
+const GAP_PX = 12;
 
 let closing = 0;
 
@@ -11,25 +15,65 @@ export function confirm(root, form, onYes) {
     place.textContent = shownText(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
   }
   const button = dialog.querySelector(".yes");
-  const clicked = (event) => {
+  const answers = new AbortController();
+  /** @param {string} name @param {(event: Data) => void} listener @param {EventTarget} [target] */
+  const on = (name, listener, target = dialog) =>
+    target.addEventListener(name, listener, { signal: answers.signal, capture: target !== dialog });
+  const close = () => dialog.matches(":popover-open") && dialog.hidePopover();
+  on("click", (event) => {
     if (event.defaultPrevented) return; // it was not open when the finger went down
     if (event.target.closest(".yes")) onYes(event);
-    if (event.target.closest("button")) dialog.close();
-  };
-  // The second tap of the press that opens the dialog is no answer.
+    if (event.target.closest("button")) close();
+  });
+  // A touch of anything else is "not now".
+  on("pointerdown", (event) => dialog.contains(event.target) || close(), window);
+  on("keydown", (event) => event.key === "Escape" && close(), window);
+  on("focusout", (event) => event.relatedTarget && !dialog.contains(event.relatedTarget) && close());
+  on("resize", close, window);
+  // The second tap of the press that opens the question is no answer.
   button.disabled = true;
   const opening = setTimeout(() => (button.disabled = false), TAP_AGAIN_MS);
-  dialog.addEventListener("click", clicked);
-  const closed = () => {
+  const notNow = setTimeout(close, NOT_NOW_MS);
+  on("beforetoggle", ({ newState }) => {
+    if (newState === "open") return;
+    answers.abort();
     clearTimeout(opening);
-    dialog.removeEventListener("click", clicked);
+    clearTimeout(notNow);
+    root.toggleAttribute("data-asked", false);
+    if (dialog.contains(document.activeElement)) root.querySelector("button").focus();
     // The second tap of an answer is no press of the button below.
     closing = setTimeout(() => delete document.body.dataset.asks, TAP_AGAIN_MS);
-  };
+  });
   clearTimeout(closing);
   document.body.dataset.asks = "";
-  dialog.addEventListener("close", closed, { once: true });
-  dialog.showModal();
+  root.toggleAttribute("data-asked", true);
+  dialog.showPopover();
+  placeBeside(dialog, root.getBoundingClientRect());
+  dialog.querySelector(".no").focus();
+}
+
+// Above the button, else below or beside it, within the page.
+/** @param {HTMLElement} sheet @param {DOMRect} button */
+function placeBeside(sheet, button) {
+  const page = document.querySelector("main").getBoundingClientRect();
+  const { width, height } = sheet.getBoundingClientRect();
+  /** @param {number} start @param {number} least @param {number} most */
+  const within = (start, least, most) => Math.max(least, Math.min(start, most));
+  const isInFrame = button.right <= page.left || button.left >= page.right;
+  let left = within((button.left + button.right - width) / 2, page.left + GAP_PX, page.right - GAP_PX - width);
+  let top = button.top - GAP_PX - height;
+  if (isInFrame || top < page.top) {
+    const isRight = page.right - button.right >= width + 2 * GAP_PX;
+    const isBelow = !isInFrame && page.bottom - button.bottom >= height + 2 * GAP_PX;
+    if (isBelow) top = button.bottom + GAP_PX;
+    else {
+      left = isRight ? Math.max(button.right, page.left) + GAP_PX : button.left - GAP_PX - width;
+      left = within(left, page.left + GAP_PX, page.right - GAP_PX - width);
+      const middle = (button.top + button.bottom - height) / 2;
+      top = within(middle, page.top + GAP_PX, page.bottom - GAP_PX - height);
+    }
+  }
+  Object.assign(sheet.style, { left: `${left}px`, top: `${top}px` });
 }
 
 // The value as the page shows it.

@@ -94,8 +94,8 @@
   function lock() {
     var words = page.sentences;
     show("form.page [type=submit], form.control [type=submit], .hold", "disabled", true);
-    document.querySelectorAll("dialog[open]").forEach(function (dialog) {
-      dialog.close();
+    document.querySelectorAll("dialog[popover]").forEach(function (dialog) {
+      if (dialog.hidePopover && dialog.matches(":popover-open")) dialog.hidePopover();
     });
     show('form.page :is([data-text="reason"], [data-text="reasons"])', "textContent", words.faulty);
     show('form.page [data-text="more"]', "textContent", "");

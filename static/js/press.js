@@ -1,6 +1,7 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
 import { enteredValues, forgetRobotValue } from "./entries.js";
 import { hooksOf, isEquipped, showReceipt } from "./show.js";
+import { StopKeys, isOver } from "./stop-keys.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
 // A second tap within this time is the same press.
@@ -28,6 +29,26 @@ export function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
+// A button looks pressed while a pointer is down on it: from the first moment on, and not once it has slid off.
+function feelTouches() {
+  /** @type {Map<number, HTMLElement>} */
+  const touched = new Map();
+  addEventListener("pointerdown", ({ target, pointerId }) => {
+    const button = target.closest?.("form.page button:enabled");
+    if (!button) return;
+    touched.set(pointerId, button);
+    button.toggleAttribute("data-down", true);
+  });
+  /** @param {PointerEvent} event */
+  const released = (event) => {
+    const button = touched.get(event.pointerId);
+    if (!button || (event.type === "pointermove" && isOver(button, event))) return;
+    touched.delete(event.pointerId);
+    if (![...touched.values()].includes(button)) button.toggleAttribute("data-down", false);
+  };
+  for (const name of ["pointermove", "pointerup", "pointercancel"]) addEventListener(name, released, true);
+}
+
 export class Presser {
   /** @type {import("./press-socket.js").PressSocket | null} */
   #socket = null;
@@ -48,6 +69,7 @@ export class Presser {
   #id = newId(); // of the next press
   /** @type {Map<HTMLElement | null, HTMLElement>} */
   #buttons = new Map(); // submit button → its widget
+  #stops = new StopKeys((button, event) => this.#pressed(event, button));
 
   /** @param {Map<string, HTMLElement>} widgets @param {import("./source.js").Source} source */
   constructor(widgets, source) {
@@ -55,6 +77,7 @@ export class Presser {
     this.#source = source;
     if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
+    feelTouches();
     // A key that is held down is one press.
     addEventListener(
       "keydown",
@@ -82,6 +105,7 @@ export class Presser {
   /** @param {MouseEvent} event */
   #clicked(event) {
     const button = event.target.closest("button");
+    if (button && this.#stops.isPressed(event, button)) return event.preventDefault();
     // A button that was enabled under a resting finger was not pressed.
     if (button && event.detail > 0 && button !== this.#downButton) event.preventDefault();
     else if (this.#buttons.has(button)) this.#pressed(event, button);
@@ -109,7 +133,7 @@ export class Presser {
   // By a pointer, a key or a program. Only a pointer has a "down" before.
   /** @param {MouseEvent | SubmitEvent} event @param {HTMLElement} root @param {HTMLButtonElement} button */
   #begin(event, root, button) {
-    const byPointer = event.detail > 0;
+    const byPointer = event.detail > 0 || event.type.startsWith("pointer");
     const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
     const isCancel = button.matches(".cancel");
     if (isCancel) click.press = byPointer ? this.#downValue : button.value;

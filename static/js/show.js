@@ -74,7 +74,7 @@ const SHOW = {
   enabled: (root, value) => {
     for (const key of keysOf(root)) key.disabled = !value;
     hooksOf(root).lock?.(root, !value);
-    if (!value) root.querySelector("dialog.ask")?.close();
+    if (!value) root.querySelector(".ask:popover-open")?.hidePopover();
   },
   stoppable: (root, value) => {
     const cancel = root.querySelector(".cancel");
@@ -163,7 +163,7 @@ export function lockWidget(root, lost, unknown) {
   if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="doing"]'), unknown);
   const buttons = root.querySelectorAll("button[type=submit], .hold");
   for (const button of buttons) button.disabled = true;
-  root.querySelector("dialog.ask")?.close();
+  root.querySelector(".ask:popover-open")?.hidePopover();
   const reason = root.querySelector(".why")?.dataset.lost ?? lost; // of a stop button: what to use instead
   const locks = { reason, reasons: reason, more: "", enabled: false };
   if (buttons.length) for (const [name, value] of Object.entries(locks)) showAttribute(root, name, value);

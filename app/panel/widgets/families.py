@@ -269,9 +269,11 @@ class KeyCommand(Command):
 
 
 class PressCommand(Command):
-    """A command that one press sends; with `confirm_press` the page asks before."""
+    """A command that one press sends; with `confirm_press` the page asks before, and says the
+    `consequence` of the press."""
 
     confirm_press: bool = False
+    consequence: Label | None = None
 
     @property
     @abstractmethod
@@ -280,6 +282,12 @@ class PressCommand(Command):
 
     def templates(self) -> list[Any]:
         return [self.template]
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        if self.consequence is not None and not self.confirm_press:
+            what = "is said by the question before the press: add confirm_press = true, or leave it out"
+            yield Fault(f"{place}.consequence", what)
+        yield from super().faults(place, checking)
 
 
 class PublishCommand(TopicWidget, Command):

@@ -37,6 +37,7 @@ WORDS: Final = (
     *(word.code for word in LEVEL_WORDS.values()),
     "clean",
     "cleaning",
+    "cleaning_end",
 )
 TREND_WORDS: Final = (
     "trend_earlier",

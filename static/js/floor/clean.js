@@ -1,9 +1,11 @@
 // The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
 import { shield } from "./shield.js";
 import { lockLocally, unlockLocally } from "../show.js";
+import { leaveStopsBare } from "../stop-keys.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;
+const HOLD_TO_END_MS = 2000; // a cloth does not rest for so long on one place
 const HOLDS = '[data-kind="hold"]';
 
 const over = document.getElementById("cleaning");
@@ -13,6 +15,12 @@ export class Cleaning {
   #endsAt = 0; // by performance.now(): a clock that is set changes nothing
 
   constructor() {
+    addEventListener("resize", () => over.matches(":popover-open") && leaveStopsBare(over));
+    let holding = 0;
+    const end = over.querySelector(".end-cleaning");
+    end.addEventListener("pointerdown", () => (holding = setTimeout(() => this.#end(), HOLD_TO_END_MS)));
+    for (const name of ["pointerup", "pointercancel", "pointerleave"])
+      end.addEventListener(name, () => clearTimeout(holding));
     const left = Number(pageGuard.recall(UNTIL)) - Date.now();
     if (left > 0 && left <= totalMs()) this.#begin(left);
   }
@@ -32,10 +40,12 @@ export class Cleaning {
     document.activeElement?.blur();
     document.getElementById("menu").hidePopover();
     over.showPopover();
+    leaveStopsBare(over);
     this.#count();
   }
 
   #count() {
+    if (!over.matches(":popover-open")) return;
     const left = this.#endsAt - performance.now();
     if (left <= 0) return this.#end();
     over.querySelector("[role=timer]").textContent = Math.ceil(left / 1000);

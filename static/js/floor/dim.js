@@ -1,4 +1,5 @@
 // The page gets dark when it is not touched for long. The touch that wakes it presses nothing.
+import { leaveStopsBare } from "../stop-keys.js";
 import { shield } from "./shield.js";
 
 const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keydown", "wheel"];
@@ -49,5 +50,6 @@ export class Dimming {
     if (this.#pressed.size || document.querySelector("#cleaning:popover-open")) return this.#wait();
     shield.raise();
     dark.showPopover();
+    leaveStopsBare(dark);
   }
 }

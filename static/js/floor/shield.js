@@ -1,5 +1,6 @@
 // Takes every touch and key away from the page: while it is cleaned, and where a touch only wakes it.
 import { TAP_AGAIN_MS } from "../press.js";
+import { isStop } from "../stop-keys.js";
 
 const POINTERS = ["pointerdown", "pointerup", "pointercancel", "pointermove"];
 const OTHERS = [
@@ -19,6 +20,9 @@ const OTHERS = [
   "dragstart",
   "submit",
 ];
+
+/** @param {EventTarget | null} target */
+const isEnd = (target) => target instanceof Element && target.closest(".end-cleaning") !== null;
 
 class Shield {
   // Called with each event that is swallowed.
@@ -55,7 +59,7 @@ class Shield {
 
   /** @param {Event} event */
   #swallow(event) {
-    if (!this.#up) return;
+    if (!this.#up || isStop(event.target) || isEnd(event.target)) return;
     const what = event.pointerId ?? event.code;
     if (event.type === "pointerdown" || event.type === "keydown") this.#down.add(what);
     if (["pointerup", "pointercancel", "keyup"].includes(event.type)) this.#down.delete(what);

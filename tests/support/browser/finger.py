@@ -63,6 +63,12 @@ class Touch:
         touches = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
         self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
+    def lift(self, number: int, point: tuple[float, float]) -> None:
+        """Lifts one of several fingers, which is at `point`; the others stay."""
+        x, y = point
+        touches = [{"x": x, "y": y, "id": number}]
+        self._session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": touches})
+
 
 class Finger:
     """A page with a hold, and a finger on its screen. `surface` is what the finger touches."""

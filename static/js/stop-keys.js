@@ -1,0 +1,66 @@
+// Stop buttons: pressed by their own pointer, whatever else touches the glass, and below no cover.
+
+const STOPS = '[data-role="stop"] > button[type="submit"]';
+
+/** @param {EventTarget | null} target */
+export function isStop(target) {
+  return target instanceof Element && target.closest(STOPS) !== null;
+}
+
+/** @param {HTMLElement} button @param {{ clientX: number, clientY: number }} event */
+export const isOver = (button, { clientX: x, clientY: y }) => {
+  const { left, right, top, bottom } = button.getBoundingClientRect();
+  return x >= left && x <= right && y >= top && y <= bottom;
+};
+
+// Chromium gives a click to the first finger only, but each finger has its own pointer.
+export class StopKeys {
+  /** @type {Map<number, HTMLButtonElement>} */
+  #down = new Map(); // pointer → the stop button that it went down on
+  /** @type {(button: HTMLButtonElement, event: PointerEvent) => void} */
+  #press;
+  /** @type {WeakMap<HTMLButtonElement, number>} */
+  #pressedAt = new WeakMap(); // when a pointer pressed it: the click that follows is the same press
+
+  /** @param {(button: HTMLButtonElement, event: PointerEvent) => void} press */
+  constructor(press) {
+    this.#press = press;
+    addEventListener("pointerdown", (event) => this.#began(event), true);
+    // Where another finger scrolls the page, the browser takes the pointers of all fingers away.
+    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, (event) => this.#ended(event), true);
+  }
+
+  // Whether a click is that of a press by a pointer.
+  /** @param {Event} click @param {HTMLButtonElement} button */
+  isPressed(click, button) {
+    return click.timeStamp - (this.#pressedAt.get(button) ?? Number.NEGATIVE_INFINITY) < CLICK_AFTER_MS;
+  }
+
+  /** @param {PointerEvent} event */
+  #began(event) {
+    const button = event.button === 0 && isStop(event.target) && event.target.closest(STOPS);
+    if (button && !button.disabled) this.#down.set(event.pointerId, button);
+  }
+
+  /** @param {PointerEvent} event */
+  #ended(event) {
+    const button = this.#down.get(event.pointerId);
+    this.#down.delete(event.pointerId);
+    if (!button || !(event.type === "pointercancel" || isOver(button, event))) return;
+    this.#pressedAt.set(button, event.timeStamp);
+    this.#press(button, event);
+  }
+}
+
+const CLICK_AFTER_MS = 500;
+
+// Leaves the stop buttons bare under what covers the page.
+/** @param {HTMLElement} cover */
+export function leaveStopsBare(cover) {
+  const { left, top, width, height } = cover.getBoundingClientRect();
+  const holes = [...document.querySelectorAll(STOPS)]
+    .map((button) => button.getBoundingClientRect())
+    .filter((hole) => hole.width && hole.height)
+    .map((hole) => `M${hole.left - left} ${hole.top - top}v${hole.height}h${hole.width}v${-hole.height}z`);
+  cover.style.clipPath = holes.length ? `path(evenodd, "M0 0H${width}V${height}H0z${holes.join("")}")` : "";
+}

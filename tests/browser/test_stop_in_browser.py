@@ -1,0 +1,213 @@
+"""Stop works with any number of fingers on the glass, beside a question, while the screen is cleaned,
+and when it is dark."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import middle
+from tests.support.browser.touch import PANEL, SIZES, permit, touched
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+
+STOP: Final = "[data-widget=stop] > button"
+RESET: Final = """
+[[page.group.widget]]
+id = "reset"
+kind = "publish"
+role = "reset"
+label = "Reset"
+confirm_press = true
+consequence = "Motors come on. The arm does not move."
+topic = "/operation2"
+type = "std_msgs/msg/String"
+message = { data = "reset" }
+
+[[page]]
+id = "other"
+"""
+# How long it takes from a touch to the look of a pressed button.
+FEELS: Final = """(button) => new Promise((resolve) => {
+  let at = 0;
+  addEventListener("pointerdown", (event) => (at = event.timeStamp), { capture: true, once: true });
+  new MutationObserver(() => requestAnimationFrame(() => resolve(performance.now() - at)))
+    .observe(button, { attributeFilter: ["data-down"] });
+})"""
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    above = "\n[screen]\ndim_after_s = 2"
+    panel = PANEL.replace('\n[[page]]\nid = "other"\n', RESET) % above
+    with demo_server(tmp_path_factory.mktemp("stop"), panel) as mine:
+        permit(mine)
+        yield mine
+
+
+@pytest.fixture
+def page(touchscreen: Page, cell: Server) -> Page:
+    return touched(touchscreen, cell)
+
+
+def stops(server: Server) -> int:
+    """How many presses of Stop were sent."""
+    return server.process.text.count(" of stop by ")
+
+
+def pressed(server: Server, before: int) -> None:
+    until(lambda: stops(server) > before, "Stop is sent")
+    assert stops(server) == before + 1
+
+
+@pytest.mark.parametrize("fingers", [1, 4])
+def test_it_is_pressed_while_other_fingers_rest_on_the_glass(
+    page: Page, cell: Server, fingers: int
+) -> None:
+    resting = [(640.0 + 40 * n, 300.0) for n in range(fingers)]
+    touch, before = Touch(page), stops(cell)
+    for n in range(fingers):
+        touch.send("touchStart", *resting[: n + 1])
+    stop = middle(page.locator(STOP))
+    touch.send("touchStart", *resting, stop)
+    touch.lift(fingers, stop)
+    pressed(cell, before)
+    for n in range(fingers):
+        touch.lift(n, resting[n])
+    pressed(cell, before)
+
+
+def test_it_is_pressed_while_a_finger_holds_the_robot(page: Page, cell: Server) -> None:
+    touch, before = Touch(page), stops(cell)
+    hold = middle(page.get_by_role("button", name="Left"))
+    touch.send("touchStart", hold)
+    expect(page.locator("[data-widget=jog][data-hold=held]")).to_be_attached()
+    stop = middle(page.locator(STOP))
+    touch.send("touchStart", hold, stop)
+    touch.lift(1, stop)
+    pressed(cell, before)
+    touch.lift(0, hold)
+
+
+def test_a_tap_is_one_press_and_a_finger_that_slides_off_none(page: Page, cell: Server) -> None:
+    before = stops(cell)
+    page.locator(STOP).tap()
+    pressed(cell, before)
+    expect(page.locator(f"{STOP}:not([aria-busy])")).to_be_attached()
+    touch, (x, y) = Touch(page), middle(page.locator(STOP))
+    touch.send("touchStart", (x, y))
+    expect(page.locator(f"{STOP}[data-down]")).to_be_attached()
+    touch.send("touchMove", (x + 300, y - 200))
+    expect(page.locator(f"{STOP}[data-down]")).to_have_count(0)
+    touch.send("touchEnd")
+    page.locator(STOP).tap()
+    pressed(cell, before + 1)
+
+
+def test_a_key_of_the_keyboard_presses_it_once(page: Page, cell: Server) -> None:
+    before = stops(cell)
+    page.locator(STOP).focus()
+    page.keyboard.press("Enter")
+    pressed(cell, before)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_a_question_stands_beside_its_button_and_stop_is_pressed_at_once(
+    touchscreen: Page, cell: Server, size: tuple[int, int]
+) -> None:
+    page = touched(touchscreen, cell, size)
+    before = stops(cell)
+    page.get_by_role("button", name="Reset").tap()
+    question = page.get_by_role("dialog", name="Reset")
+    expect(question).to_contain_text("Motors come on. The arm does not move.")
+    expect(question).to_be_in_viewport(ratio=1)
+    expect(page.locator("[data-widget=reset][data-asked]")).to_be_attached()
+    assert uncovered(page)
+    page.locator(STOP).tap()
+    pressed(cell, before)
+    expect(question).to_be_hidden()  # another touch is "not now"
+
+
+def uncovered(page: Page) -> bool:
+    """Whether nothing lies over Stop."""
+    script = "([x, y]) => document.elementFromPoint(x, y).closest('[data-widget=stop]') !== null"
+    return bool(page.evaluate(script, list(middle(page.locator(STOP)))))
+
+
+def test_the_question_presses_with_yes_only(page: Page, cell: Server) -> None:
+    def resets() -> int:
+        return cell.process.text.count(" of reset by ")
+
+    before = resets()
+    reset, question = page.get_by_role("button", name="Reset"), page.get_by_role("dialog", name="Reset")
+    reset.tap()
+    question.get_by_role("button", name="Cancel").or_(question.locator(".no")).first.tap()
+    expect(question).to_be_hidden()
+    expect(page.locator("body[data-asks]")).to_have_count(0)
+    reset.tap()
+    question.locator(".yes").tap()
+    until(lambda: resets() == before + 1, "it is sent")
+    expect(question).to_be_hidden()
+    expect(page.locator("body[data-asks]")).to_have_count(0)
+    reset.focus()
+    page.keyboard.press("Enter")
+    expect(question).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(question).to_be_hidden()
+    expect(reset).to_be_focused()
+    assert resets() == before + 1
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_it_is_bare_and_pressed_while_the_screen_is_cleaned(
+    touchscreen: Page, cell: Server, size: tuple[int, int]
+) -> None:
+    page = touched(touchscreen, cell, size)
+    before = stops(cell)
+    page.get_by_role("button", name="Menu").tap()
+    page.get_by_role("button", name="Clean the screen").tap()
+    expect(page.locator("#cleaning")).to_be_visible()
+    assert uncovered(page)
+    page.touchscreen.tap(*middle(page.locator(STOP)))
+    pressed(cell, before)
+    expect(page.locator("#cleaning")).to_be_visible()
+
+
+def test_cleaning_ends_when_its_button_is_held(page: Page, cell: Server) -> None:
+    page.get_by_role("button", name="Menu").tap()
+    page.get_by_role("button", name="Clean the screen").tap()
+    end = page.locator(".end-cleaning")
+    expect(end).to_be_visible()
+    end.tap()  # too short
+    expect(page.locator("#cleaning")).to_be_visible()
+    touch = Touch(page)
+    touch.send("touchStart", middle(end))
+    expect(page.locator("#cleaning")).to_be_hidden()
+    touch.send("touchEnd")
+
+
+def test_the_first_touch_on_a_dark_page_stops(page: Page, cell: Server) -> None:
+    before = stops(cell)
+    expect(page.locator("#dark")).to_be_visible()
+    assert uncovered(page)
+    page.touchscreen.tap(*middle(page.locator(STOP)))
+    pressed(cell, before)
+    expect(page.locator("#dark")).to_be_hidden()
+
+
+@pytest.mark.real_time
+def test_a_touch_is_seen_within_50_ms(page: Page, cell: Server) -> None:
+    load = page.locator("[data-widget=load] > button")
+    touch = Touch(page)
+
+    def felt() -> Any:
+        page.evaluate(f"window.felt = ({FEELS})(document.querySelector('[data-widget=load] > button'))")
+        touch.send("touchStart", middle(load))
+        took = page.evaluate("window.felt")
+        touch.send("touchCancel")
+        expect(page.locator("[data-widget=load] > button[data-down]")).to_have_count(0)
+        return took
+
+    assert sorted(felt() for _ in range(5))[2] < 50
