@@ -192,7 +192,8 @@ async def _app_state(
     async with open_log(settings, panel) as oplog:
         check_port(server)
         # In development the gallery shows all kinds.
-        kinds = {*KINDS} if settings.dev else {widget.kind for widget in panel.widgets()}
+        used = {widget.kind for widget in panel.widgets()} & KINDS.keys()  # the state has no row
+        kinds = {*KINDS} if settings.dev else used
         static_files, templates = shipped_path("static"), shipped_path("templates")
         require_files(static_files, templates)
         own = (panel.picture_files, panel.styles, panel.templates)

@@ -1,8 +1,7 @@
 """The families of widgets: base classes of the kinds, which add keys and checks.
 
 A family's methods are the interface to the rest of the panel: faults, required endpoints, messages to
-send. How a kind is shown, permitted and sent is in tables of other rooms (`app/view/kinds.py`,
-`app/permission/interlocks.py`, `app/commands/dispatch.py`).
+send. Tables of other rooms say how a kind is shown, permitted and sent.
 """
 
 from abc import abstractmethod
@@ -34,14 +33,14 @@ from app.panel.base import (
 from app.panel.checks.types import field_faults
 from app.panel.faults.wording import list_names
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
+from app.panel.widgets.sent_message import SentMessage
 
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
     """What a widget's check needs: the inputs of its page by id, the ids of all inputs and of all
-    interlocks, topic → type of the subscriptions (`types`), the ids of all `pages` and the names of
-    all `pictures`. Faults of the widgets in `faulty` are
-    reported already: checks that depend on them are skipped."""
+    interlocks, topic → type of the subscriptions (`types`), the ids of all `pages` and the names of all
+    `pictures`. Faults of widgets in `faulty` are reported already: checks of them are skipped."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
@@ -205,16 +204,6 @@ class Display(TopicWidget, DisplayWidget):
         yield from ()
 
 
-class SentMessage(NamedTuple):
-    """A message that a command sends: when, its type ("" if the panel file names none), and its fields
-    with input ids; `comments` are by field (".seq")."""
-
-    when: str
-    type_name: str = ""
-    fields: Mapping[str, Any] = {}
-    comments: Mapping[str, str] = {}
-
-
 class Command(BaseWidget):
     """A widget that sends commands to the robot while its interlocks permit."""
 
@@ -261,16 +250,14 @@ class KeyCommand(Command):
         return self.icon or ICONS.get(self.role, "")
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        allowed = COLOURS[self.role]
-        if self.colour is not None and self.colour not in allowed:
+        if self.colour is not None and self.colour not in (allowed := COLOURS[self.role]):
             message = f"a {self.role} key is {' or '.join(allowed)} (IEC 60204-1), never {self.colour}"
             yield Fault(f"{place}.colour", message)
         yield from super().faults(place, checking)
 
 
 class PressCommand(Command):
-    """A command that one press sends; with `confirm_press` the page asks before, and says the
-    `consequence` of the press."""
+    """A command that one press sends; with `confirm_press` the page asks, and says `consequence`."""
 
     confirm_press: bool = False
     consequence: Label | None = None
@@ -284,9 +271,9 @@ class PressCommand(Command):
         return [self.template]
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        if self.consequence is not None and not self.confirm_press:
-            what = "is said by the question before the press: add confirm_press = true, or leave it out"
-            yield Fault(f"{place}.consequence", what)
+        if self.consequence and not self.confirm_press:
+            message = "is said before the press: add confirm_press = true, or leave it out"
+            yield Fault(f"{place}.consequence", message)
         yield from super().faults(place, checking)
 
 

@@ -14,8 +14,9 @@ from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
 from app.panel.template import set_field
 from app.panel.values import number_text
-from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand, SentMessage
+from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand
 from app.panel.widgets.roles import KeyRole
+from app.panel.widgets.sent_message import SentMessage
 
 DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
 COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")

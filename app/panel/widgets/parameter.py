@@ -17,9 +17,10 @@ from app.interfaces.validation import format_value
 from app.panel.base import SaidLabel, Seconds, Span, catalogue_default, is_absolute_name
 from app.panel.number_range import Range, decimal_text
 from app.panel.values import join_list, number_text, quote_element, same_value
-from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand, SentMessage
+from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand
 from app.panel.widgets.inputs import BOOL_TEXTS, Option, option_faults
 from app.panel.widgets.numbers import Number, SteppedWidget, Unit
+from app.panel.widgets.sent_message import SentMessage
 
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]

@@ -8,7 +8,8 @@ from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.widgets.families import CheckContext, Command, KeyCommand, PressCommand, SentMessage
+from app.panel.widgets.families import CheckContext, Command, KeyCommand, PressCommand
+from app.panel.widgets.sent_message import SentMessage
 
 
 class TemplateCommand(KeyCommand, PressCommand):
