@@ -80,6 +80,8 @@ LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
 Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
 Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
 
+NOT_RAISED: Final = "this version checks alarms, but does not raise them: do not rely on them yet"
+
 
 class AlarmList(Description):
     """Alarms that a robot publishes as a list: the `field` of the message that is the list, and the

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from app.errors import Note
 from app.interfaces import Interfaces
+from app.panel.alarm import NOT_RAISED
 from app.panel.checks.fit import fit_notes
 from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
@@ -13,6 +14,7 @@ from app.panel.widgets.trend import Trend, history_bytes
 
 def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """All notes with their places in the panel file, without ids and lines."""
+    yield from _alarm_notes(panel)
     yield from _unbounded_trust_notes(panel)
     yield from _embedded_controls_notes(panel)
     yield from _unused_interlock_notes(panel)
@@ -21,6 +23,12 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from fit_notes(panel)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)
+
+
+def _alarm_notes(panel: Panel) -> Iterator[Note]:
+    """Alarms, which nothing raises yet."""
+    if panel.alarms:
+        yield Note("alarm[0]", NOT_RAISED)
 
 
 def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:
