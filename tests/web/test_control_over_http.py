@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Final
 
 import httpx
 import pytest
@@ -131,22 +132,62 @@ def test_a_press_needs_control(own_client: Callable[..., Client], own_kiosk: Ser
     until(lambda: all(f"by {n} with" in own_kiosk.process.text for n in names), "the log names each")
 
 
+STOP_AND_START: Final = """
+title = "Cell"
+mode = "demo"
+[[interlock]]
+id = "unused"
+topic = "/operation_enabled"
+[[page]]
+id = "operation"
+title = "Operation"
+[[page.widget]]
+id = "stop"
+kind = "publish"
+role = "stop"
+label = "Stop"
+topic = "/stop"
+type = "std_msgs/msg/Empty"
+message = {}
+[[page.widget]]
+id = "start"
+kind = "publish"
+role = "start"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Empty"
+message = {}
+"""
+
+
+@pytest.fixture
+def stop_client(tmp_path: Path) -> Iterator[Callable[..., Client]]:
+    """Makes clients of a panel with a stop and a start."""
+    path = control_panel(tmp_path, panel=STOP_AND_START)
+    server = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_PROXIES=PROXY)
+    with ready(server) as mine, clients_of(mine) as make:
+        yield make
+
+
 def test_every_client_may_stop_and_the_log_says_that_it_had_no_control(
-    own_client: Callable[..., Client],
+    stop_client: Callable[..., Client],
 ) -> None:
-    ann, bob = own_client("192.0.2.1"), own_client("192.0.2.2")
+    ann, bob = stop_client("192.0.2.1"), stop_client("192.0.2.2")
     ann.take()
-    stopped, started = (
-        bob.http.post(f"/widgets/{name}", json={"inputs": {}}) for name in ("stop", "start")
-    )
+
+    def press(client: Client, widget: str) -> httpx.Response:
+        return client.http.post(f"/widgets/{widget}", json={"inputs": {}})
+
+    until(lambda: press(ann, "start").status_code == 200, "the robot's nodes are known")
+    stopped, started = press(bob, "stop"), press(bob, "start")
     assert (stopped.status_code, stopped.json()["outcome"]) == (200, "published")
     assert (started.status_code, started.json()["code"]) == (409, "control_held")
     snapshot = re.search(r"event: snapshot\ndata: (.*)\n", bob.http.get("/events?once=1").text)
     assert snapshot
     widgets = json.loads(snapshot[1])["widgets"]
     assert (widgets["stop"]["enabled"], widgets["start"]["enabled"]) == (True, False)
-    assert ann.http.post("/widgets/stop", json={"inputs": {}}).status_code == 200
-    assert ann.press().status_code == 200  # the stop took no control
+    assert press(ann, "stop").status_code == 200
+    assert press(ann, "start").status_code == 200  # the stop of another took no control
     rows = list(csv.DictReader(io.StringIO(ann.http.get("/log.csv").text.removeprefix("\ufeff"))))
     closed = [row for row in reversed(rows) if row["kind"] == "closed" and row["widget"] == "stop"]
     assert [(row["browser"], row["verdict"]) for row in closed] == [
