@@ -156,7 +156,7 @@ def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
     dialog = asked(shown.locator('[data-widget="allow"] > button'))
     expect(dialog.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
     expect(dialog.locator("dd")).to_have_text("(empty)")
-    yes, no = box(shown, "dialog[open] .yes"), box(shown, "dialog[open] .no")
+    yes, no = box(shown, "dialog:popover-open .yes"), box(shown, "dialog:popover-open .no")
     assert no["width"] * 0.22 >= 20
     assert yes["width"] * 0.22 >= 20
     space = """(button) => {
@@ -165,7 +165,7 @@ def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
       const inside = text.getBoundingClientRect(), around = button.getBoundingClientRect();
       return Math.min(inside.left - around.left, around.right - inside.right);
     }"""
-    assert shown.locator("dialog[open] .yes").evaluate(space) >= 12
+    assert shown.locator("dialog:popover-open .yes").evaluate(space) >= 12
     dialog.locator(".no").click()
 
 

@@ -24,7 +24,7 @@ NOTE: Final = """
     window.opened = 0;
     window.downs = [];
     addEventListener("pointerdown", () => {
-        const answers = document.querySelector("dialog[open] .yes:enabled") !== null;
+        const answers = document.querySelector("dialog:popover-open .yes:enabled") !== null;
         downs.push({ at: performance.now(), answers });
     }, true);
     window.late = null;

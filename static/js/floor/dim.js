@@ -18,8 +18,10 @@ export class Dimming {
     this.#afterMs = afterMs;
     for (const name of MOVES) addEventListener(name, (event) => this.#touched(event), true);
     shield.touched = (event) => MOVES.includes(event.type) && this.#touched(event);
-    // What the operator must see: the state of the robot, and what is wrong with the panel.
+    // What the operator must see: the state of the machine and of the robot, and what is wrong with the panel.
     const seen = new MutationObserver(() => this.wake());
+    const machine = document.querySelector(".machine-state");
+    if (machine) seen.observe(machine, { attributeFilter: ["data-state", "data-shape", "data-colour"] });
     seen.observe(document.getElementById("state"), { attributeFilter: ["data-state"] });
     seen.observe(document.getElementById("fault"), { attributeFilter: ["hidden"] });
     this.#wait();
