@@ -3,6 +3,7 @@
     KioskError
     ├── SettingsError          –    an environment variable, or a file it names, is unusable
     ├── PanelError             –    the panel file has faults; `faults` lists them with their places
+    ├── KindError              –    a kind of widgets lacks a part
     ├── InterfaceError         –    a ROS 2 type or field does not exist in the definitions
     ├── FieldError             422  a field does not accept a value; `field` is its path
     ├── InputError             422  a request is malformed

@@ -26,13 +26,14 @@ export function confirm(root, form, onYes) {
     if (event.target.closest("button")) close();
   });
   // A touch of anything else is "not now".
-  on("pointerdown", (event) => dialog.contains(event.target) || close(), window);
+  on("pointerdown", (event) => dialog.contains(event.target) || isSecondTap || close(), window);
   on("keydown", (event) => event.key === "Escape" && close(), window);
   on("focusout", (event) => event.relatedTarget && !dialog.contains(event.relatedTarget) && close());
-  on("resize", close, window);
+  on("resize", () => placeBeside(dialog, root.getBoundingClientRect()), window);
   // The second tap of the press that opens the question is no answer.
+  let isSecondTap = true;
   button.disabled = true;
-  const opening = setTimeout(() => (button.disabled = false), TAP_AGAIN_MS);
+  const opening = setTimeout(() => (button.disabled = isSecondTap = false), TAP_AGAIN_MS);
   const notNow = setTimeout(close, NOT_NOW_MS);
   on("beforetoggle", ({ newState }) => {
     if (newState === "open") return;

@@ -1,7 +1,7 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
 import { enteredValues, forgetRobotValue } from "./entries.js";
 import { hooksOf, isEquipped, showReceipt } from "./show.js";
-import { StopKeys, isOver } from "./stop-keys.js";
+import { feelTouches, StopKeys } from "./stop-keys.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
 // A second tap within this time is the same press.
@@ -27,26 +27,6 @@ export function post(url, body, timeoutMs, options) {
 
 export function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
-}
-
-// A button looks pressed while a pointer is down on it: from the first moment on, and not once it has slid off.
-function feelTouches() {
-  /** @type {Map<number, HTMLElement>} */
-  const touched = new Map();
-  addEventListener("pointerdown", ({ target, pointerId }) => {
-    const button = target.closest?.("form.page button:enabled");
-    if (!button) return;
-    touched.set(pointerId, button);
-    button.toggleAttribute("data-down", true);
-  });
-  /** @param {PointerEvent} event */
-  const released = (event) => {
-    const button = touched.get(event.pointerId);
-    if (!button || (event.type === "pointermove" && isOver(button, event))) return;
-    touched.delete(event.pointerId);
-    if (![...touched.values()].includes(button)) button.toggleAttribute("data-down", false);
-  };
-  for (const name of ["pointermove", "pointerup", "pointercancel"]) addEventListener(name, released, true);
 }
 
 export class Presser {

@@ -1,4 +1,5 @@
-// Stop buttons: pressed by their own pointer, whatever else touches the glass, and below no cover.
+// Touches of buttons: felt at once; a stop button is pressed by its own pointer, whatever else touches the glass, and
+// lies below no cover.
 
 const STOPS = '[data-role="stop"] > button[type="submit"]';
 
@@ -8,7 +9,7 @@ export function isStop(target) {
 }
 
 /** @param {HTMLElement} button @param {{ clientX: number, clientY: number }} event */
-export const isOver = (button, { clientX: x, clientY: y }) => {
+const isOver = (button, { clientX: x, clientY: y }) => {
   const { left, right, top, bottom } = button.getBoundingClientRect();
   return x >= left && x <= right && y >= top && y <= bottom;
 };
@@ -63,4 +64,24 @@ export function leaveStopsBare(cover) {
     .filter((hole) => hole.width && hole.height)
     .map((hole) => `M${hole.left - left} ${hole.top - top}v${hole.height}h${hole.width}v${-hole.height}z`);
   cover.style.clipPath = holes.length ? `path(evenodd, "M0 0H${width}V${height}H0z${holes.join("")}")` : "";
+}
+
+// A button looks pressed while a pointer is down on it: from the first moment on, and not once it has slid off.
+export function feelTouches() {
+  /** @type {Map<number, HTMLElement>} */
+  const touched = new Map();
+  addEventListener("pointerdown", ({ target, pointerId }) => {
+    const button = target.closest?.("form.page button:enabled");
+    if (!button) return;
+    touched.set(pointerId, button);
+    button.toggleAttribute("data-down", true);
+  });
+  /** @param {PointerEvent} event */
+  const released = (event) => {
+    const button = touched.get(event.pointerId);
+    if (!button || (event.type === "pointermove" && isOver(button, event))) return;
+    touched.delete(event.pointerId);
+    if (![...touched.values()].includes(button)) button.toggleAttribute("data-down", false);
+  };
+  for (const name of ["pointermove", "pointerup", "pointercancel"]) addEventListener(name, released, true);
 }

@@ -84,6 +84,7 @@ def test_the_documented_setting_reaches_nodes_on_fast_dds(domain: int) -> None:
         bridge.end()
 
 
+@pytest.mark.real_time
 @pytest.mark.usefixtures("robot")
 def test_the_doctor_names_what_the_range_alone_lacks(domain: int, tmp_path: Path) -> None:
     bridge = started(domain, "")

@@ -289,7 +289,7 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
     for language in LANGUAGES:
         page = opens(language, "en-US")
         path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
-            "main", "number-text"
+            "start", "number-text"
         )
         rows = [(row.text, row.whole, False) for row in TABLE if row.language == language]
         texts = [text for text, _ in generated(20_000, seed=len(rows))]
@@ -310,7 +310,7 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
 def test_scripts_and_server_judge_limits_and_steps_the_same(opens: Opens) -> None:
     page = opens("en", "de-DE")
     path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
-        "main", "number-inputs"
+        "start", "number-inputs"
     )
     chance = random.Random(2)
     rows: list[tuple[float, Range, bool]] = []

@@ -16,7 +16,7 @@ from selenium.webdriver.remote.webelement import WebElement
 
 from app.i18n import render, say
 from tests.support.browser.webdriver import firefox, webkit
-from tests.support.parts import Server, until
+from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import demo_server, kept_running
 
 PANEL: Final = """
@@ -158,9 +158,16 @@ def logged(server: Server, widget: str) -> list[dict[str, Any]]:
     return [row for row in csv.DictReader(io.StringIO(rows)) if row["widget"] == widget]
 
 
-def test_each_page_of_the_shipped_panel_starts_whole(demo: Server, other_browser: Remote) -> None:
+@pytest.fixture
+def shipped(servers: Callable[[Server], Server]) -> Server:
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(SHIPPED)))
+    until(mine.ready, "ready")
+    return mine
+
+
+def test_each_page_of_the_shipped_panel_starts_whole(shipped: Server, other_browser: Remote) -> None:
     for page in PAGES:
-        opened(other_browser, f"{demo.url}/pages/{page}")
+        opened(other_browser, f"{shipped.url}/pages/{page}")
         assert other_browser.execute_script(LEFT_OUT) == 0, page
 
 

@@ -109,7 +109,7 @@ def test_a_tap_is_one_press_and_a_finger_that_slides_off_none(page: Page, cell: 
 def test_a_key_of_the_keyboard_presses_it_once(page: Page, cell: Server) -> None:
     before = stops(cell)
     page.locator(STOP).focus()
-    page.keyboard.press("Enter")
+    page.keyboard.press(" ")
     pressed(cell, before)
 
 
@@ -152,7 +152,7 @@ def test_the_question_presses_with_yes_only(page: Page, cell: Server) -> None:
     expect(question).to_be_hidden()
     expect(page.locator("body[data-asks]")).to_have_count(0)
     reset.focus()
-    page.keyboard.press("Enter")
+    page.keyboard.press(" ")
     expect(question).to_be_visible()
     page.keyboard.press("Escape")
     expect(question).to_be_hidden()

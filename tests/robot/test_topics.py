@@ -339,6 +339,7 @@ def test_a_whole_message_of_many_elements_is_not_built() -> None:
     assert time.thread_time() - before < LONGEST_TURN_S
 
 
+@pytest.mark.real_time
 def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> None:
     event = "rcl_interfaces/msg/ParameterEvent"
     parameter = {"value": {"type": 4, "string_value": "x" * 20}}

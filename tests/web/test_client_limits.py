@@ -158,6 +158,7 @@ def refusal(program: httpx.Client, **headers: str) -> httpx.Response:
     return refused[0]
 
 
+@pytest.mark.real_time
 def test_a_client_with_too_many_requests_is_told_when_to_ask_again(cell: Server) -> None:
     with client(cell, OTHER) as program, client(cell, ANOTHER) as another:
         answer = refusal(program)

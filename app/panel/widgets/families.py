@@ -270,12 +270,6 @@ class PressCommand(Command):
     def templates(self) -> list[Any]:
         return [self.template]
 
-    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        if self.consequence and not self.confirm_press:
-            message = "is said before the press: add confirm_press = true, or leave it out"
-            yield Fault(f"{place}.consequence", message)
-        yield from super().faults(place, checking)
-
 
 class PublishCommand(TopicWidget, Command):
     """A command that publishes a topic."""

@@ -1,9 +1,10 @@
 """Readouts, lamps, cameras and logs in each of their states."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, get_args
 
 from app.i18n import TextLike, number, say
+from app.panel.widgets.displays import LampState
 from app.panel.widgets.log_view import LEVELS as LOG_LEVELS
 from app.web.gallery import texts
 from app.web.gallery.examples import AT, NOT_LIVE, TOPIC, Example, Table
@@ -37,7 +38,7 @@ LIVE: Final[Table] = {"state": "live", "text": texts.LOCKED.shown, "note": "", "
 LAMPS: Final = (
     *(
         Example(shape, "indicator", LAMP, LIVE | {"shape": shape})
-        for shape in ("circle", "square", "triangle", "diamond", "cross", "bar")
+        for shape in get_args(LampState.model_fields["shape"].annotation)
     ),
     *(
         Example(colour, "indicator", LAMP, LIVE | {"shape": "diamond", "colour": colour})

@@ -77,6 +77,7 @@ def _words() -> dict[str, Any]:
         "embed": "",
         "pictures": "/gallery",
         "asks": {},
+        "stop_lost": "",
         "lines": lambda _: LINES,
         "plot": sample_plot,
     }
