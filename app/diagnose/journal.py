@@ -52,9 +52,9 @@ _PRESS: Final = re.compile(r"[0-9a-f\-]{8,40}")
 _UNIT: Final = re.compile(r"(?:operator-panel|zenoh-bridge)[\w.@\-]{0,60}", re.ASCII)
 # Arguments of the program's own log calls, as they are written there.
 ARGUMENTS: Final = rules(
-    ("press.press own_id press_id goal.press_id waiting.press_id", _PRESS),
-    ("lease.id receipt.id said.id", _PRESS),
-    ("widget.id widget_id receipt.widget", ID),
+    ("press.id press.press press_id goal.press_id", _PRESS),
+    ("receipt.id body.id", _PRESS),
+    ("press.widget.id widget.id receipt.widget", ID),
     ("key topic node widget.node node.name request.service widget.action", ROS_KEY),
     ("zid self.head.hash", HEX),
     ("type_name", ROS_TYPE),
