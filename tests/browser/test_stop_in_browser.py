@@ -82,8 +82,17 @@ def test_it_is_pressed_while_other_fingers_rest_on_the_glass(
 def test_it_is_pressed_while_a_finger_holds_the_robot(page: Page, cell: Server) -> None:
     touch, before = Touch(page), stops(cell)
     hold = middle(page.get_by_role("button", name="Left"))
-    touch.send("touchStart", hold)
-    expect(page.locator("[data-widget=jog][data-hold=held]")).to_be_attached()
+
+    def held() -> bool:
+        """Its script may not have been there at the first touch."""
+        touch.send("touchStart", hold)
+        page.wait_for_timeout(500)
+        if page.locator("[data-widget=jog][data-hold=held]").count():
+            return True
+        touch.send("touchEnd")
+        return False
+
+    until(held, "it is held")
     stop = middle(page.locator(STOP))
     touch.send("touchStart", hold, stop)
     touch.lift(1, stop)

@@ -29,7 +29,7 @@ def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr()
     first, note, *fits = said.out.splitlines()
     assert first == f'{SHIPPED}: good: "Robot cell 1", 5 page(s), 47 widget(s)'
-    assert note.startswith('  note: interlock[0] "operation", line 12: the last value on ')
+    assert note.startswith('  note: interlock[0] "operation", line 34: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
     assert [line.partition("fits ")[2] for line in fits] == ["", screens, screens, screens]
     assert "keeps 24h" in fits[0]
@@ -129,8 +129,8 @@ def test_a_note_is_no_fault_and_has_its_place(
     said = capsys.readouterr()
     assert said.err == ""
     assert said.out.splitlines()[1:] == [
-        '  note: interlock[0] "operation", line 12: is worth a look',
-        '  note: page[1].group[0].widget[1].span "last_heard", line 366: is large',
+        '  note: interlock[0] "operation", line 34: is worth a look',
+        '  note: page[1].group[0].widget[1].span "last_heard", line 373: is large',
     ]
     load_panel(SHIPPED)
 
