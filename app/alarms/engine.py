@@ -228,8 +228,8 @@ class AlarmEngine:
 
     def _restored_entry(self, alarm_id: str, record: str) -> AlarmInstance | None:
         entry = entry_in(record)
-        sources = (one for one in self._sources.values() if alarm_id.startswith(f"{one.id}:"))
-        source = next(sources, None)
+        candidates = self._sources.values()
+        source = next((s for s in candidates if alarm_id.startswith(f"{s.id}:")), None)
         if entry is None or source is None:
             return None
         alarm = self._new_entry(source.of_entry(entry))

@@ -82,7 +82,7 @@ def _replayed(options: Any, panel: Panel, ends: threading.Event, stack: ExitStac
 
 def _sorted_out(parser: Parser, options: Any) -> Any:
     """The arguments with what is no panel file moved to where it belongs."""
-    words = [one for one in (options.panel, options.endpoint, options.namespace) if one is not None]
+    words = [word for word in (options.panel, options.endpoint, options.namespace) if word is not None]
     panel = words.pop(0) if words and words[0].endswith(SUFFIX) else None
     if len(words) > 2:
         parser.error(f'"{words[2]}" is one argument too many')

@@ -12,7 +12,7 @@ from app.errors import PressRefused
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
-from app.permission.press_permission import cause_of, judged
+from app.permission.press_permission import cause_of, judged, with_hint
 from app.permission.verdict import Verdict
 from app.robot.state import RobotState
 
@@ -62,7 +62,8 @@ class PressJudge:
         """The verdict of the permission's checks at `now` (monotonic seconds). Ingests nothing."""
         interlocks = self._panel.interlocks_of(press.widget)
         conditions = self._guard.conditions(press.principal)
-        return judged(press.widget, interlocks, self._robot, now, conditions)
+        verdict = judged(press.widget, interlocks, self._robot, now, conditions)
+        return with_hint(self._panel, press.widget, verdict)
 
     def judge_at(self, press: Press[Command], now: float) -> Judgement:
         """Whether a press or hold may be sent at `now` (monotonic seconds). Ingests nothing."""

@@ -139,8 +139,8 @@ def sentences() -> tuple[Sentence, ...]:
         text = file.read_text(encoding="utf-8")
         if "log." in text:
             other_sentences |= set(_logged(ast.parse(text)))
-    telling = [one for one in other_sentences if _letters(one) >= LEAST_LETTERS]
-    return tuple(sorted(telling, key=lambda one: (-len(one.fixed[0]), -_letters(one), one.fixed)))
+    telling = [known for known in other_sentences if _letters(known) >= LEAST_LETTERS]
+    return tuple(sorted(telling, key=lambda s: (-len(s.fixed[0]), -_letters(s), s.fixed)))
 
 
 def _letters(one: Sentence) -> int:

@@ -38,7 +38,6 @@ from app.panel.widgets.families import (
     BaseWidget,
     Command,
     DisplayWidget,
-    KeyCommand,
     PublishCommand,
     TopicSource,
     TopicWidget,
@@ -47,6 +46,7 @@ from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
+from app.panel.widgets.templated import is_stop
 from app.pictures import picture_files
 
 
@@ -166,7 +166,7 @@ class Panel(Description):
     @cached_property
     def stops(self) -> tuple[Command, ...]:
         """The widgets that stop the machine."""
-        return tuple(w for w in self.commands if isinstance(w, KeyCommand) and w.role == "stop")
+        return tuple(widget for widget in self.commands if is_stop(widget))
 
     @cached_property
     def uniform_buttons(self) -> Mapping[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]:

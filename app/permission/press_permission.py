@@ -15,7 +15,7 @@ from app.i18n import TextLike
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
-from app.panel.widgets.templated import needs_control
+from app.panel.widgets.templated import is_stop, needs_control
 from app.permission.interlocks import (
     LINK_CODES,
     blocked_buttons,
@@ -151,8 +151,13 @@ def permissions(
         if widget.id not in verdicts:
             verdicts[widget.id] = judge(widget)
     for widget in panel.stops:
-        verdicts[widget.id] = with_advice(verdicts[widget.id], panel.stop_hint)
+        verdicts[widget.id] = with_hint(panel, widget, verdicts[widget.id])
     return verdicts
+
+
+def with_hint(panel: Panel, widget: Command, verdict: Verdict) -> Verdict:
+    """A lock of a stop button says what to use instead; any other verdict stays as it is."""
+    return with_advice(verdict, panel.stop_hint) if is_stop(widget) else verdict
 
 
 def judged(

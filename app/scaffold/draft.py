@@ -105,7 +105,7 @@ def make_draft(
     entries = [entry for entry in entries if (entry.kind, entry.name) not in left_out]
     acting = [
         replace(label, interlock=interlock_for(label, interlocks))
-        for label in with_own_labels([one for one in entries if one.control])
+        for label in with_own_labels([entry for entry in entries if entry.control])
     ]
     pages, rest = make_pages([*(entry for entry in entries if not entry.control), *acting], live)
     remarks += [f"{name}: {NO_ROOM}" for name in dict.fromkeys(one.name for one in rest)]

@@ -95,7 +95,8 @@ def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
 def _in_order(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     shown = [entry for entry in entries if not entry.control]
     shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
-    acting = sorted((entry for entry in entries if entry.control), key=lambda one: (one.kind, one.name))
+    controls = (entry for entry in entries if entry.control)
+    acting = sorted(controls, key=lambda entry: (entry.kind, entry.name))
     return [*shown, *acting]
 
 

@@ -82,9 +82,9 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
     numeric = kind in INTEGER_RANGES or kind in FLOAT_TYPES
     for interlock in interlocks:
         comparisons = interlock.comparisons
-        for one in (comparisons.get("equals"), *comparisons.get("one_of", ())):
-            if one is not None:
-                yield one
+        for value in (comparisons.get("equals"), *comparisons.get("one_of", ())):
+            if value is not None:
+                yield value
         if "min" in comparisons or "max" in comparisons:
             low, high = _limits(interlock)
             span = high - low

@@ -59,9 +59,11 @@ class PanelRobot:
         needs = [need for widget in panel.widgets() for need in needs_of(widget, self._interfaces)]
         names = played_names(panel)
         self._story = None if names is None else PlayedPalletizing(names, number)
-        told = {} if names is None else names.publishes
-        self._own = {name: kind for name, kind in _reference_topics(panel).items() if name not in told}
-        skipped = {**self._own, **told, EVENTS: EVENT_TYPE}
+        of_story = {} if names is None else names.publishes
+        self._own = {
+            name: kind for name, kind in _reference_topics(panel).items() if name not in of_story
+        }
+        skipped = {**self._own, **of_story, EVENTS: EVENT_TYPE}
         shown = _of(needs, Shown)
         self._topics = simulated_topics(panel, shown, self._interfaces, skipped, APART * number)
         self._published = _by_topic(_of(needs, Published))
@@ -88,9 +90,9 @@ class PanelRobot:
             for topic, one in self._topics.items()
         }
         events = SimulatedTopic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
-        return {**own, **dict(self._told_topics()), **simulated, EVENTS: events}
+        return {**own, **dict(self._story_topics()), **simulated, EVENTS: events}
 
-    def _told_topics(self) -> Iterator[tuple[str, SimulatedTopic]]:
+    def _story_topics(self) -> Iterator[tuple[str, SimulatedTopic]]:
         """The topics of the story. Those with states keep the last one for late subscribers."""
         if self._story is None:
             return
@@ -119,8 +121,8 @@ class PanelRobot:
     @cached_property
     def actions(self) -> Mapping[str, ActionServer]:
         own = {COUNT: CountAction(COUNT_TYPE, self._demo)} if self._has(COUNT) else {}
-        told = self._story.actions if self._story else {}
-        return {**own, **self._simulated, **told}
+        of_story = self._story.actions if self._story else {}
+        return {**own, **self._simulated, **of_story}
 
     # What it receives and publishes.
 

@@ -156,7 +156,7 @@ class ViewRefresher:
                 self._log.exception("the view could not be refreshed; it is tried again")
             self._failed = self._whole = True
             self._schedule(self._shown_at + AGAIN_S)
-            locked = lock_all(self._current, say("view_failed"))
+            locked = lock_all(self._panel, self._current, say("view_failed"))
             self.publisher.post(locked.view, locked.without_control)
         else:
             self._failed = self._whole = False

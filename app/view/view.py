@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple, TypedDict
 
-from app.i18n import Text, TextLike, say
+from app.i18n import Text, TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import NO_CONTROL, ControlView, for_role
@@ -164,20 +164,22 @@ def _show(
         return FAILED_COMMAND if isinstance(widget, Command) else FAILED, now + RETRY_S
 
 
-def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
+def lock_all(panel: Panel, current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
     """The view with every interlock and command locked for one reason."""
-    overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
+    stops = {widget.id for widget in panel.stops}
 
-    def locked(attributes: Mapping[str, Any]) -> Any:
+    def locked(attributes: Mapping[str, Any], widget: str = "") -> Any:
         if "enabled" not in attributes:
             return attributes
+        why = joined((reason, panel.stop_hint)) if widget in stops else reason
+        overlay = {"enabled": False, "reason": why, "reasons": why, "more": ""}
         return {name: overlay.get(name, value) for name, value in attributes.items()}
 
     view = current.view.copy()
     view["interlocks"] = {name: locked(state) for name, state in view["interlocks"].items()}
-    view["widgets"] = {name: locked(attributes) for name, attributes in view["widgets"].items()}
+    view["widgets"] = {name: locked(shown, name) for name, shown in view["widgets"].items()}
     view["state"] = UNKNOWN
-    without = {name: locked(attributes) for name, attributes in current.without_control.items()}
+    without = {name: locked(shown, name) for name, shown in current.without_control.items()}
     return current._replace(view=view, without_control=without)
 
 

@@ -11,6 +11,7 @@ let closing = 0;
 /** @param {HTMLElement} root @param {HTMLFormElement} form @param {(event: Event) => void} onYes */
 export function confirm(root, form, onYes) {
   const dialog = root.querySelector("dialog.ask");
+  if (dialog.matches(":popover-open")) return; // a second tap of a button in the frame, which stays live
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
     place.textContent = shownText(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
   }

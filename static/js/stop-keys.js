@@ -27,6 +27,7 @@ export class StopKeys {
   constructor(press) {
     this.#press = press;
     addEventListener("pointerdown", (event) => this.#began(event), true);
+    addEventListener("pointermove", (event) => this.#moved(event), true);
     // Where another finger scrolls the page, the browser takes the pointers of all fingers away.
     for (const name of ["pointerup", "pointercancel"]) addEventListener(name, (event) => this.#ended(event), true);
   }
@@ -43,11 +44,18 @@ export class StopKeys {
     if (button && !button.disabled) this.#down.set(event.pointerId, button);
   }
 
+  // A finger that slides off takes its press back.
+  /** @param {PointerEvent} event */
+  #moved(event) {
+    const button = this.#down.get(event.pointerId);
+    if (button && !isOver(button, event)) this.#down.delete(event.pointerId);
+  }
+
   /** @param {PointerEvent} event */
   #ended(event) {
     const button = this.#down.get(event.pointerId);
     this.#down.delete(event.pointerId);
-    if (!button || !(event.type === "pointercancel" || isOver(button, event))) return;
+    if (!button || (event.type === "pointerup" && !isOver(button, event))) return;
     this.#pressedAt.set(button, event.timeStamp);
     this.#press(button, event);
   }
@@ -55,9 +63,17 @@ export class StopKeys {
 
 const CLICK_AFTER_MS = 500;
 
-// Leaves the stop buttons bare under what covers the page.
+// Leaves the stop buttons bare under what covers the page, also when the page changes its size.
 /** @param {HTMLElement} cover */
 export function leaveStopsBare(cover) {
+  cutHoles(cover);
+  const resized = () => cutHoles(cover);
+  addEventListener("resize", resized);
+  cover.addEventListener("beforetoggle", () => removeEventListener("resize", resized), { once: true });
+}
+
+/** @param {HTMLElement} cover */
+function cutHoles(cover) {
   const { left, top, width, height } = cover.getBoundingClientRect();
   const holes = [...document.querySelectorAll(STOPS)]
     .map((button) => button.getBoundingClientRect())

@@ -4,6 +4,7 @@ evaluated."""
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -322,7 +323,7 @@ def test_an_evaluation_looks_only_at_what_may_have_changed(
         air.engine.evaluate()
     read: list[str] = []
 
-    def counted(alarm, *about):  # type: ignore[no-untyped-def]
+    def counted(alarm: Any, *about: Any) -> Any:
         read.append(alarm.id)
         return read_source(alarm, *about)
 

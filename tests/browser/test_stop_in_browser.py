@@ -14,6 +14,19 @@ from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
 STOP: Final = "[data-widget=stop] > button"
+PAUSE: Final = """
+[[frame.widget]]
+id = "pause"
+kind = "publish"
+label = "Pause"
+confirm_press = true
+topic = "/operation2"
+type = "std_msgs/msg/String"
+message = { data = "pause" }
+
+[[page]]
+id = "setup"
+"""
 RESET: Final = """
 [[page.group.widget]]
 id = "reset"
@@ -42,6 +55,7 @@ FEELS: Final = """(button) => new Promise((resolve) => {
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     above = "\n[screen]\ndim_after_s = 2"
     panel = PANEL.replace('\n[[page]]\nid = "other"\n', RESET) % above
+    panel = panel.replace('\n[[page]]\nid = "setup"\n', PAUSE)
     with demo_server(tmp_path_factory.mktemp("stop"), panel) as mine:
         permit(mine)
         yield mine
@@ -115,6 +129,19 @@ def test_a_tap_is_one_press_and_a_finger_that_slides_off_none(page: Page, cell: 
     pressed(cell, before + 1)
 
 
+def test_a_finger_whose_pointer_is_taken_away_has_pressed_only_while_it_was_on_stop(
+    page: Page, cell: Server
+) -> None:
+    """A browser takes the pointers of all fingers away where one of them scrolls the page."""
+    touch, (x, y), before = Touch(page), middle(page.locator(STOP)), stops(cell)
+    touch.send("touchStart", (x, y))
+    touch.send("touchMove", (x + 300, y - 200))
+    touch.send("touchCancel")
+    touch.send("touchStart", (x, y))
+    touch.send("touchCancel")
+    pressed(cell, before)
+
+
 def test_a_key_of_the_keyboard_presses_it_once(page: Page, cell: Server) -> None:
     before = stops(cell)
     page.locator(STOP).focus()
@@ -143,6 +170,15 @@ def uncovered(page: Page) -> bool:
     """Whether nothing lies over Stop."""
     script = "([x, y]) => document.elementFromPoint(x, y).closest('[data-widget=stop]') !== null"
     return bool(page.evaluate(script, list(middle(page.locator(STOP)))))
+
+
+def test_a_double_tap_of_a_frame_key_asks_once(page: Page, cell: Server) -> None:
+    page.locator("[data-widget=pause] > button").dblclick()
+    question = page.get_by_role("dialog", name="Pause")
+    expect(question).to_be_visible()
+    expect(page.locator("[data-widget=pause] .receipt")).to_be_empty()
+    question.locator(".no").click()
+    expect(question).to_be_hidden()
 
 
 def test_the_question_presses_with_yes_only(page: Page, cell: Server) -> None:
@@ -212,7 +248,9 @@ def test_a_touch_is_seen_within_50_ms(page: Page, cell: Server) -> None:
     touch = Touch(page)
 
     def felt() -> Any:
-        page.evaluate(f"window.felt = ({FEELS})(document.querySelector('[data-widget=load] > button'))")
+        page.evaluate(
+            f"void (window.felt = ({FEELS})(document.querySelector('[data-widget=load] > button')))"
+        )
         touch.send("touchStart", middle(load))
         took = page.evaluate("window.felt")
         touch.send("touchCancel")

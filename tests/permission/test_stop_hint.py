@@ -1,12 +1,24 @@
 """A locked stop button says what to use in its place; other buttons do not."""
 
+import asyncio
 from typing import Any, Final
 
 import pytest
 
+from app.i18n import say
 from app.robot.state import RobotState
-from app.view.view import build_view
-from tests.support.builders import FREE, NOW, panel_of, permits, robot_there
+from app.view.view import build_view, lock_all
+from tests.support.builders import (
+    FREE,
+    MESSAGE,
+    NOW,
+    FakeTransport,
+    panel_of,
+    permits,
+    press_widget,
+    presses_of,
+    robot_there,
+)
 from tests.support.words import english
 
 STOP: Final = {**FREE, "id": "stop", "label": "Stop", "role": "stop", "interlock": "operation"}
@@ -40,3 +52,21 @@ def test_without_the_key_it_is_the_emergency_stop(robot: RobotState) -> None:
 def test_a_free_stop_button_says_nothing(robot: RobotState) -> None:
     permits(robot)
     assert build_view(panel_of(STOP, START), robot, NOW).view["widgets"]["stop"]["reason"] is None
+
+
+def test_the_receipt_of_a_refused_stop_says_it_too(robot: RobotState) -> None:
+    permits(robot, False)
+    presses = presses_of(panel_of(MESSAGE, STOP, START, stop_hint=HINT), robot, FakeTransport())
+    inputs = {"message": "now"}
+    stop = asyncio.run(press_widget(presses, "stop", inputs))
+    start = asyncio.run(press_widget(presses, "start", inputs, "p2"))
+    assert (stop.outcome, start.outcome) == ("refused", "refused")
+    assert str(english(stop.reason)).endswith(HINT)
+    assert HINT not in str(english(start.reason))
+
+
+def test_a_view_that_failed_says_it_at_the_stop_button_only(robot: RobotState) -> None:
+    panel = panel_of(STOP, START, stop_hint=HINT)
+    view = lock_all(panel, build_view(panel, robot, NOW), say("view_failed")).view
+    reasons = {name: str(english(view["widgets"][name]["reason"])) for name in ("stop", "start")}
+    assert reasons["stop"] == f"{reasons['start']} {HINT}"

@@ -209,12 +209,12 @@ def lost_text(about: str, code: str = "topic_unrouted") -> str:
     return f"{lost.what} {lost.do}"
 
 
-def topic_named(graph: GraphSnapshot, place: Place, given: str) -> tuple[RobotGraph, SurveyedTopic]:
+def topic_named(graph: GraphSnapshot, place: Place, wanted: str) -> tuple[RobotGraph, SurveyedTopic]:
     """The topic of this name, which is not below the namespace if it begins with "//"; LinkError with
     similar names."""
     check_namespace(graph, place.namespace)
-    known = shown_topics(graph, "" if given.startswith(GLOBAL) else place.namespace)
-    name = f"/{given.lstrip('/')}"
+    known = shown_topics(graph, "" if wanted.startswith(GLOBAL) else place.namespace)
+    name = f"/{wanted.lstrip('/')}"
     if name not in known:
         close = near(name, known)
         hint = f"did you mean {' or '.join(close)}?" if close else "`operator-panel topics` lists them"

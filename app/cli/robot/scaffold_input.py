@@ -85,7 +85,7 @@ async def _parameters(
         late = asyncio.get_running_loop().time() > end
         of_node = None if late else await services.parameters(node)
         if of_node is not None:
-            parameters += [replace(one, node=one.node.removeprefix(below)) for one in of_node]
+            parameters += [replace(known, node=known.node.removeprefix(below)) for known in of_node]
         elif robot.service(f"{node.name}/list_parameters") is not None:
             unreadable.append(node.name.removeprefix(below))
     return parameters, unreadable
@@ -101,15 +101,15 @@ def _is_of(topic: SurveyedTopic, namespace: str) -> bool:
     return _is_below(topic.name, namespace) or any(_is_below(node, namespace) for node in nodes)
 
 
-def _topic(one: SurveyedTopic, below: str) -> SurveyedTopic:
+def _topic(topic: SurveyedTopic, below: str) -> SurveyedTopic:
     """With its name as a panel file has it."""
-    if _is_below(one.name, below):
-        return replace(one, name=one.name.removeprefix(below))
-    return one if one.name in SHARED_TOPICS else replace(one, name=f"/{one.name}")
+    if _is_below(topic.name, below):
+        return replace(topic, name=topic.name.removeprefix(below))
+    return topic if topic.name in SHARED_TOPICS else replace(topic, name=f"/{topic.name}")
 
 
-def _server(one: Server, below: str) -> Server:
-    return replace(one, name=one.name.removeprefix(below))
+def _server(server: Server, below: str) -> Server:
+    return replace(server, name=server.name.removeprefix(below))
 
 
 def _has_use(topic: SurveyedTopic, interfaces: Interfaces) -> bool:

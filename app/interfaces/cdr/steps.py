@@ -102,9 +102,9 @@ class _ProgramBuilder:
         self._sizes = room
         self._pending = NO_SIZE
 
-    def add(self, do: ScanStep, one: Any = None, other: Any = None) -> None:
+    def add(self, do: ScanStep, first: Any = None, second: Any = None) -> None:
         self._flush()
-        self.steps.append((do, one, other))
+        self.steps.append((do, first, second))
 
     @property
     def _next_step(self) -> int:

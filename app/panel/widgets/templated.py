@@ -44,7 +44,12 @@ class TemplateCommand(KeyCommand, PressCommand):
         yield from ()
 
 
+def is_stop(widget: Command) -> bool:
+    """Whether it stops the machine."""
+    return isinstance(widget, KeyCommand) and widget.role == "stop"
+
+
 def needs_control(widget: Command) -> bool:
     """Whether only a client in control may press or hold it, if the panel requires control: all but a
     press that stops."""
-    return not (isinstance(widget, TemplateCommand) and widget.role == "stop")
+    return not (isinstance(widget, TemplateCommand) and is_stop(widget))

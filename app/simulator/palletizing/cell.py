@@ -31,7 +31,7 @@ LONGEST_STEP_S: Final = 5.0  # a machine that slept goes on where it was
 JITTER: Final = 0.04  # of a cycle's duration
 JOG_S: Final = 0.3  # the belt stops without a message for so long
 OUT_S: Final = 6.0  # a pallet goes out
-LIGHT_S: Final = 0.4  # until the lamp reports what it was told
+LIGHT_S: Final = 0.4  # until the lamp reports what it was switched to
 HOUR_S: Final = 3600.0
 FIRST_BOXES: Final = 87
 FIRST_PALLET: Final = 11
@@ -133,7 +133,7 @@ class PalletizingCell:
         notes, self._notes = self._notes, []
         return notes
 
-    # What it is told.
+    # Commands.
 
     def start(self) -> str:
         if refused := self._refused_start():

@@ -37,7 +37,7 @@ class PalletOut:
         self._goals: dict[bytes, int] = {}
         self._running: bytes | None = None
         self._pallet = 0
-        self._told = -1
+        self._reported = -1
 
     def step(self) -> None:
         """Ends the running goal when its pallet is out, or stays."""
@@ -50,7 +50,7 @@ class PalletOut:
         if goal_id in self._goals or self._cell.move_pallet_out():
             return False
         self._goals[goal_id], self._running = EXECUTING, goal_id
-        self._pallet, self._told = self._cell.pallet, -1
+        self._pallet, self._reported = self._cell.pallet, -1
         for old in list(self._goals)[:-KEPT_GOALS]:
             del self._goals[old]
         return True
@@ -67,9 +67,9 @@ class PalletOut:
 
     def feedback(self) -> list[tuple[bytes, Fields]]:
         percent = self._percent()
-        if self._running is None or percent == self._told:
+        if self._running is None or percent == self._reported:
             return []
-        self._told = percent
+        self._reported = percent
         return [(self._running, {"sequence": [percent]})]
 
     def states(self) -> list[tuple[bytes, int]]:

@@ -15,10 +15,12 @@ export class Cleaning {
   #endsAt = 0; // by performance.now(): a clock that is set changes nothing
 
   constructor() {
-    addEventListener("resize", () => over.matches(":popover-open") && leaveStopsBare(over));
     let holding = 0;
     const end = over.querySelector(".end-cleaning");
-    end.addEventListener("pointerdown", () => (holding = setTimeout(() => this.#end(), HOLD_TO_END_MS)));
+    end.addEventListener("pointerdown", () => {
+      clearTimeout(holding); // of another finger: only the last one counts
+      holding = setTimeout(() => this.#end(), HOLD_TO_END_MS);
+    });
     for (const name of ["pointerup", "pointercancel", "pointerleave"])
       end.addEventListener(name, () => clearTimeout(holding));
     const left = Number(pageGuard.recall(UNTIL)) - Date.now();
