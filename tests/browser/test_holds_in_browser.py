@@ -110,7 +110,7 @@ def test_lost_permission_ends_the_hold_until_a_new_press(finger: Finger, jogger:
     def allow_after() -> None:
         permit(finger.server, jogger, True)
 
-    found = measured(finger, jogger, forbid, "forbidden", lift=False)
+    found = measured(finger, jogger, forbid, "interlock_not_permitted", lift=False)
     soon("permission lost", found)
     expect(finger.page.locator("#receipt-jog")).to_contain_text("does not permit operation")
     heard = len(jogger.heard(TOPIC))

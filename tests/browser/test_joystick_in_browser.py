@@ -174,7 +174,7 @@ def test_lost_permission_ends_the_hold(thumb: Thumb, robot: RosNode) -> None:
     def forbid() -> None:
         robot.publish("/stick_enabled", {"data": False})
 
-    drive_ended_by(thumb, robot, forbid, "forbidden", lift=False)
+    drive_ended_by(thumb, robot, forbid, "interlock_not_permitted", lift=False)
     expect(thumb.button).to_be_disabled()
     expect(thumb.root.locator('[data-text="reason"]')).to_contain_text("does not permit operation")
     count = len(robot.heard(TOPIC))
