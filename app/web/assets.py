@@ -19,7 +19,9 @@ from typing import ClassVar, Final
 from app.errors import KindError
 from app.panel.widgets.kinds import KINDS
 
-LAYERS: Final = ("guard", "tokens", "base", "layout", "widgets", "keys", "floor")
+LAYERS: Final = (
+    "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
+)  # fmt: skip
 SHARED: Final = ("entries", "marks")  # by several kinds of widgets
 OWN_PAGES: Final = ("log",)
 GALLERY: Final = "gallery"  # not in the installed package

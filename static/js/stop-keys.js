@@ -1,7 +1,6 @@
-// Touches of buttons: felt at once; a stop button is pressed by its own pointer, whatever else touches the glass, and
-// lies below no cover.
+// Touches of buttons: felt at once. A stop button is pressed by its own pointer, whatever else touches the glass.
 
-const STOPS = '[data-role="stop"] > button[type="submit"]';
+export const STOPS = '[data-role="stop"] > button[type="submit"]';
 
 /** @param {EventTarget | null} target */
 export function isStop(target) {
@@ -62,25 +61,6 @@ export class StopKeys {
 }
 
 const CLICK_AFTER_MS = 500;
-
-// Leaves the stop buttons bare under what covers the page, also when the page changes its size.
-/** @param {HTMLElement} cover */
-export function leaveStopsBare(cover) {
-  cutHoles(cover);
-  const resized = () => cutHoles(cover);
-  addEventListener("resize", resized);
-  cover.addEventListener("beforetoggle", () => removeEventListener("resize", resized), { once: true });
-}
-
-/** @param {HTMLElement} cover */
-function cutHoles(cover) {
-  const { left, top, width, height } = cover.getBoundingClientRect();
-  const holes = [...document.querySelectorAll(STOPS)]
-    .map((button) => button.getBoundingClientRect())
-    .filter((hole) => hole.width && hole.height)
-    .map((hole) => `M${hole.left - left} ${hole.top - top}v${hole.height}h${hole.width}v${-hole.height}z`);
-  cover.style.clipPath = holes.length ? `path(evenodd, "M0 0H${width}V${height}H0z${holes.join("")}")` : "";
-}
 
 // A button looks pressed while a pointer is down on it: from the first moment on, and not once it has slid off.
 export function feelTouches() {

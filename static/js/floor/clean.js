@@ -1,7 +1,7 @@
 // The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
 import { shield } from "./shield.js";
 import { lockLocally, unlockLocally } from "../show.js";
-import { leaveStopsBare } from "../stop-keys.js";
+import { leaveStopsBare } from "./bare.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;

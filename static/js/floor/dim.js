@@ -1,5 +1,5 @@
 // The page gets dark when it is not touched for long. The touch that wakes it presses nothing.
-import { leaveStopsBare } from "../stop-keys.js";
+import { leaveStopsBare } from "./bare.js";
 import { shield } from "./shield.js";
 
 const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keydown", "wheel"];
