@@ -339,15 +339,22 @@ def test_a_whole_message_of_many_elements_is_not_built() -> None:
     assert time.thread_time() - before < LONGEST_TURN_S
 
 
-@pytest.mark.real_time
+# Additions that take 10 ms on the machine for which `LONGEST_TURN_S` was chosen.
+ADDITIONS: Final = 200_000
+ADDITIONS_S: Final = 0.01
+
+
 def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> None:
+    """Compared with additions in the same moment: a processor is slower beside other work."""
     event = "rcl_interfaces/msg/ParameterEvent"
     parameter = {"value": {"type": 4, "string_value": "x" * 20}}
     changed = [{"name": f"parameter_{number}", **parameter} for number in range(1990)]
     data = INTERFACES.encode(event, {"node": "/arm", "changed_parameters": changed})
-    took = []
+    ratios = []
     for _ in range(5):  # the least: another program shares the processor
-        before = time.thread_time()
+        begin = time.thread_time()
+        assert sum(number & 7 for number in range(ADDITIONS)) > 0
+        middle = time.thread_time()
         assert len(INTERFACES.decode(event, data).changed_parameters) == 1990
-        took.append(time.thread_time() - before)
-    assert min(took) < LONGEST_TURN_S
+        ratios.append((time.thread_time() - middle) / (middle - begin))
+    assert min(ratios) < LONGEST_TURN_S / ADDITIONS_S
