@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from app.alarms.delays import DelayedCondition
-from app.alarms.entries import Entry
+from app.alarms.entries import AlarmEntry
 from app.alarms.instance import AlarmInstance, Definition, define
 from app.alarms.records import entry_in, status_in
 from app.alarms.sources import UNKNOWN, SourceReading, read_source
@@ -127,7 +127,9 @@ class AlarmEngine:
             del self._waiting[alarm_id]
         self._emit([t for alarm_id in turn for t in self._evaluated(self.alarms[alarm_id], now)])
 
-    def entries_received(self, robot: str, alarm_id: str, entries: Iterable[Entry], at: float) -> None:
+    def entries_received(
+        self, robot: str, alarm_id: str, entries: Iterable[AlarmEntry], at: float
+    ) -> None:
         """A robot published entries of an alarm with `diagnostics` or a list; `at` in monotonic
         seconds. A list without `active` has all of its active entries."""
         source = self._sources[robot, alarm_id]
@@ -152,7 +154,7 @@ class AlarmEngine:
         self._entries[definition.robot, definition.alarm.id].append(alarm)
         return alarm
 
-    def _end_missing(self, source: Definition, named: Mapping[str, Entry]) -> None:
+    def _end_missing(self, source: Definition, named: Mapping[str, AlarmEntry]) -> None:
         for alarm in self._entries[source.robot, source.alarm.id]:
             entry = alarm.entry
             if entry is not None and entry.name not in named and entry.level:

@@ -17,7 +17,7 @@ LONGEST_NAME: Final = 200
 NO_CATALOGUE: Final[Catalogue] = {}
 
 
-class Entry(NamedTuple):
+class AlarmEntry(NamedTuple):
     """An alarm as a robot publishes it. `level` is 0 where it is not active."""
 
     name: str
@@ -28,7 +28,7 @@ class Entry(NamedTuple):
 
 def entries_of(
     alarm: Alarm, rows: Sequence[tuple[Any, ...]], catalogue: Catalogue = NO_CATALOGUE
-) -> Iterator[Entry]:
+) -> Iterator[AlarmEntry]:
     """The entries of a message: `rows` have the values of `DIAGNOSTIC_FIELDS`, or of the fields that
     `[alarm.list]` names. `catalogue` has the texts of its codes."""
     if alarm.listed is not None:
@@ -37,10 +37,10 @@ def entries_of(
     for name, level, message, hardware in rows:
         if any(fnmatchcase(name, pattern) for pattern in alarm.diagnostics or ()):
             text = message or hardware or name
-            yield Entry(name[:LONGEST_NAME], LEVELS.get(_number(level), 2), text, alarm.priorities)
+            yield AlarmEntry(name[:LONGEST_NAME], LEVELS.get(_number(level), 2), text, alarm.priorities)
 
 
-def _listed(alarm: Alarm, listed: AlarmList, row: tuple[Any, ...], catalogue: Catalogue) -> Entry:
+def _listed(alarm: Alarm, listed: AlarmList, row: tuple[Any, ...], catalogue: Catalogue) -> AlarmEntry:
     values = dict(zip(listed.own_fields, row, strict=True))
     code = str(values[listed.code])[:LONGEST_NAME]
     known = catalogue.get(code)
@@ -48,7 +48,7 @@ def _listed(alarm: Alarm, listed: AlarmList, row: tuple[Any, ...], catalogue: Ca
     is_active = values.get(listed.active) is True if listed.active else True
     level = str(_number(values[listed.level])) if listed.level else ""
     priority = listed.priorities.get(level, alarm.priority)
-    return Entry(code, int(is_active), text or alarm.text or code, (priority,))
+    return AlarmEntry(code, int(is_active), text or alarm.text or code, (priority,))
 
 
 def _number(level: Any) -> Any:

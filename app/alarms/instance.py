@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 from app.alarms.delays import LIMIT_LEVELS, DelayedCondition, Delays, Limit, LimitName
-from app.alarms.entries import Entry
+from app.alarms.entries import AlarmEntry
 from app.alarms.states import AlarmKind
 from app.alarms.status import NORMAL, AlarmRules, AlarmStatus
 from app.i18n import TextLike
@@ -26,7 +26,7 @@ class Definition:
     delays: Delays
     thresholds: tuple[Limit | None, ...]
 
-    def of_entry(self, entry: Entry) -> "Definition":
+    def of_entry(self, entry: AlarmEntry) -> "Definition":
         """The definition of an alarm that the robot publishes itself."""
         rules = replace(self.rules, priorities=entry.priorities)
         return replace(self, id=f"{self.id}:{entry.name}", rules=rules)
@@ -65,7 +65,7 @@ class AlarmInstance:
     status: AlarmStatus = NORMAL
     conditions: tuple[DelayedCondition, ...] = field(init=False)
     value: float | None = None
-    entry: Entry | None = None
+    entry: AlarmEntry | None = None
     heard_at: float = -math.inf
     due: float = math.inf
     timer: float = math.inf

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from app.alarms.entries import Entry
+from app.alarms.entries import AlarmEntry
 from app.alarms.instance import AlarmInstance
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, TakenOut
@@ -55,13 +55,13 @@ def status_in(record: str, now: Moment) -> AlarmStatus:
     )
 
 
-def entry_in(record: str) -> Entry | None:
+def entry_in(record: str) -> AlarmEntry | None:
     """What the robot had published; None for an alarm of the panel file."""
     values = json.loads(record).get("entry")
     if values is None:
         return None
     text: TextLike = text_in(values["text"]) if values["is_sentence"] else values["text"]
-    return Entry(values["name"], int(values["level"]), text, tuple(values["priorities"]))
+    return AlarmEntry(values["name"], int(values["level"]), text, tuple(values["priorities"]))
 
 
 def _wall(moment: Moment | None) -> float | None:

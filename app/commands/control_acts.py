@@ -7,7 +7,7 @@ from typing import Final
 from app.audit.press_record import PressLog, origin_of
 from app.commands.acts import Act, ActRequest, Applied, always, same_principal, server_permits
 from app.i18n import Text, say
-from app.permission.control_authority import LIFE_S, ControlAuthority, Refusal
+from app.permission.control_authority import LIFE_S, ControlAuthority, ControlRefusal
 from app.permission.control_parties import HandOver
 from app.permission.principal import Principal
 
@@ -28,7 +28,7 @@ class ControlChange(Applied):
 
 
 def _changes(
-    apply: Callable[[ControlAuthority, ActRequest], Refusal],
+    apply: Callable[[ControlAuthority, ActRequest], ControlRefusal],
 ) -> Callable[[ControlAuthority, ActRequest], ControlChange]:
     """`Act.apply` from a function that returns the code of a refusal, "" if it was done."""
 

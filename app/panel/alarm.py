@@ -15,7 +15,7 @@ from app.panel.base import (
     File,
     Id,
     Seconds,
-    Topic,
+    TopicName,
     TopicQos,
     Type,
     panel_text,
@@ -126,7 +126,7 @@ class Alarm(Description):
     off_delay_s: Delay = 0.0
     on_unknown: Literal["keep", "raise"] = "keep"
     max_shelf_s: Annotated[float, Field(gt=0, le=SHIFT_S, allow_inf_nan=False)] = SHIFT_S
-    topic: Topic | None = None
+    topic: TopicName | None = None
     type: Type | None = None
     field: FieldPath = "data"
     unit: Unit = ""

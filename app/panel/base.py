@@ -237,7 +237,7 @@ else:
     Note = panel_text(40)
     AnyText = panel_text(least=0)
 Span = Annotated[int, Field(ge=1, le=12)]
-Topic = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
+TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_check_message_type)]
 ServiceType = Annotated[str, AfterValidator(_check_service_type)]
 ActionType = Annotated[str, AfterValidator(_check_action_type)]

@@ -4,7 +4,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from app.panel.base import Description, Seconds, Topic
+from app.panel.base import Description, Seconds, TopicName
 
 
 class ControlRules(Description):
@@ -46,4 +46,4 @@ class RecordRules(Description):
     before_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
     after_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
     max_mb: Annotated[float, Field(ge=16, le=1_000_000, allow_inf_nan=False)] = 512.0
-    topics: Annotated[tuple[Topic, ...] | None, Field(strict=False)] = None
+    topics: Annotated[tuple[TopicName, ...] | None, Field(strict=False)] = None

@@ -21,7 +21,7 @@ from app.permission.verdict import PERMITTED, Verdict, locked
 LIFE_S: Final = 5.0  # without a keepalive; a page with scripts sends one every 1.5 s
 ASK_AGAIN_S: Final = 10.0  # after a request was denied
 
-Refusal = Literal[
+ControlRefusal = Literal[
     "",
     "control_held_by_other",
     "control_already_requested",
@@ -109,7 +109,7 @@ class ControlAuthority:
 
     # Acts: each returns why it was refused, "" where it was done. They are idempotent.
 
-    def take(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
+    def take(self, who: Principal, life_s: float = LIFE_S) -> ControlRefusal:
         """Takes what is free; the panel at the cell takes over."""
         self.advance()
         if not who.client.id:
@@ -121,7 +121,7 @@ class ControlAuthority:
             self._log_line(f"control {'taken over' if holder else 'taken'} by {who}")
         return ""
 
-    def ask(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
+    def ask(self, who: Principal, life_s: float = LIFE_S) -> ControlRefusal:
         """Asks the holder; what is free or may be taken over is taken."""
         self.advance()
         if not who.client.id:
@@ -137,7 +137,7 @@ class ControlAuthority:
         self._log_line(f"{who} asks for control")
         return ""
 
-    def give(self, who: Principal, to: str) -> Refusal:
+    def give(self, who: Principal, to: str) -> ControlRefusal:
         """The holder grants the request of the browser with the id `to`."""
         self.advance()
         requester = self.requester
@@ -146,7 +146,7 @@ class ControlAuthority:
         self._pass_on(f"given by {who}")
         return ""
 
-    def keep(self, who: Principal, to: str) -> Refusal:
+    def keep(self, who: Principal, to: str) -> ControlRefusal:
         """The holder denies the request of the browser with the id `to`."""
         self.advance()
         requester = self.requester
@@ -158,7 +158,7 @@ class ControlAuthority:
         self._log_line(f"{who} keeps control: {requester} was denied")
         return ""
 
-    def release(self, who: Principal) -> Refusal:
+    def release(self, who: Principal) -> ControlRefusal:
         """The holder gives it up: to the client that requests it, else to no one. A requester withdraws
         its request."""
         self.advance()

@@ -13,7 +13,7 @@ from app.errors import PanelError
 from app.panel import Panel, load_panel
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous
-from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, Refusal
+from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, ControlRefusal
 from app.permission.control_authority_view import Role, role
 from app.permission.control_parties import HandOver
 from app.permission.principal import Principal
@@ -213,7 +213,7 @@ def test_the_holder_keeps_and_the_request_can_be_repeated_later(requested: Room)
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("who", [BOB, CY, CELL, ANONYMOUS])
 def test_only_the_holder_answers_a_request(
-    requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], who: Principal
+    requested: Room, act: Callable[[ControlAuthority, Principal, str], ControlRefusal], who: Principal
 ) -> None:
     assert act(requested.control, who, BOB.client.id) == "control_changed"
     assert (requested.control.holder, requested.control.requester) == (ANN, BOB)
@@ -222,7 +222,7 @@ def test_only_the_holder_answers_a_request(
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("to", [CY.client.id, ANN.client.id, ""])
 def test_an_answer_is_for_the_request_that_was_on_the_screen(
-    requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], to: str
+    requested: Room, act: Callable[[ControlAuthority, Principal, str], ControlRefusal], to: str
 ) -> None:
     assert act(requested.control, ANN, to) == "control_changed"
     assert (requested.control.holder, requested.control.requester) == (ANN, BOB)

@@ -26,7 +26,7 @@ from app.panel.base import (
     Note,
     Seconds,
     Span,
-    Topic,
+    TopicName,
     TopicQos,
     Type,
 )
@@ -143,7 +143,7 @@ class Input(EntryWidget):
 class TopicWidget(BaseWidget):
     """A widget that publishes or shows a topic."""
 
-    topic: Topic
+    topic: TopicName
     type: Type
     qos: TopicQos = TopicQos()
 
@@ -151,7 +151,7 @@ class TopicWidget(BaseWidget):
 class TopicField(Description):
     """A field of a topic of its own, which a widget reads beside or instead of its topic."""
 
-    topic: Topic
+    topic: TopicName
     type: Type
     field: FieldPath = "data"
     max_age_s: Seconds | None = None

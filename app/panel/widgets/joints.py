@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 from app.errors import Fault
 from app.i18n import TextLike, number
 from app.interfaces import STRING_TYPES, Interfaces
-from app.panel.base import Description, FieldPath, Label, Seconds, Span, Topic, Type, non_empty
+from app.panel.base import Description, FieldPath, Label, Seconds, Span, TopicName, Type, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
 from app.panel.values import number_text
@@ -98,7 +98,7 @@ class Joints(TopicWidget, DisplayWidget):
     `names` beside it."""
 
     kind: Literal["joints"]
-    topic: Topic = "/joint_states"
+    topic: TopicName = "/joint_states"
     type: Type = "sensor_msgs/msg/JointState"
     field: FieldPath = "position"
     names: ListName = "name"

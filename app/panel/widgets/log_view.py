@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from app.panel.base import Span, Topic
+from app.panel.base import Span, TopicName
 from app.panel.widgets.families import DisplayWidget, TopicSource, TopicWidget
 
 LEVELS: Final = ("debug", "info", "warn", "error", "fatal")
@@ -19,7 +19,7 @@ class LogView(TopicWidget, DisplayWidget):
     """
 
     kind: Literal["log"]
-    topic: Topic = "/rosout"
+    topic: TopicName = "/rosout"
     type: Literal["rcl_interfaces/msg/Log"] = "rcl_interfaces/msg/Log"
     level: Level = "info"
     node: Annotated[str, Field(max_length=100)] = ""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
-from app.panel.base import Description, FieldPath, Seconds, Span, Topic, Type
+from app.panel.base import Description, FieldPath, Seconds, Span, TopicName, Type
 from app.panel.checks.templates import NOW_RULE, example_values, unknown_input_faults
 from app.panel.checks.types import field_faults
 from app.panel.constants import mismatch_at
@@ -19,7 +19,7 @@ class Confirm(Description):
     """A field that confirms the effect of a command: it must have the value `equals` (or that of an
     input, `"{id}"`) within `within_s`. The default type is that of the topic elsewhere in the panel."""
 
-    topic: Topic
+    topic: TopicName
     type: Type | None = None
     field: FieldPath = "data"
     equals: Any

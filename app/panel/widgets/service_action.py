@@ -11,7 +11,7 @@ from app.dialect.endpoint import Role, ServerRole
 from app.errors import Fault, InterfaceError
 from app.i18n import TextLike
 from app.interfaces import Interfaces
-from app.panel.base import ActionType, AnyText, FieldPath, Seconds, ServiceType, Span, Topic
+from app.panel.base import ActionType, AnyText, FieldPath, Seconds, ServiceType, Span, TopicName
 from app.panel.template import response_paths
 from app.panel.widgets.families import CheckContext
 from app.panel.widgets.templated import TemplateCommand
@@ -43,7 +43,7 @@ class Call(ServerCommand):
     string of these names. `answer` is shown with `{field}` filled in."""
 
     kind: Literal["call"]
-    service: Topic
+    service: TopicName
     type: ServiceType
     request: dict[str, Any] = Field(default_factory=dict)
     success: FieldPath | None = None
@@ -82,7 +82,7 @@ class Action(ServerCommand):
     `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
 
     kind: Literal["action"]
-    action: Topic
+    action: TopicName
     type: ActionType
     goal: dict[str, Any] = Field(default_factory=dict)
     progress: FieldPath | None = None

@@ -16,7 +16,7 @@ from app.panel.base import (
     Label,
     Seconds,
     Span,
-    Topic,
+    TopicName,
     TopicQos,
     Type,
     non_empty,
@@ -77,7 +77,7 @@ class Pen(Description):
     """One line of a trend: a field as `value * scale + offset`. `normal` is the lowest and the highest
     normal value."""
 
-    topic: Topic
+    topic: TopicName
     type: Type
     qos: TopicQos = TopicQos()
     field: FieldPath = "data"

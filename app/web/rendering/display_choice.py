@@ -21,7 +21,7 @@ LANGUAGE: Final = "language"
 KEPT_S: Final = 400 * 86400  # as long as browsers keep a cookie
 
 
-class Display(NamedTuple):
+class DisplaySettings(NamedTuple):
     """The values of a page's root element."""
 
     theme: str
@@ -47,9 +47,9 @@ class Choice(TypedDict):
     options: list[Option]
 
 
-def display_of(connection: HTTPConnection, panel: Panel) -> Display:
+def display_of(connection: HTTPConnection, panel: Panel) -> DisplaySettings:
     """The look of this browser's pages."""
-    return Display(*(_chosen(connection, panel, name) for name in Display._fields))
+    return DisplaySettings(*(_chosen(connection, panel, name) for name in DisplaySettings._fields))
 
 
 def _chosen(connection: HTTPConnection, panel: Panel, name: str) -> str:
@@ -71,7 +71,7 @@ def language_choice(panel: Panel, now: str) -> list[Choice]:
     return [Choice(name=LANGUAGE, label=say("display_language"), options=options)] if tags[1:] else []
 
 
-def choices(now: Display) -> list[Choice]:
+def choices(now: DisplaySettings) -> list[Choice]:
     """The choices of the menu, with what is chosen."""
     return [
         Choice(

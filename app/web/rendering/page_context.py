@@ -27,7 +27,13 @@ from app.web.assets import PICTURES
 from app.web.embedding import QUERY as EMBED
 from app.web.embedding import only_shows
 from app.web.language import language_of
-from app.web.rendering.display_choice import Choice, Display, choices, display_of, language_choice
+from app.web.rendering.display_choice import (
+    Choice,
+    DisplaySettings,
+    choices,
+    display_of,
+    language_choice,
+)
 from app.web.rendering.page_data import page_json, panel_data
 from app.web.rendering.page_words import page_words
 
@@ -39,7 +45,7 @@ class PageContext(TypedDict):
     """The variables of `screen.html`."""
 
     site: AppState
-    display: Display
+    display: DisplaySettings
     choices: Sequence[Choice]
     panel: Panel
     page: Page

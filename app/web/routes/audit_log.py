@@ -25,7 +25,7 @@ from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
-from app.web.rendering.display_choice import Display, display_of
+from app.web.rendering.display_choice import DisplaySettings, display_of
 from app.web.rendering.log_words import (
     OUTCOMES,
     date_of,
@@ -98,7 +98,7 @@ class LogContext(TypedDict):
 
     site: AppState
     panel: Panel
-    display: Display
+    display: DisplaySettings
     wanted: Wanted
     typed: dict[str, str]
     rows: list[Row]

@@ -16,7 +16,7 @@ from app.web.gallery.displays import LINES
 from app.web.gallery.examples import Example
 from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
-from app.web.rendering.display_choice import CHOICES, Choice, Display, choices, display_of
+from app.web.rendering.display_choice import CHOICES, Choice, DisplaySettings, choices, display_of
 from app.web.rendering.entry_words import UNREADABLE
 from app.web.rendering.page_words import TREND_WORDS, WORDS
 
@@ -101,7 +101,7 @@ def _html(example: Example, number: int, cell: Template, words: dict[str, Any]) 
     return Markup(html)
 
 
-def _urls(choice: Choice, display: Display) -> list[str]:
+def _urls(choice: Choice, display: DisplaySettings) -> list[str]:
     """The address of each option of a choice, with the others as they are."""
     now = display._asdict()
     return [f"?{urlencode(now | {choice['name']: option['value']})}" for option in choice["options"]]

@@ -19,7 +19,7 @@ from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
-from app.web.rendering.display_choice import Display
+from app.web.rendering.display_choice import DisplaySettings
 from app.web.rendering.page_words import ask_of
 
 
@@ -27,7 +27,7 @@ class Reader(NamedTuple):
     """The language and the display choices of a browser."""
 
     language: str
-    display: Display
+    display: DisplaySettings
 
 
 @dataclass(frozen=True, slots=True)
