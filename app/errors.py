@@ -60,8 +60,8 @@ class KioskError(Exception):
     @property
     def text(self) -> TextLike:
         """The sentence that it was raised with, or its message, which is in no language."""
-        given = self.args[0] if self.args else ""
-        return given if isinstance(given, Text) else str(self)
+        argument = self.args[0] if self.args else ""
+        return argument if isinstance(argument, Text) else str(self)
 
 
 class SettingsError(KioskError):

@@ -94,8 +94,8 @@ def _icon(name: str) -> Markup:
     return icon(name)
 
 
-def _unknown(what: str, name: Any) -> PlacementError:
-    return PlacementError({"unknown": what, "name": str(name)[:LONGEST_NAME]})
+def _unknown(kind: str, name: Any) -> PlacementError:
+    return PlacementError({"unknown": kind, "name": str(name)[:LONGEST_NAME]})
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +119,8 @@ class _Page:
                 raise _unknown("picture", name)
             return PICTURE.format(Markup(f"{mark}."), name, alt)
 
-        given = {"title": self.request["titles"][language], "language": language}
-        context = template.new_context({**given, "widget": widget, "picture": picture})
+        texts = {"title": self.request["titles"][language], "language": language}
+        context = template.new_context({**texts, "widget": widget, "picture": picture})
         try:
             return _joined(template, template.root_render_func(context))
         except Exception:

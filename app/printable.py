@@ -36,7 +36,7 @@ def readable(text: str) -> str:
 
 def printable(text: str) -> str:
     """The text with an escape, such as `\\u202e`, for each character that must not be shown."""
-    return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _HIDDEN.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def one_line(text: str, most: int | None = None) -> str:

@@ -46,8 +46,8 @@ class RobotLog(logging.LoggerAdapter[logging.Logger]):
     def process(
         self, msg: Any, kwargs: MutableMapping[str, Any]
     ) -> tuple[Any, MutableMapping[str, Any]]:
-        given = {name: f"{self._prefix}{text}" for name, text in kwargs.get("extra", {}).items()}
-        extra = {**(self.extra or {}), **given}
+        prefixed = {name: f"{self._prefix}{text}" for name, text in kwargs.get("extra", {}).items()}
+        extra = {**(self.extra or {}), **prefixed}
         return f"{self._prefix.replace('%', '%%')}{msg}", {**kwargs, "extra": extra}
 
 

@@ -71,8 +71,8 @@ class Settings:
 
 def state_home() -> Path:
     """The user's state folder (XDG Base Directory Specification). A relative path is ignored."""
-    given = Path(os.environ.get("XDG_STATE_HOME", ""))
-    return given if given.is_absolute() else Path("~/.local/state").expanduser()
+    path = Path(os.environ.get("XDG_STATE_HOME", ""))
+    return path if path.is_absolute() else Path("~/.local/state").expanduser()
 
 
 def _check_names(variables: Iterable[str]) -> None:
@@ -86,32 +86,32 @@ def _check_names(variables: Iterable[str]) -> None:
             raise SettingsError(f"{variable} is not a setting of this server: {hint}")
 
 
-def parse_root_path(given: str) -> str:
+def parse_root_path(text: str) -> str:
     """The path below which a proxy shows the panel, without a slash at its end; "" for none."""
-    path = given.rstrip("/")
+    path = text.rstrip("/")
     if not ROOT_PATH.fullmatch(path) or {".", ".."} & set(path.split("/")):
         raise SettingsError(
-            f'KIOSK_ROOT_PATH is "{given}": it must be a path such as /cell1, of letters, digits, ".", '
+            f'KIOSK_ROOT_PATH is "{text}": it must be a path such as /cell1, of letters, digits, ".", '
             '"_", "~" and "-"'
         )
     return path
 
 
-def _parse_mode(given: str) -> Mode | None:
-    match given:
+def _parse_mode(text: str) -> Mode | None:
+    match text:
         case "":
             return None
         case "demo" | "live":
-            return given
-    raise SettingsError(f'KIOSK_MODE is "{given}": it must be "demo" or "live"')
+            return text
+    raise SettingsError(f'KIOSK_MODE is "{text}": it must be "demo" or "live"')
 
 
-def _split_list(given: str) -> Iterator[str]:
-    return filter(None, (part.strip().lower() for part in given.split(",")))
+def _split_list(text: str) -> Iterator[str]:
+    return filter(None, (part.strip().lower() for part in text.split(",")))
 
 
-def _parse_hosts(given: str) -> Iterator[str]:
-    for host in _split_list(given):
+def _parse_hosts(text: str) -> Iterator[str]:
+    for host in _split_list(text):
         if not HOST_NAME.fullmatch(host):
             raise SettingsError(
                 f'KIOSK_HOSTS has "{host}": names or addresses with commas between, without port '
@@ -120,8 +120,8 @@ def _parse_hosts(given: str) -> Iterator[str]:
         yield host
 
 
-def _parse_proxies(given: str) -> Iterator[str]:
-    for proxy in _split_list(given):
+def _parse_proxies(text: str) -> Iterator[str]:
+    for proxy in _split_list(text):
         try:
             ip_network(proxy)
         except ValueError:
@@ -137,5 +137,5 @@ def _parse_path(env: Mapping[str, str], name: str, default: Path) -> Path: ...
 @overload
 def _parse_path(env: Mapping[str, str], name: str, default: None) -> Path | None: ...
 def _parse_path(env: Mapping[str, str], name: str, default: Path | None) -> Path | None:
-    given = env.get(name)
-    return Path(given).expanduser().resolve() if given else default
+    text = env.get(name)
+    return Path(text).expanduser().resolve() if text else default

@@ -29,13 +29,13 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 def checked(path: Path, verbose: bool = False) -> int:
     """Prints the faults or notes of one panel file; its exit status."""
     try:
-        found = check_panel(path)
+        result = check_panel(path)
     except PanelError as error:
         print(error, file=sys.stderr, flush=True)
         return UNREADABLE if error.unreadable else FAULTY
-    lines = [_summary(path, found.panel), *map(str, found.notes)]
+    lines = [_summary(path, result.panel), *map(str, result.notes)]
     if verbose:
-        lines += [line for remark in found.previews for line in str(remark).splitlines()]
+        lines += [line for remark in result.previews for line in str(remark).splitlines()]
     print("\n  ".join(lines), flush=True)
     return GOOD
 
@@ -43,8 +43,8 @@ def checked(path: Path, verbose: bool = False) -> int:
 def _summary(path: Path, panel: Panel) -> str:
     widgets = sum(1 for _ in panel.widgets())
     robots = f"{len(panel.robots)} robot(s), " if panel.robots else ""
-    what = f'"{panel.title}", {robots}{len(panel.pages)} page(s), {widgets} widget(s)'
-    return f"{path}: good: {what}"
+    summary = f'"{panel.title}", {robots}{len(panel.pages)} page(s), {widgets} widget(s)'
+    return f"{path}: good: {summary}"
 
 
 def make_parser(prog: str) -> Parser:

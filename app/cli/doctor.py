@@ -70,24 +70,24 @@ def as_text(report: Report, verbose: bool = False) -> str:
         for finding in report.findings
         if finding.severity == severity
     ]
-    last = {one.code: one for one in ordered}
-    for advice, found in groupby(ordered, lambda one: one.do):
-        for one in found:
-            lines.append(_line(one))
-            if one is last[one.code] and report.more[one.code]:
-                lines.append(f"         … and {report.more[one.code]} more")
+    last = {finding.code: finding for finding in ordered}
+    for advice, findings in groupby(ordered, lambda finding: finding.do):
+        for finding in findings:
+            lines.append(_line(finding))
+            if finding is last[finding.code] and report.more[finding.code]:
+                lines.append(f"         … and {report.more[finding.code]} more")
         lines.append(f"         → {advice}")
     counts = [(n, severity) for severity in SEVERITIES if (n := report.count(severity))]
     listed = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
-    what = "All is well" if report.is_well else "Something is wrong"
+    result = "All is well" if report.is_well else "Something is wrong"
     passed = len(report.facts) + report.more_facts
-    lines.append(f"{what}: {listed or 'nothing was found'}, {passed} checks were passed.")
+    lines.append(f"{result}: {listed or 'nothing was found'}, {passed} checks were passed.")
     return "\n".join(lines)
 
 
-def _line(one: Finding) -> str:
-    robot = f" of robot {one.robot}" if one.robot else ""
-    return f"{one.severity:8} {one.code}{robot}: {one.what}"
+def _line(finding: Finding) -> str:
+    robot = f" of robot {finding.robot}" if finding.robot else ""
+    return f"{finding.severity:8} {finding.code}{robot}: {finding.sentence}"
 
 
 def make_parser(prog: str) -> Parser:

@@ -36,23 +36,23 @@ def exit_status(work: Callable[[Namespace], int], options: Namespace) -> int:
         return 1
 
 
-def _install(given: Namespace) -> int:
-    host = Host(given.root.resolve())
+def _install(arguments: Namespace) -> int:
+    host = Host(arguments.root.resolve())
     options = Options(
-        wheel=checked_wheel(given.wheel),
-        panel=given.panel,
-        zenoh=given.zenoh,
-        wheels=given.wheels and given.wheels.resolve(),
-        screen=not given.no_screen,
-        touch_matrix=tuple(given.touch_matrix.split()),
-        any_system=given.any_system,
+        wheel=checked_wheel(arguments.wheel),
+        panel=arguments.panel,
+        zenoh=arguments.zenoh,
+        wheels=arguments.wheels and arguments.wheels.resolve(),
+        screen=not arguments.no_screen,
+        touch_matrix=tuple(arguments.touch_matrix.split()),
+        any_system=arguments.any_system,
     )
     plan = steps(options, host)
     for line in describe(plan, host):
         print(line)
-    if given.dry_run:
+    if arguments.dry_run:
         return 0
-    if not confirmed(given):
+    if not confirmed(arguments):
         return USAGE_ERROR
     print("installed" if apply(plan, host, print_progress) else "everything was done before")
     if host.runs_systemd:

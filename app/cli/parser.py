@@ -15,10 +15,10 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **options)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        given, unknown = self.parse_known_args(args, namespace)
+        parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:  # options first: what follows one may be its value
             self.error(self._unknown(min(unknown, key=lambda word: not word.startswith("-"))))
-        return given
+        return parsed
 
     def _unknown(self, word: str) -> str:
         if not word.startswith("-"):

@@ -24,13 +24,13 @@ PROG: Final = "python -m app.cli support"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = make_parser(prog).parse_args(arguments)
-    file = given.output or Path(time.strftime("operator-panel-support-%Y%m%d-%H%M%S.zip"))
-    if not given.list and not given.yes and not sys.stdin.isatty():
+    parsed = make_parser(prog).parse_args(arguments)
+    file = parsed.output or Path(time.strftime("operator-panel-support-%Y%m%d-%H%M%S.zip"))
+    if not parsed.list and not parsed.yes and not sys.stdin.isatty():
         print("this is no terminal to ask at: give --yes to write it, or --list", file=sys.stderr)
         return 2
     try:
-        settings, options = settings_of(given), options_of(given)
+        settings, options = settings_of(parsed), options_of(parsed)
         diagnosis = asyncio.run(diagnose(settings, options))
     except KioskError as error:
         print(error, file=sys.stderr)
@@ -38,9 +38,9 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     sources = Sources(environment=os.environ, journal=journal)
     made = parts(settings, options, diagnosis, sources)
     print(listed(made))
-    if given.list:
+    if parsed.list:
         return 0
-    if not given.yes and not _wanted(file):
+    if not parsed.yes and not _wanted(file):
         print("nothing was written")
         return 2
     try:
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def listed(made: Sequence[Part]) -> str:
     """What the bundle holds, a line for each file."""
-    lines = [f"  {one.name:32} {_size(one.size):>8}  {one.about}" for one in made]
+    lines = [f"  {part.name:32} {_size(part.size):>8}  {part.about}" for part in made]
     return "\n".join(["The bundle holds:", *lines, ONLY])
 
 

@@ -19,7 +19,7 @@ def check_graph(report: Report, graph: GraphSnapshot, behind: PanelNames) -> boo
         theirs = graph.robots[0].namespace
         report.find("bridge_namespace", robot=robot.id, theirs=theirs, ours=robot.namespace)
         return False
-    bridges = [bridge for one in behind.graphs for bridge in one.bridges]
+    bridges = [bridge for graph in behind.graphs for bridge in graph.bridges]
     for bridge in bridges:
         _check_bridge(report, bridge, robot.id)
     _check_several(report, behind, robot.id)
@@ -43,21 +43,21 @@ def _check_bridge(report: Report, bridge: Bridge, robot: str) -> None:
 
 def _check_several(report: Report, behind: PanelNames, robot: str) -> None:
     """Whether two bridges forward the same for the same namespace."""
-    found = {}
+    shared = {}
     for name in sorted(behind.robot.needed()):
         there = [t for t in behind.topics(name) if t.announced]
         zids = {e.bridge for t in there for e in (*t.publishers, *t.subscribers)}
         zids |= {server.bridge for server in (*behind.services(name), *behind.actions(name))}
         if len(zids) > 1:
-            found[name] = zids
-    if found:
-        bridges = sorted(set[str]().union(*found.values()))
-        report.find("bridges_two", few([*found]), robot=robot, number=len(bridges), zids=few(bridges))
+            shared[name] = zids
+    if shared:
+        bridges = sorted(set[str]().union(*shared.values()))
+        report.find("bridges_two", few([*shared]), robot=robot, number=len(bridges), zids=few(bridges))
 
 
 def _check_nodes(report: Report, behind: PanelNames, bridges: Sequence[Bridge]) -> bool:
     """Whether the bridges see nodes, and any of what the panel needs."""
-    topics = sum(len(one.topics) for one in behind.graphs)
+    topics = sum(len(graph.topics) for graph in behind.graphs)
     nodes = behind.nodes()
     domain = few(sorted({str(bridge.domain) for bridge in bridges}))
     # Limited to its machine and on another interface than the nodes, it learns their names at most.
@@ -72,8 +72,8 @@ def _check_nodes(report: Report, behind: PanelNames, bridges: Sequence[Bridge]) 
     report.fact(f"{where} has nodes: {len(nodes)}, and topics: {topics}")
     needed = behind.robot.needed()
     there = any(behind.topics(n) or behind.offers(n) or behind.has_node(n) for n in needed)
-    if not there and (found := next(behind.elsewhere(needed), None)) is not None:
-        report.find("robot_elsewhere", robot=behind.robot.id, found=found[0], namespace=found[1])
+    if not there and (near := next(behind.elsewhere(needed), None)) is not None:
+        report.find("robot_elsewhere", robot=behind.robot.id, found=near[0], namespace=near[1])
     return True
 
 

@@ -155,14 +155,14 @@ def _operators_log(folder: Path) -> Iterator[Part]:
 
 def _presses(folder: Path) -> list[Row]:
     """The entries of the last hour, the oldest first."""
-    wanted, found = Filter(since=int((time.time() - LAST_S) * 1000), every=True), list[Row]()
-    while len(found) < MOST_PRESSES:
-        before = found[-1].entry.seq if found else None
+    wanted, presses = Filter(since=int((time.time() - LAST_S) * 1000), every=True), list[Row]()
+    while len(presses) < MOST_PRESSES:
+        before = presses[-1].entry.seq if presses else None
         more = rows(folder, wanted, before, ROWS_AT_ONCE)
-        found += more
+        presses += more
         if len(more) < ROWS_AT_ONCE:
             break
-    return found[::-1]
+    return presses[::-1]
 
 
 def _of_server(options: Options, diagnosis: Diagnosis) -> Iterator[Part]:

@@ -23,10 +23,10 @@ def check_clocks(
 ) -> None:
     types = robot.panel.subscriptions()
     live = {
-        topic: [one for key in robot.possible_keys(topic) for one in observed.live(key)]
+        topic: [sample for key in robot.possible_keys(topic) for sample in observed.live(key)]
         for topic in types
     }
-    sent = [one.sent - one.wall for several in live.values() for one in several if one.sent]
+    sent = [sample.sent - sample.wall for several in live.values() for sample in several if sample.sent]
     if not sent:
         report.find("clock_unknown", robot=robot.id, window=f"{observed.window_s:.1f}")
         return

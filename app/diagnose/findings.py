@@ -23,10 +23,10 @@ SEVERITIES: Final[tuple[Severity, ...]] = get_args(Severity)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """`what` and `do` are sentences with `{name}` placeholders."""
+    """`sentence` and `do` are sentences with `{name}` placeholders."""
 
     severity: Severity
-    what: str
+    sentence: str
     do: str
 
 
@@ -36,9 +36,9 @@ _ROWS: Final[Mapping[Severity, wording.Rows]] = {
     "note": wording.NOTES,
 }
 KINDS: Final[Mapping[str, Kind]] = {
-    code: Kind(severity, what, do)
+    code: Kind(severity, sentence, do)
     for severity, rows in _ROWS.items()
-    for code, (what, do) in rows.items()
+    for code, (sentence, do) in rows.items()
 }
 
 
@@ -57,8 +57,8 @@ class Finding:
         return KINDS[self.code].severity
 
     @property
-    def what(self) -> str:
-        return self._filled(KINDS[self.code].what)
+    def sentence(self) -> str:
+        return self._filled(KINDS[self.code].sentence)
 
     @property
     def do(self) -> str:
@@ -75,7 +75,7 @@ class Finding:
             "code": self.code,
             "about": one_line(self.about, MOST_TEXT),
         }
-        return finding | {"robot": self.robot, "what": self.what, "do": self.do}
+        return finding | {"robot": self.robot, "what": self.sentence, "do": self.do}
 
 
 def few(names: Sequence[str]) -> str:
@@ -116,12 +116,12 @@ class Report:
     @property
     def is_well(self) -> bool:
         """Whether there is neither an error nor a warning."""
-        return all(found.severity == "note" for found in self.findings)
+        return all(finding.severity == "note" for finding in self.findings)
 
     def count(self, severity: Severity) -> int:
         """How many findings of a severity there are, with those that are only counted."""
         more = sum(number for code, number in self.more.items() if KINDS[code].severity == severity)
-        return more + sum(found.severity == severity for found in self.findings)
+        return more + sum(finding.severity == severity for finding in self.findings)
 
     def codes(self) -> list[str]:
-        return [found.code for found in self.findings]
+        return [finding.code for finding in self.findings]

@@ -39,15 +39,15 @@ def harmless_report(diagnosis: Diagnosis, version: str) -> dict[str, Any]:
     }
 
 
-def _finding(one: Finding) -> dict[str, str]:
-    about = _place(one.about) if one.code in OF_THE_FILE else _names(one.about, *_ABOUT)
+def _finding(finding: Finding) -> dict[str, str]:
+    about = _place(finding.about) if finding.code in OF_THE_FILE else _names(finding.about, *_ABOUT)
     details = {
         name: _names(str(value), rule) if (rule := DETAILS.get(name)) else LEFT_OUT
-        for name, value in one.details.items()
+        for name, value in finding.details.items()
     }
-    what = KINDS[one.code].what.format(about=about, **details)
-    shown = {"severity": one.severity, "code": one.code, "about": about}
-    return shown | {"robot": one.robot, "what": what}
+    sentence = KINDS[finding.code].sentence.format(about=about, **details)
+    shown = {"severity": finding.severity, "code": finding.code, "about": about}
+    return shown | {"robot": finding.robot, "what": sentence}
 
 
 def _names(text: str, *expected: re.Pattern[str]) -> str:
@@ -56,7 +56,7 @@ def _names(text: str, *expected: re.Pattern[str]) -> str:
     shown = []
     for name in text[: more.start() if more else None].split(", "):
         kept = (harmless(name, rule) for rule in expected)
-        shown.append(next((one for one in kept if one != LEFT_OUT), LEFT_OUT))
+        shown.append(next((name for name in kept if name != LEFT_OUT), LEFT_OUT))
     return ", ".join(shown) + (more[0] if more else "")
 
 

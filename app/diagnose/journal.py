@@ -143,8 +143,8 @@ def sentences() -> tuple[Sentence, ...]:
     return tuple(sorted(telling, key=lambda s: (-len(s.fixed[0]), -_letters(s), s.fixed)))
 
 
-def _letters(one: Sentence) -> int:
-    return sum(map(str.isalpha, "".join(one.fixed)))
+def _letters(sentence: Sentence) -> int:
+    return sum(map(str.isalpha, "".join(sentence.fixed)))
 
 
 def _logged(tree: ast.AST) -> Iterator[Sentence]:
@@ -175,8 +175,8 @@ def harmless_line(line: str, unit: str = "") -> str:
 def _sentence_of(text: str) -> str:
     """A robot's name may stand before a sentence."""
     for rest in (text, text.partition(": ")[2]):
-        for one in sentences():
-            if (shown := one.shown(rest)) is not None:
+        for sentence in sentences():
+            if (shown := sentence.shown(rest)) is not None:
                 return shown if rest is text else f"{GAP}: {shown}"
     return LEFT_OUT
 

@@ -103,12 +103,12 @@ async def check_version(report: Report, session: AdminSession, endpoint: str, ro
     """Whether the other side has this Zenoh; its admin space may be off."""
     ours = version("eclipse-zenoh")
     answers = await asyncio.gather(*(session.query_all(selector, ASK_S) for selector in ROUTERS))
-    for _, answer in (one for several in answers for one in several):
+    for _, answer in (answer for several in answers for answer in several):
         with suppress(
             ValueError, TypeError, AttributeError, LookupError, RecursionError
         ):  # an answer that is none of Zenoh's
             said = json.loads(answer)
-            if all(session.zid != one.get("peer") for one in said["sessions"]):
+            if all(session.zid != peer.get("peer") for peer in said["sessions"]):
                 continue  # further away
             theirs = RELEASE.match(said["version"])
             if theirs is not None and theirs[1] != ".".join(ours.split(".")[:2]):

@@ -69,10 +69,14 @@ class PanelNames:
     graphs: tuple[RobotGraph, ...]
 
     @classmethod
-    def of(cls, robot: PanelRobot, graph: GraphSnapshot) -> "PanelNames":
-        elsewhere = [f"/{robot.key(one)}" for one in robot.needed() if one.startswith(GLOBAL)]
+    def for_robot(cls, robot: PanelRobot, graph: GraphSnapshot) -> "PanelNames":
+        elsewhere = [f"/{robot.key(name)}" for name in robot.needed() if name.startswith(GLOBAL)]
         names = (robot.namespace, *elsewhere)
-        own = (one for one in graph.robots if any(within(name, one.namespace) for name in names))
+        own = (
+            robot_graph
+            for robot_graph in graph.robots
+            if any(within(name, robot_graph.namespace) for name in names)
+        )
         return cls(robot, tuple(own))
 
     def places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:
@@ -93,13 +97,13 @@ class PanelNames:
     def subscribers(self, name: str) -> list[TopicEndpoint]:
         return [subscriber for topic in self.topics(name) for subscriber in topic.subscribers]
 
-    def topic_forwarding(self, name: str, of: TopicList) -> Forwarding | None:
+    def topic_forwarding(self, name: str, ends: TopicList) -> Forwarding | None:
         """Of the publishers or subscribers of a topic; None without any."""
         places = ((graph, graph.topic(own)) for graph, own in self.places(name))
         return _best(
-            topic_forwarding(graph, topic, [of])
+            topic_forwarding(graph, topic, [ends])
             for graph, topic in places
-            if topic and getattr(topic, of)
+            if topic and getattr(topic, ends)
         )
 
     def server_forwarding(self, name: str, kind: ServerList) -> Forwarding | None:
@@ -140,7 +144,9 @@ class PanelNames:
     def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
         """A sentence with similar names in the graph; "" if there are none."""
         there = [
-            f"{graph.namespace}{server.name}" for graph in self.graphs for server in _of(graph, kind)
+            f"{graph.namespace}{server.name}"
+            for graph in self.graphs
+            for server in _endpoints(graph, kind)
         ]
         own = self.robot.namespace
         similar = [self._written(near_name) for near_name in near(f"/{self.robot.key(name)}", there)]
@@ -158,8 +164,8 @@ class PanelNames:
         own = self.robot.namespace
         for graph in self.graphs:
             topics, servers = (t.name for t in graph.topics), (*graph.services, *graph.actions)
-            for there in (f"{graph.namespace}{one}" for one in (*topics, *(s.name for s in servers))):
-                for name in (one for one in names if not one.startswith(GLOBAL)):
+            for there in (f"{graph.namespace}{name}" for name in (*topics, *(s.name for s in servers))):
+                for name in (name for name in names if not name.startswith(GLOBAL)):
                     if there.endswith(name) and there != f"{own}{name}":
                         yield there, there.removesuffix(name)
 
@@ -171,7 +177,7 @@ def _best(known: Iterable[Forwarding | None]) -> Forwarding | None:
     return next((key for key in order if key in there), None)
 
 
-def _of(graph: RobotGraph, kind: str) -> tuple[SurveyedTopic, ...] | tuple[Server, ...]:
+def _endpoints(graph: RobotGraph, kind: str) -> tuple[SurveyedTopic, ...] | tuple[Server, ...]:
     match kind:
         case "topics":
             return graph.topics

@@ -21,7 +21,7 @@ REGULAR: Final = 2  # messages while one listens
 def check_permissions(
     report: Report, behind: PanelNames, observed: ReceivedSamples, interfaces: Interfaces
 ) -> None:
-    for topic in dict.fromkeys(one.topic for one in behind.robot.panel.interlocks):
+    for topic in dict.fromkeys(interlock.topic for interlock in behind.robot.panel.interlocks):
         _check_topic(report, behind, observed, topic)
     for interlock in behind.robot.panel.interlocks:
         _check_value(report, behind, observed, interlock, interfaces)
@@ -30,7 +30,7 @@ def check_permissions(
 def _check_topic(report: Report, behind: PanelNames, observed: ReceivedSamples, topic: str) -> None:
     """Whether its publisher stays, and a panel that starts later would get a permission."""
     using = [interlock for interlock in behind.robot.panel.interlocks if interlock.topic == topic]
-    key, ids = behind.robot.key(topic), ", ".join(one.id for one in using)
+    key, ids = behind.robot.key(topic), ", ".join(interlock.id for interlock in using)
     count, window = len(observed.live(key)), f"{observed.window_s:.1f}"
     publishers = behind.publishers(topic)
     robot = behind.robot.id
@@ -44,7 +44,7 @@ def _check_topic(report: Report, behind: PanelNames, observed: ReceivedSamples, 
     _check_publishers(report, publishers, using, robot)
     if behind.topic_forwarding(topic, "publishers") != "forwarded":
         return  # it is found as a topic
-    limits = [one.max_age_s for one in using if one.max_age_s is not None]
+    limits = [interlock.max_age_s for interlock in using if interlock.max_age_s is not None]
     if limits and observed.longest_gap(key) > min(limits):
         report.find(
             "permission_stale",

@@ -84,7 +84,7 @@ async def _inspect(
     if not before.robots:
         report.find(sentences.absent, ", ".join(endpoints), robot=robot.id)
         return before
-    if not check_graph(report, before, PanelNames.of(robot, before)):
+    if not check_graph(report, before, PanelNames.for_robot(robot, before)):
         return before
     received = await _receive(robot, link, before, listen_s)
     graph = await _later(link, before)
@@ -92,9 +92,9 @@ async def _inspect(
         for bridge in silent:
             report.find(sentences.silent, bridge, robot=robot.id)
         return before
-    behind = PanelNames.of(robot, graph)
+    behind = PanelNames.for_robot(robot, graph)
     check_permissions(report, behind, received, interfaces)
-    TopicChecks(report, behind, interfaces, PanelNames.of(robot, before)).check()
+    TopicChecks(report, behind, interfaces, PanelNames.for_robot(robot, before)).check()
     check_clocks(report, robot, received, interfaces)
     if graph.bridges:
         check_copies(report, robot, received)
@@ -122,7 +122,7 @@ async def _receive(
 ) -> ReceivedSamples:
     """Listens to the panel's topics until interlocks that are not latched, or have a max_age_s, have
     been received often enough."""
-    panel, behind, dialect = robot.panel, PanelNames.of(robot, graph), link.access.dialect
+    panel, behind, dialect = robot.panel, PanelNames.for_robot(robot, graph), link.access.dialect
     topics = panel.subscriptions()
     expressions = {
         key: dialect.topic(key, type_name)

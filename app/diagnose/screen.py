@@ -45,8 +45,8 @@ def displays(root: Path = DRM) -> Iterator[ConnectedScreen]:
         except OSError:
             continue
         name = folder.name.partition("-")[2]
-        if (found := parsed(name, edid)) is not None:
-            yield found
+        if (screen := parsed(name, edid)) is not None:
+            yield screen
 
 
 def parsed(name: str, edid: bytes) -> ConnectedScreen | None:
@@ -73,7 +73,7 @@ def check_screens(report: Report, panel: Panel, root: Path = DRM) -> None:
             report.find("screen_unknown", named)
             continue
         _check_size(report, panel, display, named)
-        screen = Screen.of(size, panel.mm_per_px)
+        screen = Screen.from_size(size, panel.mm_per_px)
         for page in panel.pages:
             if page.fit and not page.template and (why := fit.reason(panel, page, screen)):
                 report.find("page_too_large", page.id, screen=size, detail=why)

@@ -38,7 +38,7 @@ def harmless_snapshot(events: str) -> Any:
 def by_id(value: Any, keys: Rules, rule: Rule = None) -> dict[str, Any]:
     """Of a table by ids, such as those of widgets."""
     table = value if isinstance(value, Mapping) else {}
-    return {key: harmless_value(of, keys, rule) for key, of in table.items() if ID.fullmatch(key)}
+    return {key: harmless_value(row, keys, rule) for key, row in table.items() if ID.fullmatch(key)}
 
 
 def harmless_ready(answer: Any) -> Any:

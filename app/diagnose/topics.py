@@ -93,10 +93,11 @@ class TopicChecks:
         if all(misfits):  # one that gets it is enough
             self._find("topic_qos", topic, detail=misfits[0])
 
-    def _is_let_through(self, of: TopicList, topic: str) -> bool:
+    def _is_let_through(self, ends: TopicList, topic: str) -> bool:
         """Whether a bridge forwards a topic that is there. It finds why not, unless that is new."""
         known = [
-            robots_behind.topic_forwarding(topic, of) for robots_behind in (self._earlier, self._behind)
+            robots_behind.topic_forwarding(topic, ends)
+            for robots_behind in (self._earlier, self._behind)
         ]
         return self._is_found("topic_unrouted", topic, known)
 
@@ -128,21 +129,23 @@ class TopicChecks:
         """Whether the robot's definition is known to be another one."""
         return differs(theirs, own_hash(type_name, self._interfaces))
 
-    def _check_server(self, what: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
-        """`what` is "service" or "action"."""
+    def _check_server(self, role: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
+        """`role` is "service" or "action"."""
         if not servers:
-            if self._is_served(name, "service_servers" if what == "service" else "action_servers"):
-                hint = self._behind.hint(name, "services" if what == "service" else "actions")
-                self._find(f"{what}_absent", name, hint=hint)
+            if self._is_served(name, "service_servers" if role == "service" else "action_servers"):
+                hint = self._behind.hint(name, "services" if role == "service" else "actions")
+                self._find(f"{role}_absent", name, hint=hint)
             return
         for server in servers:
             if server.type != wanted:
-                self._find(f"{what}_type", name, found=server.type, wanted=wanted)
+                self._find(f"{role}_type", name, found=server.type, wanted=wanted)
             elif not server.can_be_called:
                 self._find("wrong_rmw", name, vendor=server.dds)
             else:
-                found = (one for one, theirs in server.hashes if self._differs(theirs, one))
-                if (part := next(found, None)) is not None:
+                differing = (
+                    type_name for type_name, theirs in server.hashes if self._differs(theirs, type_name)
+                )
+                if (part := next(differing, None)) is not None:
                     self._find("definition_differs", name, type=part)
 
     def _check_parameters(self, node: str) -> None:

@@ -142,8 +142,8 @@ def _in_a_row(parts: Iterable[Param], pattern: str, language: str) -> str:
 def _panel_text(params: Mapping[str, Any], language: str) -> str:
     """A text of the panel file in this language, else in the panel's own, whose tag is under ""."""
     others = (text for tag, text in params.items() if tag)
-    found = params.get(language) or params.get(params[""]) or next(others)
-    return str(_written(found, language))
+    chosen = params.get(language) or params.get(params[""]) or next(others)
+    return str(_written(chosen, language))
 
 
 def _parts(params: Mapping[str, Any], language: str) -> str:
@@ -176,7 +176,7 @@ def localized(value: Any, language: str) -> Any:
     if isinstance(value, str):  # most are
         return value
     if isinstance(value, dict):
-        return {key: localized(one, language) for key, one in value.items()}
+        return {key: localized(item, language) for key, item in value.items()}
     if isinstance(value, Text):
         return _rendered(value, language)
     if isinstance(value, list | tuple):
@@ -204,7 +204,7 @@ def _text_in(stored: Any) -> Text:
     if not isinstance(stored, dict) or stored.keys() != {"code", "params"}:
         raise ValueError("it is no sentence with a code and params")
     code = present_code(stored["code"])
-    return say(code, **{name: _param_in(one) for name, one in stored["params"].items()})
+    return say(code, **{name: _param_in(param) for name, param in stored["params"].items()})
 
 
 def _param_in(stored: Any) -> Any:

@@ -36,17 +36,17 @@ def each_language(text: TextLike) -> Mapping[str, str]:
     return text.texts if isinstance(text, PanelText) else {"": str(text)}
 
 
-def alike(one: TextLike, other: TextLike) -> bool:
+def alike(text: TextLike, other: TextLike) -> bool:
     """Whether two texts of the panel file read the same in a language of either."""
-    tags = {*each_language(one), *each_language(other)}
-    return any(render(one, tag or ENGLISH) == render(other, tag or ENGLISH) for tag in tags)
+    tags = {*each_language(text), *each_language(other)}
+    return any(render(text, tag or ENGLISH) == render(other, tag or ENGLISH) for tag in tags)
 
 
 def changed(text: str | PanelText, change: Callable[[str], str]) -> str | PanelText:
     """A text of the panel file, changed in each of its languages."""
     if isinstance(text, str):
         return change(text)
-    return PanelText({tag: change(one) for tag, one in text.texts.items()}, text.own)
+    return PanelText({tag: change(translation) for tag, translation in text.texts.items()}, text.own)
 
 
 def together(parts: Iterable[TextLike]) -> TextLike:
@@ -58,7 +58,9 @@ def together(parts: Iterable[TextLike]) -> TextLike:
 
 def filled_in(text: PanelText, fill: Callable[[str], TextLike]) -> Text:
     """A text of the panel file, filled in in each of its languages."""
-    return Text(PANEL, (("", text.own), *((tag, fill(one)) for tag, one in text.texts.items())))
+    return Text(
+        PANEL, (("", text.own), *((tag, fill(translation)) for tag, translation in text.texts.items()))
+    )
 
 
 def number(text: str, unit: TextLike = "") -> TextLike:
@@ -81,12 +83,12 @@ def numbers(texts: Iterable[str], unit: TextLike = "") -> Text:
 
 def after_space(unit: str | PanelText) -> str | PanelText:
     """A unit as it follows a number within a sentence; "" without one."""
-    return changed(unit, lambda one: f" {one}") if unit else ""
+    return changed(unit, lambda text: f" {text}") if unit else ""
 
 
 def with_unit(text: str, unit: str | PanelText) -> TextLike:
     """A text that is not a number, or a list of numbers, followed by the unit if it is not ""."""
-    return changed(unit, lambda one: f"{text} {one}") if unit else text
+    return changed(unit, lambda symbol: f"{text} {symbol}") if unit else text
 
 
 def time_of_day(at: str) -> Text:

@@ -39,9 +39,9 @@ def own_wheel() -> Path | None:
     return next(runs_from, None) or next(Path(sys.prefix).glob(f"{NAME}*{SUFFIX}"), None)
 
 
-def checked_wheel(given: Path | None) -> Path:
+def checked_wheel(path: Path | None) -> Path:
     """The wheel to install; SettingsError says which is expected."""
-    wheel = given or own_wheel()
+    wheel = path or own_wheel()
     if wheel is None:
         raise SettingsError(
             "the wheel is missing: name it, such as dist/operator_panel-0.1.0-py3-none-any.whl"

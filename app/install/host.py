@@ -70,11 +70,11 @@ def _without_own(env: Mapping[str, str]) -> dict[str, str]:
 
 def release_of(host: Host) -> tuple[str, str]:
     """(id, version) of the system, such as ("debian", "12"); os-release(5)."""
-    found = {}
+    keys = {}
     for name in ("/etc/os-release", "/usr/lib/os-release"):
         if host.files.is_file(name):
             for line in host.files.read(name).decode(errors="replace").splitlines():
                 key, _, value = line.partition("=")
-                found[key] = value.strip('"')
+                keys[key] = value.strip('"')
             break
-    return found.get("ID", ""), found.get("VERSION_ID", "")
+    return keys.get("ID", ""), keys.get("VERSION_ID", "")

@@ -44,13 +44,13 @@ class Type:
         return replace(self, container="one", size=0)
 
     def __str__(self) -> str:
-        one = f"{self.name}<={self.bound}" if self.bound else self.name
+        element = f"{self.name}<={self.bound}" if self.bound else self.name
         match self.container:
             case "one":
-                return one
+                return element
             case "array":
-                return f"{one}[{self.size}]"
-        return f"{one}[<={self.size}]" if self.size else f"{one}[]"
+                return f"{element}[{self.size}]"
+        return f"{element}[<={self.size}]" if self.size else f"{element}[]"
 
 
 def zero_value(kind: Type) -> Any:
@@ -110,7 +110,7 @@ class Structure:
 
     def nested_fields(self) -> Iterator[tuple[Field, str]]:
         """(field, structure name) of each field whose type is a structure."""
-        return ((one, one.type.name) for one in self.fields if one.type.is_nested)
+        return ((field, field.type.name) for field in self.fields if field.type.is_nested)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,13 +138,13 @@ class Definitions:
         """The definitions without these interfaces."""
         return Definitions(
             {
-                name: one
-                for name, one in self.structures.items()
+                name: structure
+                for name, structure in self.structures.items()
                 if interface_name(name) not in left_out
             },
             {
-                name: one
-                for name, one in self.interface_types.items()
+                name: definition
+                for name, definition in self.interface_types.items()
                 if interface_name(name) not in left_out
             },
             self.unusable | {**left_out},

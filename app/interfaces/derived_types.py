@@ -102,5 +102,5 @@ def compose_action(name: str, goal: Structure, result: Structure, feedback: Stru
         Field("get_result_service", Type(types.get_result)),
         Field("feedback_message", Type(types.feedback_message)),
     )
-    own = {one.name: one for one in (goal, result, feedback, message)}
+    own = {structure.name: structure for structure in (goal, result, feedback, message)}
     return send_goal | get_result | Definitions(own, {name: whole})

@@ -88,7 +88,7 @@ def _plain_numbers(values: "memoryview[Any]") -> list[Any]:
 
 
 @lru_cache(4096)
-def _field_names(of: type[Any]) -> tuple[tuple[str, str], ...]:
+def _field_names(message_class: type[Any]) -> tuple[tuple[str, str], ...]:
     """(attribute, field name) of a message class. No ROS field name ends with "_"."""
-    own = [field.name for field in fields(of) if field.name != PLACEHOLDER]
+    own = [field.name for field in fields(message_class) if field.name != PLACEHOLDER]
     return tuple((name, name.removesuffix("_")) for name in own)

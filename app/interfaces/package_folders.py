@@ -71,13 +71,13 @@ def package_name(package: Path) -> str:
 
 def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
     """Type → file of the interfaces that exist as `.idl` only."""
-    found = {}
+    files = {}
     for package in (place for folder in folders for place in _places(folder)):
         for file in _idl_files(package):
             if not any(file.with_suffix(suffix).is_file() for suffix in _SUFFIXES):
                 for kind in [file.parent.name] if file.parent.name in KINDS else KINDS:
-                    found[f"{package_name(package)}/{kind}/{file.stem}"] = file
-    return found
+                    files[f"{package_name(package)}/{kind}/{file.stem}"] = file
+    return files
 
 
 def idl_hint(file: Path, kind: str = "") -> str:
@@ -143,7 +143,7 @@ def _walk(
     """The files with one of these suffixes in a folder and `deepest` folders below it, by name; those
     of another package only if asked for."""
     with suppress(OSError), os.scandir(folder) as entries:
-        for entry in sorted(entries, key=lambda one: one.name):
+        for entry in sorted(entries, key=lambda entry: entry.name):
             path = Path(entry.path)
             if entry.name.endswith(suffixes) and entry.is_file():
                 yield path

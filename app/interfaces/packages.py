@@ -50,7 +50,7 @@ def _error_text(error: OSError | UnicodeDecodeError) -> str:
 
 
 def _add_file(definitions: Definitions, file: Path, package: str) -> None:
-    """Adds the definitions of a file to `found`, or its error."""
+    """Adds the definitions of a file to `definitions`, or its error."""
     try:
         read = _read_file(file, package)
         for name, structure in read.structures.items():
@@ -68,7 +68,7 @@ def _add_file(definitions: Definitions, file: Path, package: str) -> None:
 def usable_definitions(
     definitions: Definitions, known: Definitions, unread: Mapping[str, Path]
 ) -> Definitions:
-    """The usable definitions of `known` and `found`; `found` takes precedence. `unread` as of
+    """The usable definitions of `known` and `definitions`; `definitions` take precedence. `unread` as of
     `find_idl_only`.
 
     Unusable are interfaces that reference missing or unusable ones, and those that contain themselves.
@@ -125,7 +125,7 @@ def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError
 
 
 def complete_definitions(definitions: Definitions, known: Definitions) -> Definitions:
-    """The files of `found` whose references all exist in `found` or `known`."""
+    """The files of `definitions` whose references all exist in them or in `known`."""
     definitions = _without_unusable_events(definitions, known)
     while lacking := _incomplete_files(definitions, known):
         definitions = Definitions(
@@ -136,7 +136,7 @@ def complete_definitions(definitions: Definitions, known: Definitions) -> Defini
 
 
 def _without_unusable_events(definitions: Definitions, known: Definitions) -> Definitions:
-    """`found` without service events if their type does not exist."""
+    """The definitions without service events if their type does not exist."""
     if EVENT_INFO in known.structures or EVENT_INFO in definitions.structures:
         return definitions
     return Definitions(
@@ -161,4 +161,4 @@ def _incomplete_files(definitions: Definitions, known: Definitions) -> set[Path 
 def _excluding_files(
     structures: Mapping[str, Structure], files: set[Path | None]
 ) -> dict[str, Structure]:
-    return {name: one for name, one in structures.items() if one.source not in files}
+    return {name: structure for name, structure in structures.items() if structure.source not in files}

@@ -217,7 +217,7 @@ class Interfaces:
         ending = "_Response" if kind == "/srv/" else "_FeedbackMessage"
         return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
 
-    def _unknown_type_error(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
+    def _unknown_type_error(self, name: str, known: Any, noun: str = "an interface") -> InterfaceError:
         if (cause := self.unusable.get(interface_name(name))) is not None:
             return InterfaceError(f'"{name}" can\'t be used: {cause}', cause.source)
         if name in self._idl_only:
@@ -225,7 +225,7 @@ class Interfaces:
             return InterfaceError(f'"{name}" is not there: {hint}')
         if (file := find_unread(self._folders, name)) is not None:
             return InterfaceError(f'"{name}" is not there: {unread_hint(file)}')
-        why = f'"{name}" is not {what} of ROS 2 {self._distro}'
+        why = f'"{name}" is not {noun} of ROS 2 {self._distro}'
         every, package = [*known, *self.unusable], name.partition("/")[0]
         if near := _suggestions(name, every):
             return InterfaceError(f"{why}; did you mean {' or '.join(near)}?")
@@ -245,7 +245,7 @@ def _suggestions(name: str, known: Sequence[str]) -> list[str]:
         own = [
             known_name.partition("/")[2] for known_name in known if known_name.startswith(f"{each}/")
         ]
-        near += [f"{each}/{one}" for one in _similar(rest, own)]
+        near += [f"{each}/{similar}" for similar in _similar(rest, own)]
     same = [known_name for known_name in known if known_name.endswith(f"/{rest}")]
     near += get_close_matches(name, same, n=MAX_SUGGESTIONS, cutoff=0)
     return list(dict.fromkeys(near))[:MAX_SUGGESTIONS]

@@ -37,7 +37,7 @@ def definitions_of(described: Any, wanted_hash: str = "") -> Definitions:
     parts = [described.type_description, *described.referenced_type_descriptions]
     if len(parts) > MOST_TYPES:
         raise InterfaceError(f"a type description of {len(parts)} types is too large")
-    structures = {one.name: one for one in map(_structure, parts)}
+    structures = {structure.name: structure for structure in map(_structure, parts)}
     main = structures[described.type_description.type_name]
 
     def find(name: str) -> Structure:
@@ -49,8 +49,10 @@ def definitions_of(described: Any, wanted_hash: str = "") -> Definitions:
         for _, name in structure.nested_fields():
             find(name)
     _check_acyclic(structures)
-    if wanted_hash and (found := type_hash(main, find)) != wanted_hash:
-        raise InterfaceError(f"the description of {main.name} has the hash {found}, not {wanted_hash}")
+    if wanted_hash and (own_hash := type_hash(main, find)) != wanted_hash:
+        raise InterfaceError(
+            f"the description of {main.name} has the hash {own_hash}, not {wanted_hash}"
+        )
     return Definitions(structures)
 
 

@@ -66,21 +66,21 @@ def _describe_structure(structure: Structure) -> dict[str, Any]:
     return {"type_name": structure.name, "fields": [_describe_field(field) for field in fields]}
 
 
-def _describe_field(one: Field) -> dict[str, Any]:
+def _describe_field(field: Field) -> dict[str, Any]:
     described = {
-        "type_id": _type_id(one.type),
-        "capacity": one.type.size,
-        "string_capacity": one.type.bound,
-        "nested_type_name": one.type.name if one.type.is_nested else "",
+        "type_id": _type_id(field.type),
+        "capacity": field.type.size,
+        "string_capacity": field.type.bound,
+        "nested_type_name": field.type.name if field.type.is_nested else "",
     }
-    return {"name": one.name, "type": described}
+    return {"name": field.name, "type": described}
 
 
-def _type_id(of: Type) -> int:
-    one = NESTED if of.is_nested else BASE_IDS[of.name] + (BOUNDED_TEXT if of.bound else 0)
-    match of.container:
+def _type_id(kind: Type) -> int:
+    type_id = NESTED if kind.is_nested else BASE_IDS[kind.name] + (BOUNDED_TEXT if kind.bound else 0)
+    match kind.container:
         case "one":
-            return one
+            return type_id
         case "array":
-            return one + ARRAY
-    return one + (BOUNDED_SEQUENCE if of.size else SEQUENCE)
+            return type_id + ARRAY
+    return type_id + (BOUNDED_SEQUENCE if kind.size else SEQUENCE)

@@ -43,8 +43,8 @@ def format_value(value: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
             return "…"
         case Mapping():
             items = (
-                f"{key} = {format_value(one, depth - 1)}"
-                for key, one in islice(value.items(), MAX_SHOWN_ELEMENTS)
+                f"{key} = {format_value(item, depth - 1)}"
+                for key, item in islice(value.items(), MAX_SHOWN_ELEMENTS)
             )
             return f"{{{_join_limited(items, len(value))}}}"
         case list() | tuple():
@@ -123,10 +123,10 @@ def unknown_constant(name: str, kind: Type, type_name: str, constants: Mapping[s
     value = "true or false" if kind.name == "bool" else "a whole number"
     value = "a number" if kind.name in FLOAT_TYPES else value
     right = f"{value} ({kind.element}) or the name of a constant of {type_name}"
-    what = f"must be {right}, not {format_value(name)}"
+    message = f"must be {right}, not {format_value(name)}"
     near = get_close_matches(name, fitting, n=1, cutoff=0.5)
     has = f"it has {list_names(fitting)}"
-    return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"
+    return f"{message}; did you mean {near[0]}? {has}" if near else f"{message}; {has}"
 
 
 def _to_python_scalar(value: Any) -> Any:
@@ -134,11 +134,11 @@ def _to_python_scalar(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def _check_bool(given: Any) -> bool:
-    value = _to_python_scalar(given)
+def _check_bool(scalar: Any) -> bool:
+    value = _to_python_scalar(scalar)
     if value is True or value is False:
         return bool(value)
-    raise FieldError("", f"must be true or false, not {format_value(given)}")
+    raise FieldError("", f"must be true or false, not {format_value(scalar)}")
 
 
 def _integer_check(name: str) -> Check:
@@ -159,16 +159,16 @@ def _integer_check(name: str) -> Check:
 def _float_check(name: str) -> Check:
     highest = FLOAT_MAX[name]
 
-    def check(given: Any) -> float:
-        given = _to_python_scalar(given)
-        if type(given) not in (int, float):
-            raise FieldError("", f"must be a number ({name}), not {format_value(given)}")
+    def check(number: Any) -> float:
+        number = _to_python_scalar(number)
+        if type(number) not in (int, float):
+            raise FieldError("", f"must be a number ({name}), not {format_value(number)}")
         try:
-            value = float(given)
+            value = float(number)
         except OverflowError:
-            raise FieldError("", f"{format_value(given)} is out of range for {name}") from None
+            raise FieldError("", f"{format_value(number)} is out of range for {name}") from None
         if abs(value) > highest and not math.isinf(value):
-            raise FieldError("", f"{given} is out of range: {name} goes to {highest:g}")
+            raise FieldError("", f"{number} is out of range: {name} goes to {highest:g}")
         return value
 
     return check
@@ -276,5 +276,5 @@ def _unknown_field_error(structure: Structure, value: Mapping[str, Any]) -> Fiel
 
 def field_check(kind: Type, structure: Structure, nested: Callable[[str], Check]) -> Check:
     """The check of a field of a structure; `nested` returns the check of a structure by name."""
-    one = nested(kind.name) if kind.is_nested else named_check(kind, structure)
-    return one if kind.container == "one" else list_check(kind, one)
+    check = nested(kind.name) if kind.is_nested else named_check(kind, structure)
+    return check if kind.container == "one" else list_check(kind, check)

@@ -56,14 +56,14 @@ FLAGS: Final = (
 )
 
 
-def find_browser(given: str) -> str:
+def find_browser(chosen: str) -> str:
     """The path of the browser's program; SettingsError if there is none."""
-    for name in (given,) if given else BROWSERS:
-        if found := shutil.which(name):
-            return found
+    for name in (chosen,) if chosen else BROWSERS:
+        if path := shutil.which(name):
+            return path
     raise SettingsError(
-        f"there is no browser {given}: install it, or name another one as browser"
-        if given
+        f"there is no browser {chosen}: install it, or name another one as browser"
+        if chosen
         else f"there is no browser: install one of {', '.join(BROWSERS)}"
     )
 

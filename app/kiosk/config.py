@@ -81,7 +81,7 @@ def runtime_folder(env: Mapping[str, str] = os.environ) -> Path:
     return Path(folder.split(":")[0])
 
 
-def read_config(path: Path | None, **given: Any) -> KioskConfig:
+def read_config(path: Path | None, **options: Any) -> KioskConfig:
     """The file's keys, and over them those that are given and not None. SettingsError names the key."""
     settings: dict[str, Any] = {}
     if path is not None:
@@ -89,7 +89,7 @@ def read_config(path: Path | None, **given: Any) -> KioskConfig:
             settings = tomllib.loads(path.read_text())
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise SettingsError(f"{path} can't be read: {error}") from error
-    settings |= {name: value for name, value in given.items() if value is not None}
+    settings |= {name: value for name, value in options.items() if value is not None}
     try:
         return KioskConfig(**dict(_checked(name, value) for name, value in settings.items()))
     except SettingsError as error:

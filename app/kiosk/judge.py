@@ -103,9 +103,9 @@ class Judge:
         action = Action.RESTART if again else Action.OPEN_PANEL
         return PageDecision(action, "the page has no events though the server answers")
 
-    def _lasts(self, what: str, holds: bool, for_s: float, now: float) -> bool:
-        """Whether `what` has held for `for_s` seconds or longer."""
+    def _lasts(self, condition: str, holds: bool, for_s: float, now: float) -> bool:
+        """Whether `condition` has held for `for_s` seconds or longer."""
         if not holds:
-            self._since.pop(what, None)
+            self._since.pop(condition, None)
             return False
-        return now - self._since.setdefault(what, now) >= for_s
+        return now - self._since.setdefault(condition, now) >= for_s

@@ -26,7 +26,7 @@ def may_be_off(between: tuple[str, ...], now: time) -> bool:
     midnight. Without times it always is."""
     if not between:
         return True
-    start, end = (time.fromisoformat(one) for one in between)
+    start, end = (time.fromisoformat(text) for text in between)
     return start <= now < end if start <= end else now >= start or now < end
 
 

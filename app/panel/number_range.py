@@ -74,7 +74,7 @@ def is_on_step(value: float, low: float, step: float, *, whole: bool = False) ->
 
 
 def range_text(limits: Range, unit_name: str | PanelText) -> TextLike:
-    """A range as text, with the `given` unit: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
+    """A range as text, with its unit: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
     unit = after_space(unit_name)
     low, high = _number_text(limits.low), _number_text(limits.high)
     text: TextLike

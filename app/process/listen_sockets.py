@@ -30,13 +30,13 @@ def open_sockets() -> Iterator[tuple[str, socket.socket]]:
         with suppress(OSError):
             name = os.readlink(entry)
             if name.startswith("socket:"):
-                with socket.socket(fileno=os.dup(int(entry.name))) as one:
-                    yield name, one
+                with socket.socket(fileno=os.dup(int(entry.name))) as sock:
+                    yield name, sock
 
 
 def listening_sockets() -> Iterator[tuple[str, socket.socket]]:
     """`open_sockets` that listen."""
-    return ((name, one) for name, one in open_sockets() if one.getsockopt(*ACCEPTS_CONNECTIONS))
+    return ((name, sock) for name, sock in open_sockets() if sock.getsockopt(*ACCEPTS_CONNECTIONS))
 
 
 async def wait_for_listener(before: Collection[str]) -> None:
@@ -62,13 +62,13 @@ async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
     with suppress(OSError):  # no /proc on this system
         before = listener_names()
         await wait_for_listener(before)
-        for name, one in listening_sockets():
-            if name not in before and one.family in INET_FAMILIES:
-                host, port = one.getsockname()[:2]
+        for name, sock in listening_sockets():
+            if name not in before and sock.family in INET_FAMILIES:
+                host, port = sock.getsockname()[:2]
                 ports.add(port)
                 addresses.append((host, port))
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
-                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
     return addresses
 
 
@@ -76,17 +76,17 @@ def abort_unsent(ports: Collection[int]) -> None:
     """Closes the connections of these ports that have unsent data: uvicorn would wait for them without
     a limit."""
     with suppress(OSError):
-        for _, one in open_sockets():
-            if one.family in INET_FAMILIES and one.getsockname()[1] in ports and unsent_bytes(one):
+        for _, sock in open_sockets():
+            if sock.family in INET_FAMILIES and sock.getsockname()[1] in ports and unsent_bytes(sock):
                 with suppress(OSError):
-                    one.shutdown(socket.SHUT_RDWR)
+                    sock.shutdown(socket.SHUT_RDWR)
 
 
-def unsent_bytes(one: socket.socket) -> int:
+def unsent_bytes(sock: socket.socket) -> int:
     """The number of bytes in the send queue; 0 for a listening socket."""
-    if one.getsockopt(*ACCEPTS_CONNECTIONS):
+    if sock.getsockopt(*ACCEPTS_CONNECTIONS):
         return 0
-    return int.from_bytes(fcntl.ioctl(one, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
+    return int.from_bytes(fcntl.ioctl(sock, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
 
 def check_port_free(host: str, port: int) -> None:

@@ -85,5 +85,7 @@ class Watchdog:
         return ", ".join(name for name, link in links if id(link) in alive)
 
     def _running_probes(self) -> dict[int, threading.Thread]:
-        self._probes = {of: thread for of, thread in self._probes.items() if thread.is_alive()}
+        self._probes = {
+            link_id: thread for link_id, thread in self._probes.items() if thread.is_alive()
+        }
         return self._probes

@@ -101,7 +101,7 @@ class LogLines:
                 self._decode(kept)
             if number % SLICE == SLICE - 1:
                 await asyncio.sleep(0)
-        return self._found(wanted, after, most)
+        return self._select(wanted, after, most)
 
     def newest(self, wanted: Wanted, most: int) -> Found:
         """The newest of the last few lines at once, for a page that is rendered; also of the last few
@@ -109,9 +109,9 @@ class LogLines:
         for queue in (self._severe, self._others):
             for kept in list(queue)[-SLICE:]:
                 self._decode(kept)
-        return self._found(wanted, 0, most)
+        return self._select(wanted, 0, most)
 
-    def _found(self, wanted: Wanted, after: int, most: int) -> Found:
+    def _select(self, wanted: Wanted, after: int, most: int) -> Found:
         read = (kept for kept in self._since(after) if kept.line is not None)
         fitting = [(kept.number, kept.line) for kept in read if kept.line and wanted.has(kept.line)]
         shown = fitting[-most:]

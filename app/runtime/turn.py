@@ -128,7 +128,7 @@ class Turn:
         """Updates holds, then confirmations, then the view, from the robot's current state."""
         if updates.graph:
             self._peer.lost(updates.peers_lost)
-            self._peer.found(updates.peers_found)
+            self._peer.appeared(updates.peers_found)
             self.on_graph_change(updates.peer_appeared)
         self._commands.holds.judge()
         for key, reading in updates.readings:

@@ -34,12 +34,12 @@ def checked_draft(make: Callable[[LeftOut], Draft], check: Check) -> tuple[Draft
 def _blamed(draft: Draft, faults: Sequence[Fault]) -> Iterator[tuple[Part, str]]:
     pages = written(draft, trial=True)
     for fault in faults:
-        if (found := _WIDGET.fullmatch(fault.place)) is not None:
-            entry = pages[int(found[1])][int(found[2])]
-            yield (entry.kind, entry.name), _reason(found["key"], fault)
-        elif (found := _INTERLOCK.fullmatch(fault.place)) is not None:
-            topic = draft.interlocks[int(found[1])].topic
-            yield ("interlock", topic), _reason(found["key"], fault)
+        if (place := _WIDGET.fullmatch(fault.place)) is not None:
+            entry = pages[int(place[1])][int(place[2])]
+            yield (entry.kind, entry.name), _reason(place["key"], fault)
+        elif (place := _INTERLOCK.fullmatch(fault.place)) is not None:
+            topic = draft.interlocks[int(place[1])].topic
+            yield ("interlock", topic), _reason(place["key"], fault)
 
 
 def _reason(key: str, fault: Fault) -> str:

@@ -47,12 +47,12 @@ def _message(type_name: str, interfaces: Interfaces) -> dict[str, Any] | None:
     fields = interfaces.structures[type_name].fields
     if not fields:
         return {}
-    (one, *more) = fields
-    if more or one.type.is_nested or one.type.container != "one":
+    (field, *more) = fields
+    if more or field.type.is_nested or field.type.container != "one":
         return None
-    if one.type.name in NUMBERS:
-        return {one.name: 0.0 if one.type.name in FLOAT_TYPES else 0}
-    return {one.name: True if one.type.name == "bool" else "text"}
+    if field.type.name in NUMBERS:
+        return {field.name: 0.0 if field.type.name in FLOAT_TYPES else 0}
+    return {field.name: True if field.type.name == "bool" else "text"}
 
 
 def calls(service: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
@@ -86,23 +86,23 @@ def goals(action: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     yield _control("action", action.name, action.nodes, keys, comment)
 
 
-def parameter(of: NodeParameter) -> Iterator[DraftWidget]:
+def parameter(declared: NodeParameter) -> Iterator[DraftWidget]:
     """An entry for a parameter that can be set."""
-    kind = of.type.removesuffix("[]")
-    hidden = of.name.startswith("qos_overrides.") or of.name == "use_sim_time"
-    if kind not in PARAMETER_TYPES or of.read_only or hidden:
+    kind = declared.type.removesuffix("[]")
+    hidden = declared.name.startswith("qos_overrides.") or declared.name == "use_sim_time"
+    if kind not in PARAMETER_TYPES or declared.read_only or hidden:
         return
     labelled: dict[str, Any] = {
-        "label": label_of("/" + of.name.replace(".", "/")),
-        "node": of.node,
-        "parameter": of.name,
-        "type": of.type,
+        "label": label_of("/" + declared.name.replace(".", "/")),
+        "node": declared.node,
+        "parameter": declared.name,
+        "type": declared.type,
         "span": 6,
     }
-    now = shorten(repr(of.value), MAX_COMMENT, placeholder=" …")
-    about = shorten(of.description, MAX_COMMENT, placeholder=" …")
-    comment = f"Now {now}. {about}".strip() if of.value is not None else ""
-    yield _control("parameter", f"{of.node}/{of.name}", (of.node,), labelled, comment)
+    now = shorten(repr(declared.value), MAX_COMMENT, placeholder=" …")
+    about = shorten(declared.description, MAX_COMMENT, placeholder=" …")
+    comment = f"Now {now}. {about}".strip() if declared.value is not None else ""
+    yield _control("parameter", f"{declared.node}/{declared.name}", (declared.node,), labelled, comment)
 
 
 def _role(name: str) -> Mapping[str, str]:

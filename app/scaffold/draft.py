@@ -89,11 +89,11 @@ def make_draft(
     entries: list[DraftWidget] = []
     remarks: list[str] = []
     for topic in (topic for topic in known.topics if topic.announced):
-        for found in _of_topic(topic, interfaces, known):
-            if isinstance(found, DraftWidget):
-                entries.append(found)
+        for item in _of_topic(topic, interfaces, known):
+            if isinstance(item, DraftWidget):
+                entries.append(item)
             else:
-                remarks.append(f"{found.name}: {found.why}")
+                remarks.append(f"{item.name}: {item.why}")
     remarks += [f"{name}: {DENIED}" for name in known.denied if _is_public_name(name)]
     remarks += [f"{name}: {LOST}" for name in lost_names(known)]
     for server in (*known.services, *known.actions):
@@ -108,7 +108,7 @@ def make_draft(
         for label in with_own_labels([entry for entry in entries if entry.control])
     ]
     pages, rest = make_pages([*(entry for entry in entries if not entry.control), *acting], live)
-    remarks += [f"{name}: {NO_ROOM}" for name in dict.fromkeys(one.name for one in rest)]
+    remarks += [f"{name}: {NO_ROOM}" for name in dict.fromkeys(entry.name for entry in rest)]
     return replace(base, interlocks=interlocks, pages=pages, remarks=remarks)
 
 

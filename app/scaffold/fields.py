@@ -134,13 +134,15 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
         and field.type.container == "one"
         and field.type.name != "wstring"
     ]
-    for one in plain[:MOST_FIELDS]:
-        word = "" if one.name == "data" and len(plain) == 1 else one.name.replace("_", " ")
-        number = one.type.name in NUMBERS
-        text = ".2f" if one.type.name in FLOAT_TYPES else ""
-        named = constants_of(interfaces.structures[type_name], one)
-        kind = "float64" if number else one.type.name
-        yield Shown(field=one.name, kind=kind, word=word, format=text, constants=named)
+    for plain_field in plain[:MOST_FIELDS]:
+        word = (
+            "" if plain_field.name == "data" and len(plain) == 1 else plain_field.name.replace("_", " ")
+        )
+        number = plain_field.type.name in NUMBERS
+        text = ".2f" if plain_field.type.name in FLOAT_TYPES else ""
+        named = constants_of(interfaces.structures[type_name], plain_field)
+        kind = "float64" if number else plain_field.type.name
+        yield Shown(field=plain_field.name, kind=kind, word=word, format=text, constants=named)
 
 
 def constants_of(structure: Structure, field: Field) -> tuple[str, ...]:
@@ -156,11 +158,11 @@ def constants_of(structure: Structure, field: Field) -> tuple[str, ...]:
     words = field.name.upper().split("_")
     begins = [f"{'_'.join(words[n:])}_" for n in range(len(words))]
     named = ([name for name in numbers if name.startswith(begin)] for begin in begins)
-    found = next((names for names in named if len(names) > 1), [])
-    if not found and sum(one.type.name in INTEGER_RANGES for one in structure.fields) == 1:
-        found = list(numbers)
-    values = [numbers[name] for name in found]
-    return tuple(found) if len(values) > 1 and len({*values}) == len(values) else ()
+    group = next((names for names in named if len(names) > 1), [])
+    if not group and sum(field.type.name in INTEGER_RANGES for field in structure.fields) == 1:
+        group = list(numbers)
+    values = [numbers[name] for name in group]
+    return tuple(group) if len(values) > 1 and len({*values}) == len(values) else ()
 
 
 def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float] | None:

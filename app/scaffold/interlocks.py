@@ -20,7 +20,9 @@ def interlock_candidates(topics: Iterable[SurveyedTopic]) -> list[InterlockCandi
         for topic in topics
         if topic.publishers and topic.types == (BOOL,) and topic.reliable and _may_permit(topic)
     ]
-    likely.sort(key=lambda one: (not permits(one.name), not one.latched, one.name))
+    likely.sort(
+        key=lambda candidate: (not permits(candidate.name), not candidate.latched, candidate.name)
+    )
     labels = own_labels([(label_of(topic.name), topic.name) for topic in likely])
     taken: set[str] = set()
     candidates = []
@@ -61,9 +63,9 @@ def interlock_for(control: DraftWidget, candidates: Sequence[InterlockCandidate]
     nothing of this one. A control without a namespace may depend on those of a single namespace."""
     around = [candidate for candidate in candidates if within(control.scope, _namespace(candidate))]
     if around:
-        depth = max(len(_namespace(one)) for one in around)
-        nearest = [one for one in around if len(_namespace(one)) == depth]
-        own = [one for one in nearest if {*one.owners} & {*control.nodes}]
+        depth = max(len(_namespace(candidate)) for candidate in around)
+        nearest = [candidate for candidate in around if len(_namespace(candidate)) == depth]
+        own = [candidate for candidate in nearest if {*candidate.owners} & {*control.nodes}]
         return (own or nearest)[0].id
     if not control.scope and len({_namespace(candidate) for candidate in candidates}) == 1:
         return candidates[0].id

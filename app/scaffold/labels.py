@@ -15,8 +15,8 @@ def with_own_labels(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     """The entries, no two with the same label."""
     labels = own_labels([(str(entry.keys["label"]), entry.name) for entry in entries])
     return [
-        one if label == one.keys["label"] else replace(one, keys={**one.keys, "label": label})
-        for one, label in zip(entries, labels, strict=True)
+        entry if label == entry.keys["label"] else replace(entry, keys={**entry.keys, "label": label})
+        for entry, label in zip(entries, labels, strict=True)
     ]
 
 

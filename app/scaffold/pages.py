@@ -94,7 +94,7 @@ def _cut(entries: Sequence[DraftWidget], live: bool) -> list[list[DraftWidget]]:
 
 def _in_order(entries: Sequence[DraftWidget]) -> list[DraftWidget]:
     shown = [entry for entry in entries if not entry.control]
-    shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
+    shown.sort(key=lambda entry: (ORDER.index(entry.kind), entry.name))
     controls = (entry for entry in entries if entry.control)
     acting = sorted(controls, key=lambda entry: (entry.kind, entry.name))
     return [*shown, *acting]
@@ -121,10 +121,10 @@ def _trend(entries: Sequence[DraftWidget], page: str) -> Iterator[DraftWidget]:
     same = [
         gauge for gauge in gauges if gauge.keys.get("unit", "") == max(units, key=units.__getitem__)
     ]
-    pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
+    pens = [{k: gauge.keys[k] for k in TREND_KEYS if k in gauge.keys} for gauge in same[:MOST_PENS]]
     if pens:
         keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
-        longest = max(one.keys.get("max_age_s", 0) for one in same[:MOST_PENS])
+        longest = max(gauge.keys.get("max_age_s", 0) for gauge in same[:MOST_PENS])
         keys |= {"max_age_s": longest} if longest > TREND_GAP_S else {}
         comment = "Its history is kept in memory; disk = true keeps it over a restart."
         yield DraftWidget(kind="trend", name=f"{page}/trend", keys=keys, comment=comment)

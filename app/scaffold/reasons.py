@@ -14,8 +14,8 @@ OF_NAMES: Final[Mapping[str, str]] = {
     "/diagnostics_agg": "it has what /diagnostics has",
 }
 OF_TYPES: Final[Mapping[str, str]] = {
-    name: _DRAWN.format(what)
-    for name, what in {
+    name: _DRAWN.format(noun)
+    for name, noun in {
         "map_msgs/msg/OccupancyGridUpdate": "a map",
         "nav_msgs/msg/GridCells": "a map",
         "nav_msgs/msg/MapMetaData": "a map",

@@ -57,7 +57,7 @@ def _head(draft: Draft) -> Iterator[str]:
     for robot in draft.robots:
         yield ""
         yield "[[robot]]"
-        yield from (f"{key} = {_value(one)}" for key, one in robot.items())
+        yield from (f"{key} = {_value(item)}" for key, item in robot.items())
 
 
 def _interlocks(draft: Draft) -> Iterator[str]:
@@ -137,7 +137,7 @@ def _value(value: Any) -> str:
         whole = value.encode(errors="replace").decode()  # TOML has no lone surrogates
         return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        inner = ", ".join(f"{key} = {_value(one)}" for key, one in value.items())
+        inner = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())
         return f"{{ {inner} }}" if inner else "{}"
     return f"[{', '.join(map(_value, value))}]"
 

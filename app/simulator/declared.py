@@ -43,7 +43,7 @@ def declared_by(
 
 def _declared(several: list[widgets.Parameter], entry: Any) -> Parameter:
     first = several[0]
-    alike = len({(one.min, one.max, one.step) for one in several}) == 1
+    alike = len({(limits.min, limits.max, limits.step) for limits in several}) == 1
     limits = _limits(first) if alike else None
     options = tuple(option.value for option in first.options) if len(several) == 1 else ()
     value = entry if entry is not None else _value(first, limits, options)
@@ -64,8 +64,8 @@ def _limits(widget: widgets.Parameter) -> Range | None:
 def _value(widget: widgets.Parameter, limits: Range | None, options: tuple[Any, ...]) -> Any:
     if options:
         return options[0]
-    one = _single(widget, limits)
-    return [one] * LENGTH if widget.is_list else one
+    value = _single(widget, limits)
+    return [value] * LENGTH if widget.is_list else value
 
 
 def _single(widget: widgets.Parameter, limits: Range | None) -> Any:

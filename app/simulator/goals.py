@@ -86,25 +86,25 @@ class SimulatedAction:
         return True
 
     def cancel(self, goal_id: bytes) -> tuple[int, list[bytes]]:
-        running = [one for one, goal in self._goals.items() if goal.status == EXECUTING]
+        running = [goal_id for goal_id, goal in self._goals.items() if goal.status == EXECUTING]
         if goal_id != EVERY_GOAL:
             if goal_id not in self._goals:
                 return CANCEL_UNKNOWN, []
             if goal_id not in running:
                 return CANCEL_TOO_LATE, []
             running = [goal_id]
-        for one in running:
-            self._goals[one].status = CANCELED
+        for canceled in running:
+            self._goals[canceled].status = CANCELED
         return CANCEL_OK, running
 
     def feedback(self) -> list[tuple[bytes, Fields]]:
-        moment, found = self._now, []
+        moment, feedback = self._now, []
         for goal_id, goal in self._goals.items():
             if goal.status == EXECUTING and moment.t - goal.feedback_at >= FEEDBACK_S - 1e-6:
                 goal.feedback_at = moment.t
                 part = min((moment.t - goal.began) / self._duration_s, 1.0)
-                found.append((goal_id, self._feedback(moment, part)))
-        return found
+                feedback.append((goal_id, self._feedback(moment, part)))
+        return feedback
 
     def states(self) -> list[tuple[bytes, int]]:
         return [(goal_id, goal.status) for goal_id, goal in self._goals.items()]

@@ -41,8 +41,10 @@ def permitting(
     candidates = [choice for choice in values if _fits(choice, kind)]
     met = [sum(satisfies(interlock, candidate) for interlock in interlocks) for candidate in candidates]
     best, least = max(met), min(met)
-    good = [one for one, count in zip(candidates, met, strict=True) if count == best]
-    bad = [one for one, count in zip(candidates, met, strict=True) if count == least] or good
+    good = [candidate for candidate, count in zip(candidates, met, strict=True) if count == best]
+    bad = [
+        candidate for candidate, count in zip(candidates, met, strict=True) if count == least
+    ] or good
     moving = _moving(interlocks, kind) if best == len(interlocks) else None
     turn_s = period_s or robot.PERMITTED_S + robot.FORBIDDEN_S
 

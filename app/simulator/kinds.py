@@ -100,7 +100,7 @@ def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
 
 def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Shown]:
     limits = {key: getattr(display, key, None) for key in ("min", "max")}
-    numbers = {key: one for key, one in limits.items() if isinstance(one, int | float)}
+    numbers = {key: limit for key, limit in limits.items() if isinstance(limit, int | float)}
     scale, offset = getattr(display, "scale", 1.0) or 1.0, getattr(display, "offset", 0.0)
     low, high = ((numbers[k] - offset) / scale if k in numbers else None for k in ("min", "max"))
     if scale < 0:
@@ -148,9 +148,11 @@ def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
     ends = sorted((end - gauge.offset) / (gauge.scale or 1.0) for end in (low, high))
     for shown in _shown(gauge):
         yield replace(shown, low=ends[0], high=ends[1])
-    if isinstance(of := gauge.setpoint, SetpointField):
+    if isinstance(setpoint := gauge.setpoint, SetpointField):
         middle = (sum(gauge.normal or ends) / 2 - gauge.offset) / (gauge.scale or 1.0)
-        yield Shown(topic=of.topic, type=of.type, field=of.field, low=middle, high=middle)
+        yield Shown(
+            topic=setpoint.topic, type=setpoint.type, field=setpoint.field, low=middle, high=middle
+        )
 
 
 def _joints(widget: Joints, _: Interfaces) -> Iterator[Need]:
@@ -202,8 +204,8 @@ def _pressed(command: PublishPress, interfaces: Interfaces) -> Iterator[Need]:
 
 def _stepped(widget: Step, interfaces: Interfaces) -> Iterator[Need]:
     yield from _pressed(widget, interfaces)
-    of, middle = widget.value, (widget.min + widget.max) / 2
-    yield Shown(topic=of.topic, type=of.type, field=of.field, low=middle, high=middle)
+    source, middle = widget.value, (widget.min + widget.max) / 2
+    yield Shown(topic=source.topic, type=source.type, field=source.field, low=middle, high=middle)
 
 
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
@@ -235,7 +237,7 @@ def _parameter(parameter: Parameter, _: Interfaces) -> Iterator[Need]:
 SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[Need]] | None]] = {
     Static: None,
     Input: None,
-    Display: lambda of, _: _shown(of),
+    Display: lambda display, _: _shown(display),
     Readout: _readout,
     Indicator: _indicator,
     MachineState: _machine_state,

@@ -64,12 +64,12 @@ class PanelRobot:
             name: kind for name, kind in _reference_topics(panel).items() if name not in of_story
         }
         skipped = {**self._own, **of_story, EVENTS: EVENT_TYPE}
-        shown = _of(needs, Shown)
+        shown = _needs_of(needs, Shown)
         self._topics = simulated_topics(panel, shown, self._interfaces, skipped, APART * number)
-        self._published = _by_topic(_of(needs, Published))
-        self._nodes = self._declared(_of(needs, Declared))
-        self._responses = self._served(_of(needs, Served))
-        self._simulated = self._acted(_of(needs, Acted))
+        self._published = _by_topic(_needs_of(needs, Published))
+        self._nodes = self._declared(_needs_of(needs, Declared))
+        self._responses = self._served(_needs_of(needs, Served))
+        self._simulated = self._acted(_needs_of(needs, Acted))
         self._effects: list[tuple[str, Mapping[str, Any]]] = []  # on topics of `DemoRobot`
         self._moment = Moment(0.0, 0)
         self._began: float | None = None
@@ -86,8 +86,8 @@ class PanelRobot:
             topic: SimulatedTopic(name, LATCHED, self._hash(name)) for topic, name in self._own.items()
         }
         simulated = {
-            topic: SimulatedTopic(one.type, self._panel.qos(topic).wire_qos, self._hash(one.type))
-            for topic, one in self._topics.items()
+            topic: SimulatedTopic(source.type, self._panel.qos(topic).wire_qos, self._hash(source.type))
+            for topic, source in self._topics.items()
         }
         events = SimulatedTopic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
         return {**own, **dict(self._story_topics()), **simulated, EVENTS: events}
@@ -102,13 +102,17 @@ class PanelRobot:
 
     @cached_property
     def subscribes(self) -> Mapping[str, SimulatedTopic]:
-        found = {
+        simulated = {
             topic: SimulatedTopic(name, Qos(), self._hash(name)) for topic, name in LISTENS.items()
         }
         for topic, several in self._published.items():
-            one = several[0]
-            found[topic] = SimulatedTopic(one.type, one.qos.wire_qos, self._hash(one.type))
-        return {topic: one for topic, one in found.items() if self._has(topic)}
+            published = several[0]
+            simulated[topic] = SimulatedTopic(
+                published.type, published.qos.wire_qos, self._hash(published.type)
+            )
+        return {
+            topic: simulated_topic for topic, simulated_topic in simulated.items() if self._has(topic)
+        }
 
     @cached_property
     def services(self) -> Mapping[str, str]:
@@ -209,28 +213,33 @@ class PanelRobot:
 
     def _declared(self, declared: Iterable[Declared]) -> dict[str, NodeParameters]:
         """The nodes. The `system_controller` keeps its own parameters, where the types are equal."""
-        found = declared_by((parameter.widget for parameter in declared), self._panel.demo)
-        given = self._panel.demo.get(NODE, NO_ENTRY).parameters
+        by_node = declared_by((parameter.widget for parameter in declared), self._panel.demo)
+        in_table = self._panel.demo.get(NODE, NO_ENTRY).parameters
         own = {
-            name: one
-            for name, one in own_parameters().items()
-            if name not in given and found.get(NODE, {}).get(name, one).type == one.type
+            name: parameter
+            for name, parameter in own_parameters().items()
+            if name not in in_table
+            and by_node.get(NODE, {}).get(name, parameter).type == parameter.type
         }
-        found[NODE] = {**found.get(NODE, {}), **own}
-        return {node: NodeParameters(node, one) for node, one in found.items() if self._has(node)}
+        by_node[NODE] = {**by_node.get(NODE, {}), **own}
+        return {
+            node: NodeParameters(node, parameters)
+            for node, parameters in by_node.items()
+            if self._has(node)
+        }
 
     def _served(self, served: Iterable[Served]) -> dict[str, tuple[str, Response]]:
         """Service → (type, responses), without those of the `system_controller`."""
         responses: dict[str, tuple[str, Response]] = {}
-        for one in served:
-            entry = self._panel.demo.get(one.service, NO_ENTRY)
-            if SERVES.get(one.service) == one.type and not entry.response and self._permits_known():
+        for need in served:
+            entry = self._panel.demo.get(need.service, NO_ENTRY)
+            if SERVES.get(need.service) == need.type and not entry.response and self._permits_known():
                 continue
-            response = self._interfaces.service_types(one.type)[1]
-            paths = {one.success or "": True, one.message or "": DONE}
+            response = self._interfaces.service_types(need.type)[1]
+            paths = {need.success or "": True, need.message or "": DONE}
             paths.pop("", None)
             made = good_response(response, self._interfaces, entry.response, paths)
-            responses[one.service] = one.type, made
+            responses[need.service] = need.type, made
         return responses
 
     def _permits_known(self) -> bool:
@@ -240,9 +249,9 @@ class PanelRobot:
     def _acted(self, acted: Iterable[Acted]) -> dict[str, SimulatedAction]:
         """Action → its goals, without the count of the `system_controller`."""
         several: dict[str, list[Acted]] = {}
-        for one in acted:
-            several.setdefault(one.action, []).append(one)
-        found = {}
+        for need in acted:
+            several.setdefault(need.action, []).append(need)
+        actions = {}
         for name, widgets in several.items():
             entry = self._panel.demo.get(name, NO_ENTRY)
             own = name == COUNT and widgets[0].type == COUNT_TYPE
@@ -254,13 +263,13 @@ class PanelRobot:
             progress = {
                 widget.progress: widget.most for widget in widgets if widget.progress is not None
             }
-            found[name] = SimulatedAction(
+            actions[name] = SimulatedAction(
                 widgets[0].type,
                 feedback_at(types.feedback, self._interfaces, progress),
                 good_response(types.result, self._interfaces, entry.result, {}),
                 entry.duration_s,
             )
-        return found
+        return actions
 
 
 def _reference_topics(panel: Panel) -> dict[str, str]:
@@ -275,10 +284,10 @@ def _reference_topics(panel: Panel) -> dict[str, str]:
 
 def _by_topic(published: Iterable[Published]) -> dict[str, list[Published]]:
     published_by_topic: dict[str, list[Published]] = {}
-    for one in published:
-        published_by_topic.setdefault(one.topic, []).append(one)
+    for need in published:
+        published_by_topic.setdefault(need.topic, []).append(need)
     return published_by_topic
 
 
-def _of(needs: Iterable[Need], kind: type[AnyNeed]) -> list[AnyNeed]:
+def _needs_of(needs: Iterable[Need], kind: type[AnyNeed]) -> list[AnyNeed]:
     return [need for need in needs if isinstance(need, kind)]

@@ -78,8 +78,8 @@ class NodeParameters:
         known = all(name in self._declared for name in request.names)
         parameters = [(name, self._declared[name]) for name in request.names] if known else []
         if service.endswith("/get_parameters"):
-            return {"values": [_value(one.type, one.value) for _, one in parameters]}
-        return {"descriptors": [_descriptor(name, one) for name, one in parameters]}
+            return {"values": [_value(parameter.type, parameter.value) for _, parameter in parameters]}
+        return {"descriptors": [_descriptor(name, parameter) for name, parameter in parameters]}
 
     def value(self, name: str, default: Any) -> Any:
         """The value of a parameter, or a default if it is not declared."""
@@ -90,33 +90,33 @@ class NodeParameters:
         news, self._news = self._news, []
         return news
 
-    def _set(self, given: Any) -> Fields:
-        reason = self._refusal(given)
+    def _set(self, parameter: Any) -> Fields:
+        reason = self._refusal(parameter)
         if not reason:
-            declared = self._declared[given.name]
-            declared.value = _plain(getattr(given.value, FIELDS[declared.type]))
-            changed = {"name": given.name, "value": _value(declared.type, declared.value)}
+            declared = self._declared[parameter.name]
+            declared.value = _plain(getattr(parameter.value, FIELDS[declared.type]))
+            changed = {"name": parameter.name, "value": _value(declared.type, declared.value)}
             self._news.append(_event(self._node, [changed]))
         return {"successful": not reason, "reason": reason}
 
-    def _refusal(self, given: Any) -> str:
+    def _refusal(self, parameter: Any) -> str:
         """Why a value is not taken; "" if it is."""
-        declared = self._declared.get(given.name)
+        declared = self._declared.get(parameter.name)
         if declared is None:
-            return f"parameter '{given.name}' is not declared"
+            return f"parameter '{parameter.name}' is not declared"
         if declared.read_only:
-            return f"parameter '{given.name}' is read-only"
-        if given.value.type != declared.type:
-            return f"parameter '{given.name}' has another type"
-        value = _plain(getattr(given.value, FIELDS[declared.type]))
+            return f"parameter '{parameter.name}' is read-only"
+        if parameter.value.type != declared.type:
+            return f"parameter '{parameter.name}' has another type"
+        value = _plain(getattr(parameter.value, FIELDS[declared.type]))
         if declared.empty and not value.strip():
             return declared.empty
         if declared.options and not any(same_value(value, option) for option in declared.options):
-            return f"parameter '{given.name}' has no such option"
+            return f"parameter '{parameter.name}' has no such option"
         several = value if declared.type >= FIRST_ARRAY else [value]
-        if declared.limits is None or all(declared.limits.contains(one) for one in several):
+        if declared.limits is None or all(declared.limits.contains(number) for number in several):
             return ""
-        return f"parameter '{given.name}' is out of its range"
+        return f"parameter '{parameter.name}' is out of its range"
 
 
 def _plain(value: Any) -> Any:

@@ -25,7 +25,7 @@ class Effect(NamedTuple):
 
 def effects(message: Any, publications: Iterable[Published]) -> list[Effect]:
     """The effects of a decoded message, by the widgets that may have sent it."""
-    found = []
+    made = []
     for publication in publications:
         inputs: dict[str, Any] = {}
         if (
@@ -37,21 +37,21 @@ def effects(message: Any, publications: Iterable[Published]) -> list[Effect]:
         needed = {name for _, name in placeholders(publication.confirm.equals)}
         if needed <= inputs.keys():
             value = fill(publication.confirm.equals, inputs)
-            found.append(Effect(publication.confirm.topic, publication.confirm.field, value))
-    return found
+            made.append(Effect(publication.confirm.topic, publication.confirm.field, value))
+    return made
 
 
 def _fits(template: Any, value: Any, inputs: dict[str, Any]) -> bool:
     """Whether a value may have been made from a template; adds the values of its inputs."""
     if isinstance(template, Mapping):
         return all(
-            _fits(one, getattr(value, attribute_name(name), None), inputs)
-            for name, one in template.items()
+            _fits(part, getattr(value, attribute_name(name), None), inputs)
+            for name, part in template.items()
         )
     if isinstance(template, list | tuple):
         items = list(value) if value is not None else []
         return len(items) == len(template) and all(
-            _fits(one, item, inputs) for one, item in zip(template, items, strict=True)
+            _fits(part, item, inputs) for part, item in zip(template, items, strict=True)
         )
     if isinstance(template, str):
         return _text_fits(template, value, inputs)
@@ -87,8 +87,8 @@ def _learned(name: str, value: Any, inputs: dict[str, Any]) -> bool:
     return _equal(inputs.setdefault(name, value), value)
 
 
-def _equal(one: Any, other: Any) -> bool:
-    numbers = isinstance(one, int | float) and isinstance(other, float)
-    if numbers and not isinstance(one, bool):
-        return math.isclose(one, other, rel_tol=CLOSE)
-    return same_value(one, other)
+def _equal(value: Any, other: Any) -> bool:
+    numbers = isinstance(value, int | float) and isinstance(other, float)
+    if numbers and not isinstance(value, bool):
+        return math.isclose(value, other, rel_tol=CLOSE)
+    return same_value(value, other)

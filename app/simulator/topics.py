@@ -100,12 +100,12 @@ def simulated_topics(
     for shown_field in shown:
         by_topic.setdefault(shown_field.topic, []).append(shown_field)
     fields = PanelFields(panel, interfaces, phase)
-    found = {}
+    topics = {}
     for topic, type_name in panel.listened().items():
         if topic in skipped or panel.demo.get(topic, NO_ENTRY).silent:
             continue
-        found[topic] = _topic(fields, topic, type_name, by_topic.get(topic, []))
-    return found
+        topics[topic] = _topic(fields, topic, type_name, by_topic.get(topic, []))
+    return topics
 
 
 def _topic(fields: PanelFields, topic: str, type_name: str, shown: Sequence[Shown]) -> SimulatedTopic:
@@ -135,7 +135,7 @@ def _hz(
     rate_hz = fields.entry(topic).hz
     if rate_hz is not None:
         return rate_hz
-    still = made and not any(one.moving for one in made)
+    still = made and not any(signal.moving for signal in made)
     hz = OTHERS_HZ if still or type_name in SLOW else MOVING_HZ
     locks = (interlock.max_age_s for interlock in fields.panel.interlocks if interlock.topic == topic)
     ages = [

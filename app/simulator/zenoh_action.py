@@ -51,7 +51,7 @@ class PlayedAction:
             states = self._server.states()
             ended = [(q, end) for goal, q in self._results if (end := self._server.result(goal))]
             answered = {id(query) for query, _ in ended}
-            self._results = [one for one in self._results if id(one[1]) not in answered]
+            self._results = [result for result in self._results if id(result[1]) not in answered]
         for goal_id, fields in news:
             message = {"goal_id": {"uuid": goal_id}, "feedback": fields}
             payload = self._interfaces.encode(self._types.feedback_message, message)
@@ -84,7 +84,7 @@ class PlayedAction:
             return None
         with self._lock:
             code, canceled = self._server.cancel(bytes(request.goal_info.goal_id.uuid))
-        goals = [{"goal_id": {"uuid": one}} for one in canceled]
+        goals = [{"goal_id": {"uuid": goal_id}} for goal_id in canceled]
         fields = {"return_code": code, "goals_canceling": goals}
         return self._interfaces.encode(response_type, fields)
 

@@ -35,10 +35,14 @@ class SimulatedZenohRobot:
         own = {name for name in (*robot.publishes, *robot.services, *robot.actions)
                if self._key(name) not in played}  # fmt: skip
         played |= {self._key(name) for name in own}
-        self._publishes = {topic: of for topic, of in robot.publishes.items() if topic in own}
-        self._services = {name: of for name, of in robot.services.items() if name in own}
-        self._servers = {name: of for name, of in robot.actions.items() if name in own}
-        self._publishers = {topic: self._publisher(topic, of) for topic, of in self._publishes.items()}
+        self._publishes = {
+            topic: simulated for topic, simulated in robot.publishes.items() if topic in own
+        }
+        self._services = {name: type_name for name, type_name in robot.services.items() if name in own}
+        self._servers = {name: action for name, action in robot.actions.items() if name in own}
+        self._publishers = {
+            topic: self._publisher(topic, simulated) for topic, simulated in self._publishes.items()
+        }
         self._actions = [
             PlayedAction(session, self._key(name), action, interfaces, lock)
             for name, action in self._servers.items()
@@ -51,10 +55,14 @@ class SimulatedZenohRobot:
     def tokens(self, zid: str) -> Iterator[str]:
         """The liveliness tokens of its endpoints."""
         robot, key = self._robot, self._key
-        for topic, of in robot.subscribes.items():
-            yield bridge_dialect.token(zid, "MS", key(topic), of.type, of.qos, of.type_hash)
-        for topic, of in self._publishes.items():
-            yield bridge_dialect.token(zid, "MP", key(topic), of.type, of.qos, of.type_hash)
+        for topic, simulated in robot.subscribes.items():
+            yield bridge_dialect.token(
+                zid, "MS", key(topic), simulated.type, simulated.qos, simulated.type_hash
+            )
+        for topic, simulated in self._publishes.items():
+            yield bridge_dialect.token(
+                zid, "MP", key(topic), simulated.type, simulated.qos, simulated.type_hash
+            )
         for service, name in self._services.items():
             yield bridge_dialect.server_token(zid, "SS", key(service), name)
         for action, server in self._servers.items():

@@ -34,7 +34,7 @@ class BridgePeer:
         await self._liveness.stop()
         await self._membership.stop()
 
-    def found(self, zids: Iterable[str]) -> None:
+    def appeared(self, zids: Iterable[str]) -> None:
         for zid in zids:
             self._log.info("bridge %s found", zid)
 

@@ -26,7 +26,7 @@ class Peer(Protocol):
     async def stop(self) -> None:
         """Ends its tasks. Waits for the replies that callers of `flushed` wait for."""
 
-    def found(self, zids: Iterable[str]) -> None:
+    def appeared(self, zids: Iterable[str]) -> None:
         """The liveliness tokens of these peers appeared."""
 
     def lost(self, zids: Iterable[str]) -> None:

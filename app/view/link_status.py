@@ -222,10 +222,10 @@ class LinkTimes:
         """The same links with `since`, except the browser's own link."""
         if links != self._plain:
             self._plain = links
-            self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}
+            self._dated = {name: self._with_since(name, lamp) for name, lamp in links.items()}
         return self._dated
 
-    def _of(self, name: str, lamp: LinkStatus) -> LinkStatus:
+    def _with_since(self, name: str, lamp: LinkStatus) -> LinkStatus:
         if name == BROWSERS_OWN:
             return lamp
         state = (lamp["state"], lamp["text"])

@@ -67,4 +67,6 @@ def _preferred(accepted: str) -> list[str]:
     """The tags of the header, by falling weight."""
     matches = [match for part in accepted.split(",") if (match := _accepted.fullmatch(part))]
     weighted = [(float(match["weight"] or 1), match["tag"]) for match in matches]
-    return [tag for weight, tag in sorted(weighted, key=lambda one: -one[0]) if weight > 0]
+    return [
+        tag for weight, tag in sorted(weighted, key=lambda weighted_tag: -weighted_tag[0]) if weight > 0
+    ]

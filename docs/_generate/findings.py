@@ -12,7 +12,7 @@ def findings_tables() -> dict[str, str]:
 
 def _table(severity: str) -> str:
     rows = [
-        (f"`{code}`", _shown(kind.what), _shown(kind.do))
+        (f"`{code}`", _shown(kind.sentence), _shown(kind.do))
         for code, kind in KINDS.items()
         if kind.severity == severity
     ]

@@ -47,7 +47,7 @@ def demo() -> Iterator[Server]:
 
 def sized(page: Page, panel: Panel, size: str) -> Screen:
     """The screen of a size, once the page is drawn on it."""
-    screen = Screen.of(size, panel.mm_per_px)
+    screen = Screen.from_size(size, panel.mm_per_px)
     page.set_viewport_size({"width": screen.width, "height": screen.height})
     page.evaluate(DRAWN)
     return screen

@@ -265,7 +265,7 @@ def test_a_page_that_is_cut_off_shows_old_values(cell: Server, node: RosNode, pa
 
 @pytest.mark.parametrize("size", ["1280x800", "1024x600", "800x480"])
 def test_sizes_are_those_of_the_browser(cell: Server, panel: Panel, page: Page, size: str) -> None:
-    screen = Screen.of(size, panel.mm_per_px)
+    screen = Screen.from_size(size, panel.mm_per_px)
     page.set_viewport_size({"width": screen.width, "height": screen.height})
     page.goto(cell.url)
     expect(widget(page, "arm")).to_be_visible()

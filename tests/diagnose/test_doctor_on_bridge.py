@@ -223,7 +223,7 @@ def test_what_is_broken_is_named_and_nothing_else(
         monkeypatch.setattr("app.diagnose.robot.receive", receive_all)
     found = setup.findings(text, shared.endpoint, listen_s)
     assert named(found) == expected
-    assert all(one.what and one.do for one in found)
+    assert all(one.sentence and one.do for one in found)
 
 
 def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setup: Setup) -> None:

@@ -35,9 +35,9 @@ def test_each_finding_is_named_in_a_test(code: str) -> None:
 @pytest.mark.parametrize("code", KINDS)
 def test_each_sentence_ends_as_one_and_says_what_to_do(code: str) -> None:
     kind = KINDS[code]
-    assert re.search(r"[.?)}]$", kind.what)
+    assert re.search(r"[.?)}]$", kind.sentence)
     assert kind.do.endswith((".", "?"))
-    assert kind.what[0] in "{ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+    assert kind.sentence[0] in "{ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 def test_a_code_that_is_none_is_refused() -> None:
@@ -80,13 +80,17 @@ def test_a_text_of_a_robot_makes_no_line_and_has_a_limit() -> None:
 def test_text_of_a_robot_is_made_printable() -> None:
     report = Report()
     report.find("topic_type", "/a", found="\x1b[31mBool\x1b[0m\u202e", wanted="{about}")
-    assert report.findings[0].what == "/a is Bool\\u202e on the robot and {about} in the panel file."
+    assert (
+        report.findings[0].sentence == "/a is Bool\\u202e on the robot and {about} in the panel file."
+    )
 
 
 @pytest.mark.parametrize("code", KINDS)
 def test_placeholders_are_names(code: str) -> None:
     kind = KINDS[code]
-    names = {name for text in (kind.what, kind.do) for _, name, _, _ in Formatter().parse(text) if name}
+    names = {
+        name for text in (kind.sentence, kind.do) for _, name, _, _ in Formatter().parse(text) if name
+    }
     assert all(name.isidentifier() for name in names)
 
 

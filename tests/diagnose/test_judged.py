@@ -69,7 +69,9 @@ def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> SurveyedTopic:
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
     report = Report()
-    behind = PanelNames.of(robot, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
+    behind = PanelNames.for_robot(
+        robot, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), **graph),))
+    )
     TopicChecks(report, behind, INTERFACES).check()
     return report
 
@@ -105,10 +107,12 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(readout("/words")))
     lost = replace(topic("/words"), announced=False)
     assert judged(here, topics=(lost,)).codes() == ["topic_unrouted"]
-    new = PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
+    new = PanelNames.for_robot(
+        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
+    )
     report, before = (
         Report(),
-        PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,)),))),
+        PanelNames.for_robot(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,)),))),
     )
     TopicChecks(report, new, INTERFACES, before).check()
     assert report.codes() == []
@@ -134,14 +138,16 @@ def test_servers_that_the_bridge_has_lost_or_denies(
     bridge = replace(BRIDGE, config=config)
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,), nodes=(node,)),))
     report = Report()
-    TopicChecks(report, PanelNames.of(here, graph), INTERFACES).check()
+    TopicChecks(report, PanelNames.for_robot(here, graph), INTERFACES).check()
     assert named(report.findings) == [(code, "/home"), (code, "/count"), (code, PARAMETERS[0])]
 
 
 def test_a_permission_that_the_bridge_has_lost_is_not_called_stale(tmp_path: Path) -> None:
     here = robot(tmp_path, panel_of(interlock("/permission", max_age_s=1.0)))
     lost = replace(topic("/permission", BOOL), announced=False)
-    behind = PanelNames.of(here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
+    behind = PanelNames.for_robot(
+        here, GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),))
+    )
     report = Report()
     check_permissions(report, behind, ReceivedSamples(began=0.0, ended=5.0), INTERFACES)
     TopicChecks(report, behind, INTERFACES).check()
@@ -154,7 +160,7 @@ def test_a_permission_that_the_bridge_has_lost_is_not_called_stale(tmp_path: Pat
 )
 def test_a_name_that_is_nearly_there_is_named(there: str, words: str, tmp_path: Path) -> None:
     report = judged(robot(tmp_path, panel_of(readout("/words"))), topics=(topic(there),))
-    assert [finding.what for finding in report.findings] == [f"No node publishes /words.{words}"]
+    assert [finding.sentence for finding in report.findings] == [f"No node publishes /words.{words}"]
 
 
 def test_advice_for_several_is_given_once(tmp_path: Path) -> None:
@@ -175,7 +181,7 @@ def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) ->
     bridged = RobotGraph(namespace="/robot1", bridges=(BRIDGE,), topics=(topic("/words"),))
     other = RobotGraph(namespace="/robot2", bridges=(BRIDGE,), topics=(topic("/words", BOOL),))
     report = Report()
-    behind = PanelNames.of(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
+    behind = PanelNames.for_robot(robot(tmp_path, text), GraphSnapshot(robots=(bridged, other)))
     TopicChecks(report, behind, INTERFACES).check()
     assert report.codes() == []
 
@@ -195,7 +201,7 @@ def test_names_outside_of_the_namespace_and_the_nodes_log_are_found(tmp_path: Pa
     own = RobotGraph(namespace="/amr", bridges=(BRIDGE,), topics=(topic("/rosout", LOG_TYPE),))
     cell = RobotGraph(namespace="/cell", bridges=(BRIDGE,), topics=(topic("/words"),))
     report = Report()
-    behind = PanelNames.of(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
+    behind = PanelNames.for_robot(robot(tmp_path, text), GraphSnapshot(robots=(own, cell)))
     TopicChecks(report, behind, INTERFACES).check()
     assert named(report.findings) == []
 
@@ -213,7 +219,7 @@ def test_a_bridge_that_reaches_no_node(config: dict[str, Any], code: str, tmp_pa
     bridge = replace(BRIDGE, config={**BRIDGE.config, **config})
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(bridge,)),))
     report = Report()
-    behind = PanelNames.of(robot(tmp_path, panel_of(readout("/words"))), graph)
+    behind = PanelNames.for_robot(robot(tmp_path, panel_of(readout("/words"))), graph)
     check_graph(report, graph, behind)
     assert [finding.code for finding in report.findings] == [code]
     assert ("CYCLONEDDS_URI" in as_text(report)) is (code == "bridge_localhost")
@@ -253,7 +259,7 @@ def test_the_clock_of_the_bridges_machine(ahead_s: float, expected: list[str], t
     check_clocks(report, robot(tmp_path, panel_of(readout("/words"))), came, INTERFACES)
     assert report.codes() == expected
     for finding in report.findings:
-        assert f"{abs(ahead_s):.1f} s {'ahead of' if ahead_s > 0 else 'behind'}" in finding.what
+        assert f"{abs(ahead_s):.1f} s {'ahead of' if ahead_s > 0 else 'behind'}" in finding.sentence
 
 
 def test_a_clock_that_nothing_is_known_of(tmp_path: Path) -> None:
@@ -308,7 +314,7 @@ def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: 
     lock = interlock("/joints", type=state, field="position[name=lift]", max=0.5)
     here = robot(tmp_path, panel_of(lock, button("/go")))
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=(topic("/joints", state),)),))
-    behind = PanelNames.of(here, graph)
+    behind = PanelNames.for_robot(here, graph)
     for lift, codes in ((0.25, []), (0.75, ["permission_refused"])):
         report, observed = Report(), ReceivedSamples()
         for name, position in (("lift", lift), ("finger", 0.9)):
@@ -339,7 +345,7 @@ def test_the_publishers_of_a_permission_are_named_if_there_are_several(
     known = (SurveyedTopic(name="/permit", key="permit", publishers=ends),)
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
     report = Report()
-    check_permissions(report, PanelNames.of(here, graph), ReceivedSamples(), INTERFACES)
+    check_permissions(report, PanelNames.for_robot(here, graph), ReceivedSamples(), INTERFACES)
     found = [
         finding.details["nodes"]
         for finding in report.findings

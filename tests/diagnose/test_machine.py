@@ -77,7 +77,7 @@ def test_an_address_that_is_not_this_machines() -> None:
     check_port(report, "192.0.2.99", free_port())
     (found,) = report.findings
     assert found.code == "address_unusable"
-    assert "can't assign" in found.what or "cannot assign" in found.what
+    assert "can't assign" in found.sentence or "cannot assign" in found.sentence
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_a_server_of_ours_is_not_taken_for_another_program(setup: Setup, server:
     setup.port, setup.data = server.port, server.data
     found = setup.diagnose(panel_of(), NO_ROUTER).report
     assert found.codes()[:2] == ["server_running", "server_not_ready"]
-    assert "bridge" in found.findings[1].what
+    assert "bridge" in found.findings[1].sentence
     assert "data_in_use" not in found.codes()
 
 
@@ -178,7 +178,7 @@ def test_a_screen_is_measured(
 def test_the_key_that_comes_out_too_small_is_reported_in_mm(setup: Setup) -> None:
     connect(setup.screens, edid(1280, 800, 150, 94))
     found = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
-    assert "a button of 20 mm is 11 mm wide" in found.what
+    assert "a button of 20 mm is 11 mm wide" in found.sentence
     assert "mm_per_px = 0.117" in found.do
 
 

@@ -106,7 +106,7 @@ def test_it_does_what_its_page_says(machine: Machine, row: Row, one: Shown) -> N
 
     def output() -> str:
         done = machine.shell.run(one.command)
-        assert done.returncode == row.given.get("status", 0), done.stdout
+        assert done.returncode == row.values.get("status", 0), done.stdout
         return done.stdout
 
     says = row.text("says")

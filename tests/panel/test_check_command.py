@@ -168,7 +168,7 @@ def test_an_interlock_that_locks_nothing_is_noted(
     path.write_text(REFERENCE_TEXT + spare)
     assert main([str(path)]) == 0
     line = len(path.read_text().splitlines()) - 3
-    notes = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]
+    notes = [line for line in capsys.readouterr().out.splitlines() if "locks nothing" in line]
     assert notes == [
         f'  note: interlock[1] "spare", line {line}: locks nothing: no control has interlock = "spare"'
     ]

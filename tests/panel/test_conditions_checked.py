@@ -173,9 +173,9 @@ def test_a_condition_that_can_not_hold_is_a_fault(
 ) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(file_of(tmp_path, type_name, conditions))
-    found = {one.place: one.message for one in caught.value.faults}
-    assert fault in found.pop(f"interlock[0].{place}")
-    assert found == {}
+    reported = {entry.place: entry.message for entry in caught.value.faults}
+    assert fault in reported.pop(f"interlock[0].{place}")
+    assert reported == {}
 
 
 @pytest.mark.parametrize("value", [None, "true", 1, 1.0, [True], b"\1"])
@@ -204,7 +204,7 @@ def test_a_condition_without_an_interlock_is_checked_at_its_place(
 ) -> None:
     condition = Condition.model_validate({"topic": "/a", "type": "std_msgs/msg/Float64", **keys})
     faults = list(condition_faults("alarm[2]", condition, INTERFACES))
-    assert [one.place for one in faults] == [f"alarm[2].{place}"]
+    assert [reported.place for reported in faults] == [f"alarm[2].{place}"]
     assert fault in faults[0].message
 
 
@@ -217,10 +217,10 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
     shows: list[float] = []
 
     def take(value: float, *between: float) -> tuple[bool, bool]:
-        def encoded(one: float) -> bytes:
-            return INTERFACES.encode("std_msgs/msg/Float64", {"data": one})
+        def encoded(number: float) -> bytes:
+            return INTERFACES.encode("std_msgs/msg/Float64", {"data": number})
 
-        passed = tuple(SkippedPayload(encoded(one), NOW, NOW) for one in between)
+        passed = tuple(SkippedPayload(encoded(number), NOW, NOW) for number in between)
         sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, skipped_payloads=passed)
         *between_two, last = intake.steps(Changes({robot.key(ENABLED): sample}, {}, True))
         shows.extend(value for _ in between_two)

@@ -99,7 +99,7 @@ def test_a_message_a_request_and_a_goal_have_the_values_of_named_constants(path:
 
 
 def test_the_preview_of_a_press_has_the_values_that_the_robot_gets(path: Path) -> None:
-    publish, call, goal = (one.message for one in check_panel(path).previews)
+    publish, call, goal = (preview.message for preview in check_panel(path).previews)
     assert "history: [1, 2]" in publish
     assert "level: 2" in publish
     assert 'mode: "{mode}"' in publish

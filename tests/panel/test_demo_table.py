@@ -161,5 +161,5 @@ def test_an_entry_of_a_widget_with_a_fault_is_no_second_fault(tmp_path: Path) ->
 def test_a_place_with_quotes_has_the_line_of_what_is_around_it() -> None:
     place = place_of(("demo", "/a", "ranges", "position[name='b.c']", 0))
     assert place == 'demo."/a".ranges."position[name=\'b.c\']"[0]'
-    (found,) = add_locations([Fault(place, "wrong")], '[demo."/a"]\nhz = 1\n', {})
-    assert found.line == 1
+    (located,) = add_locations([Fault(place, "wrong")], '[demo."/a"]\nhz = 1\n', {})
+    assert located.line == 1

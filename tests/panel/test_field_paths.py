@@ -43,7 +43,7 @@ AT: Final = f"received {format_time(NOW)}"
 
 
 @pytest.mark.parametrize(
-    ("path", "found", "outside", "last"),
+    ("path", "steps", "outside", "last"),
     [
         ("position[name=joint_2]", ["position", Key("name", "joint_2")], "", "position"),
         (
@@ -60,8 +60,8 @@ AT: Final = f"received {format_time(NOW)}"
         ("a[b=関節]", ["a", Key("b", "関節")], "", "a"),
     ],
 )
-def test_a_path_is_read_as_it_is_written(path: str, found: list[Any], outside: str, last: str) -> None:
-    assert list(path_steps(path)) == found
+def test_a_path_is_read_as_it_is_written(path: str, steps: list[Any], outside: str, last: str) -> None:
+    assert list(path_steps(path)) == steps
     assert (parent_path(path), field_name(path)) == (outside, last)
 
 

@@ -20,15 +20,15 @@ def panel(screens: list[str], *groups: dict[str, Any], **page: Any) -> Panel:
     return Panel.model_validate({"title": "T", "screens": screens, "page": [whole]})
 
 
-def said(given: Panel) -> str:
-    return "".join(note.message for note in fit_notes(given))
+def said(checked: Panel) -> str:
+    return "".join(note.message for note in fit_notes(checked))
 
 
 @pytest.mark.parametrize(("rows", "fits"), [(6, True), (7, False)])
 def test_as_many_rows_as_there_is_height_for(rows: int, fits: bool) -> None:
     """A key of 20 mm takes 101.6 px with its gap above, and 12 px lie between rows."""
-    given = panel(["1280x800"], {"columns": 1, "widget": keys(rows)})
-    assert said(given).startswith("fits" if fits else 'does not fit 1280x800: "P" needs 807 px')
+    stacked = panel(["1280x800"], {"columns": 1, "widget": keys(rows)})
+    assert said(stacked).startswith("fits" if fits else 'does not fit 1280x800: "P" needs 807 px')
 
 
 def test_a_group_that_takes_turns_needs_height_for_itself_alone() -> None:
@@ -38,8 +38,8 @@ def test_a_group_that_takes_turns_needs_height_for_itself_alone() -> None:
 
 
 def test_a_key_that_would_be_narrower_than_20_mm_is_named() -> None:
-    given = panel(["800x480"], {"columns": 8, "widget": keys(8)})
-    assert said(given) == 'does not fit 800x480: "K0" would be 76 px wide and needs 91'
+    narrow = panel(["800x480"], {"columns": 8, "widget": keys(8)})
+    assert said(narrow) == 'does not fit 800x480: "K0" would be 76 px wide and needs 91'
 
 
 def test_only_pages_that_must_fit_are_judged_and_only_with_screens() -> None:
@@ -48,9 +48,9 @@ def test_only_pages_that_must_fit_are_judged_and_only_with_screens() -> None:
 
 
 def test_a_page_with_a_template_of_its_own_is_left_to_a_look_in_a_browser() -> None:
-    given = panel(["800x480"], {"widget": keys(20)})
-    own = given.pages[0].model_copy(update={"template": "plan.html"})
-    theirs = given.model_copy(update={"pages": (own,)})
+    crowded = panel(["800x480"], {"widget": keys(20)})
+    own = crowded.pages[0].model_copy(update={"template": "plan.html"})
+    theirs = crowded.model_copy(update={"pages": (own,)})
     assert said(theirs) == "plan.html decides what fits: look at it in a browser"
 
 

@@ -106,9 +106,9 @@ def test_the_kiosk_fills_in_deadline_and_count(tmp_path: Path) -> None:
 def test_a_fault_is_named_with_its_place(
     tmp_path: Path, hold: dict[str, Any], place: str, message: str
 ) -> None:
-    found = fault(tmp_path, hold)
-    assert found[0] == place
-    assert message in found[1]
+    reported = fault(tmp_path, hold)
+    assert reported[0] == place
+    assert message in reported[1]
 
 
 def test_a_topic_has_one_type_for_buttons_and_holds(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ MODE: Mapping[str, Any] = {
 LIGHT: Mapping[str, Any] = {"id": "light", "kind": "toggle", "label": "Light", "on": "Shines"}
 
 
-def one(table: Mapping[str, Any]) -> Input:
+def input_of(table: Mapping[str, Any]) -> Input:
     (widget,) = panel_of(table).widgets()
     assert isinstance(widget, Input)
     return widget
@@ -47,7 +47,7 @@ def exactly(value: Any, wanted: Any) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("table", "given", "value"),
+    ("table", "entered", "value"),
     [
         (SPEED, 0, 0.0),
         (SPEED, -0.5, -0.5),
@@ -74,9 +74,9 @@ def exactly(value: Any, wanted: Any) -> bool:
     ],
 )
 def test_a_value_is_taken_with_the_type_of_its_input(
-    table: Mapping[str, Any], given: Any, value: Any
+    table: Mapping[str, Any], entered: Any, value: Any
 ) -> None:
-    assert exactly(one(table).check_value(given), value)
+    assert exactly(input_of(table).check_value(entered), value)
 
 
 # What a refusal says of each input.
@@ -90,7 +90,7 @@ TAKES: Mapping[str, Mapping[str, Any]] = {
 
 
 @pytest.mark.parametrize(
-    ("table", "given", "code", "shown"),
+    ("table", "entered", "code", "shown"),
     [
         (SPEED, 1.6, "input_outside_limits", "1.6"),
         (SPEED, -0.6, "input_outside_limits", "−0.6"),
@@ -121,10 +121,10 @@ TAKES: Mapping[str, Mapping[str, Any]] = {
     ],
 )
 def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
-    table: Mapping[str, Any], given: Any, code: str, shown: str | None
+    table: Mapping[str, Any], entered: Any, code: str, shown: str | None
 ) -> None:
     with pytest.raises(InputError) as caught:
-        one(table).check_value(given)
+        input_of(table).check_value(entered)
     assert coded(caught.value.text, "label", "given") == (code, table["label"], shown)
     about = TAKES[table["label"]]
     assert coded(caught.value.text, *about)[1:] == tuple(about.values())
@@ -157,12 +157,12 @@ def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
 def test_form_text_is_converted_to_the_type_of_its_input(
     table: Mapping[str, Any], text: str, value: Any
 ) -> None:
-    assert exactly(one(table).parse_text(text, ENGLISH), value)
+    assert exactly(input_of(table).parse_text(text, ENGLISH), value)
 
 
 def test_limits_read_as_an_operator_says_them() -> None:
     for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "−1 to 1 rad")):
-        widget: Any = one(table)
+        widget: Any = input_of(table)
         assert english(widget.limits_text) == text
 
 
@@ -182,26 +182,28 @@ def test_limits_read_as_an_operator_says_them() -> None:
 def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
     more: Mapping[str, Any], step: str, whole: bool
 ) -> None:
-    widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
+    widget: Any = input_of({"id": "n", "kind": "number", "label": "N", **more})
     assert (widget.html_attributes["step"], widget.is_whole) == (step, whole)
 
 
 def test_a_value_within_a_billionth_of_a_step_is_on_it_and_is_sent_as_it_is() -> None:
-    speed, count = one(SPEED), one(COUNT)
-    for given in (0.1 + 0.2, 0.1 * 3 + 0.4, 1.1 - 0.2, 0.3 + 1e-10, 0.3 - 1e-10, -0.1 - 0.2):
-        assert speed.check_value(given) == given
-    for given in (0.3 + 2e-10, 0.3 - 2e-10, 0.25, 1.5 + 1e-12, -0.5 - 1e-12):  # limits are exact
+    speed, count = input_of(SPEED), input_of(COUNT)
+    for entered in (0.1 + 0.2, 0.1 * 3 + 0.4, 1.1 - 0.2, 0.3 + 1e-10, 0.3 - 1e-10, -0.1 - 0.2):
+        assert speed.check_value(entered) == entered
+    for entered in (0.3 + 2e-10, 0.3 - 2e-10, 0.25, 1.5 + 1e-12, -0.5 - 1e-12):  # limits are exact
         with pytest.raises(InputError):
-            speed.check_value(given)
-    for given in (0.1 * 3 * 10, 2.9999999999999996, 3.0000000005):
-        assert exactly(count.check_value(given), 3)
-    for given in (3.00000001, 2.5):
+            speed.check_value(entered)
+    for entered in (0.1 * 3 * 10, 2.9999999999999996, 3.0000000005):
+        assert exactly(count.check_value(entered), 3)
+    for entered in (3.00000001, 2.5):
         with pytest.raises(InputError):
-            count.check_value(given)
+            count.check_value(entered)
 
 
 def test_of_whole_numbers_none_counts_as_its_neighbour() -> None:
-    large = one({"id": "n", "kind": "number", "label": "N", "min": 0, "max": 10**13, "step": 10**10})
+    large = input_of(
+        {"id": "n", "kind": "number", "label": "N", "min": 0, "max": 10**13, "step": 10**10}
+    )
     assert large.check_value(2 * 10**10) == 2 * 10**10
     with pytest.raises(InputError):
         large.check_value(2 * 10**10 + 1)
@@ -212,11 +214,11 @@ def test_every_sum_of_steps_is_taken(steps: int, step: float) -> None:
     low, high = round(-20_000 * step, 6), round(20_000 * step, 6)
     table = {"id": "n", "kind": "number", "label": "N", "min": low, "max": high, "step": step}
     added = step * steps
-    assert one(table).check_value(added) == added
+    assert input_of(table).check_value(added) == added
     assert Range(low, high, step).contains(added)
 
 
 def test_every_value_on_a_step_is_taken() -> None:
-    speed = one(SPEED)
+    speed = input_of(SPEED)
     for number in range(-5, 16):
         assert speed.check_value(float(f"{number / 10:.1f}")) == number / 10

@@ -59,9 +59,9 @@ def test_a_message_of_its_own_stops_with_zeros_or_with_its_release(tmp_path: Pat
 def test_a_fault_names_its_place(
     tmp_path: Path, changes: dict[str, Any], place: str, said: str
 ) -> None:
-    where, what = fault(tmp_path, STICK | changes)
+    where, message = fault(tmp_path, STICK | changes)
     assert where == place
-    assert said in what
+    assert said in message
 
 
 def test_an_input_may_not_have_an_axis_name(tmp_path: Path) -> None:

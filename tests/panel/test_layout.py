@@ -26,16 +26,16 @@ def tables(*groups: Table, own: tuple[Table, ...] = (MESSAGE,), **more: Any) -> 
     return {"title": "Cell", "interlock": [INTERLOCK], "page": [page], **more}
 
 
-def loaded(folder: Path, given: Mapping[str, Any]) -> Panel:
+def loaded(folder: Path, content: Mapping[str, Any]) -> Panel:
     path = folder / "cell.toml"
-    path.write_text("".join(f"{name} = {toml(value)}\n" for name, value in given.items()))
+    path.write_text("".join(f"{name} = {toml(value)}\n" for name, value in content.items()))
     return load_panel(path)
 
 
-def faults(folder: Path, given: Mapping[str, Any]) -> dict[str, str]:
+def faults(folder: Path, content: Mapping[str, Any]) -> dict[str, str]:
     """Place → message of every fault."""
     with pytest.raises(PanelError) as caught:
-        loaded(folder, given)
+        loaded(folder, content)
     return {fault.place: fault.message for fault in caught.value.faults}
 
 
@@ -105,7 +105,7 @@ def test_values_and_conditions_of_groups_are_resolved_like_those_of_pages(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("given", "place", "words"),
+    ("content", "place", "words"),
     [
         (tables({"columns": 0, "widget": [FREE]}), "page[0].group[0].columns", "1 or more, not 0"),
         (tables({"columns": 13}), "page[0].group[0].columns", "12 or less, not 13"),
@@ -177,17 +177,17 @@ def test_values_and_conditions_of_groups_are_resolved_like_those_of_pages(tmp_pa
     ],
 )
 def test_a_fault_is_named_with_its_place(
-    tmp_path: Path, given: dict[str, Any], place: str, words: str
+    tmp_path: Path, content: dict[str, Any], place: str, words: str
 ) -> None:
-    found = faults(tmp_path, given)
-    assert list(found) == [place]
-    assert words in found[place]
+    reported = faults(tmp_path, content)
+    assert list(reported) == [place]
+    assert words in reported[place]
 
 
 def test_an_icon_of_a_page_is_one_that_is_shipped(tmp_path: Path) -> None:
-    given = tables()
-    given["page"][0]["icon"] = "factry"
-    assert faults(tmp_path, given) == {
+    content = tables()
+    content["page"][0]["icon"] = "factry"
+    assert faults(tmp_path, content) == {
         "page[0].icon": '"factry" is not one of the shipped icons: did you mean "factory"?'
     }
 
@@ -201,11 +201,11 @@ def test_three_keys_fill_the_frame(tmp_path: Path) -> None:
 
 def test_what_is_wrong_in_a_group_and_in_the_frame_is_reported_together(tmp_path: Path) -> None:
     """The rest is checked beside stand-ins of what is no widget at all."""
-    given = tables(
+    content = tables(
         {"columns": "three", "widget": [{**HEARD, "kind": "redout"}, {**FREE, "type": "x/msg/Y"}]},
         frame={"widget": [{**STOP, "topik": "/stop"}, {**HALT, "service": "halt"}]},
     )
-    assert set(faults(tmp_path, given)) == {
+    assert set(faults(tmp_path, content)) == {
         "page[0].group[0].columns",
         "page[0].group[0].widget[0].kind",
         "page[0].group[0].widget[1].type",
@@ -245,8 +245,8 @@ message = {}
     )
     with pytest.raises(PanelError) as caught:
         load_panel(path)
-    found = {fault.place: (fault.id, fault.line) for fault in caught.value.faults}
-    assert found == {
+    located = {fault.place: (fault.id, fault.line) for fault in caught.value.faults}
+    assert located == {
         "frame.widget[0].service": ("halt", 7),
         "page[0].group[1].columns": ("one", 17),
         "page[0].group[1].widget[0].topic": ("go", 22),
@@ -268,7 +268,9 @@ def test_each_role_has_a_colour_that_is_right_for_it(tmp_path: Path, role: str) 
 
 def test_no_key_is_red_yellow_or_green() -> None:
     """Red and yellow are of emergency stops, which no screen has; what is normal has no colour."""
-    assert {"red", "yellow", "green"}.isdisjoint({one for of in COLOURS.values() for one in of})
+    assert {"red", "yellow", "green"}.isdisjoint(
+        {colour for themes in COLOURS.values() for colour in themes}
+    )
 
 
 def test_the_icons_of_roles_are_shipped() -> None:

@@ -112,7 +112,10 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     # The catalogue is a file beside the panel file; no type of ROS 2 has a list with a bool `active`.
     files = ["list.active", "list.catalogue"]
     assert list(lacking(TABLES, Panel)) == ["namespace", *files, *conditions]
-    pages, groups = TABLES["page"], [one for page in TABLES["page"] for one in page.get("group", ())]
+    pages, groups = (
+        TABLES["page"],
+        [group for page in TABLES["page"] for group in page.get("group", ())],
+    )
     widgets = [widget for part in (*pages, *groups, TABLES["frame"]) for widget in part["widget"]]
     together = {key: value for page in pages for key, value in page.items()}
     # Those are files beside the panel file; test_page_templates.py has them.
@@ -127,9 +130,9 @@ def keys() -> Iterator[tuple[tuple[str, str], int]]:
     """((the table's header, the key), number) of each line with a key."""
     header = ""
     for number, line in enumerate(LINES, 1):
-        header = found[1] if (found := HEADER.fullmatch(line)) else header
-        if found := KEY.match(line):
-            yield (header, found[1]), number
+        header = match[1] if (match := HEADER.fullmatch(line)) else header
+        if match := KEY.match(line):
+            yield (header, match[1]), number
 
 
 # In the short form one line for each key of each table, several at once: as many mistakes, as many
@@ -149,16 +152,16 @@ def apart(numbers: Sequence[int]) -> list[list[int]]:
     """The numbers in groups, each of different widgets, pages, interlocks, robots or tables."""
     groups: list[dict[str | int, int]] = []
     for number in numbers:
-        of = id_at(number) or header_of(number)
+        place = id_at(number) or header_of(number)
         fits = (
-            one
-            for one in groups
-            if of not in one and len(one) < AT_ONCE and not ALONE & {*one.values()}
+            members
+            for members in groups
+            if place not in members and len(members) < AT_ONCE and not ALONE & {*members.values()}
         )
         group = None if number in ALONE else next(fits, None)
         if group is None:
             groups.append(group := {})
-        group[of] = number
+        group[place] = number
     return [list(group.values()) for group in groups]
 
 
@@ -172,16 +175,16 @@ def shown(numbers: Sequence[int]) -> str:
 
 
 def key_of(number: int) -> str:
-    found = KEY.match(LINES[number - 1]) or HEADER.fullmatch(LINES[number - 1])
-    assert found is not None
-    return found[1]
+    match = KEY.match(LINES[number - 1]) or HEADER.fullmatch(LINES[number - 1])
+    assert match is not None
+    return match[1]
 
 
 def one_each(faults_of: FaultsOf, mistakes: Mapping[int, str]) -> dict[int, Fault]:
     """The fault of each line: there is one in each of these lines, and no other."""
-    found = [in_words(fault) for fault in faults_of(with_lines(mistakes))]
-    assert sorted(fault.line for fault in found) == sorted(mistakes), "\n".join(map(str, found))
-    return {fault.line: fault for fault in found}
+    reported = [in_words(fault) for fault in faults_of(with_lines(mistakes))]
+    assert sorted(fault.line for fault in reported) == sorted(mistakes), "\n".join(map(str, reported))
+    return {fault.line: fault for fault in reported}
 
 
 @pytest.mark.parametrize("numbers", apart(KEYS), ids=shown)
@@ -203,7 +206,7 @@ def test_a_table_where_none_belongs_is_one_fault(faults_of: FaultsOf, numbers: S
         assert fault.place.removesuffix(".a").endswith(key_of(number)), str(fault)
 
 
-@pytest.mark.parametrize("numbers", [*apart(KEYS), *([one] for one in HEADERS)], ids=shown)
+@pytest.mark.parametrize("numbers", [*apart(KEYS), *([number] for number in HEADERS)], ids=shown)
 def test_a_misspelt_key_or_table_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     misspelt = {n: LINES[n - 1].replace(key_of(n), f"{key_of(n)}x", 1) for n in numbers}
     for number, fault in one_each(faults_of, misspelt).items():
@@ -233,9 +236,9 @@ def shows_at(number: int) -> set[int]:
 def test_what_is_left_out_is_one_fault_at_most(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     left = list(numbers)
     for fault in faults_of(with_lines(dict.fromkeys(numbers, "#"))):
-        of = next((n for n in left if in_words(fault).line in shows_at(n)), None)
-        assert of is not None, f"{fault}, without the lines {left}"
-        left.remove(of)  # those that remain have a default
+        line = next((n for n in left if in_words(fault).line in shows_at(n)), None)
+        assert line is not None, f"{fault}, without the lines {left}"
+        left.remove(line)  # those that remain have a default
 
 
 @pytest.mark.parametrize("number", HEADERS)
@@ -300,8 +303,8 @@ def test_whatever_is_wrong_is_reported_in_words(
     faults_of: FaultsOf, damages: list[tuple[Any, ...]]
 ) -> None:
     lines = list(LINES)
-    for what, at, *more in damages:
-        match what, *more:
+    for kind, at, *more in damages:
+        match kind, *more:
             case ("without",):
                 lines[at] = ""
             case "again", other:

@@ -56,18 +56,18 @@ def toml(value: Any) -> str:
 def load(tmp_path: Path) -> Load:
     """Writes tables to a file and loads it."""
 
-    def loaded(given: dict[str, Any]) -> Panel:
+    def loaded(content: dict[str, Any]) -> Panel:
         path = tmp_path / "cell.toml"
-        path.write_text("".join(f"{name} = {toml(value)}\n" for name, value in given.items()))
+        path.write_text("".join(f"{name} = {toml(value)}\n" for name, value in content.items()))
         return load_panel(path)
 
     return loaded
 
 
-def faults(load: Load, given: dict[str, Any]) -> dict[str, str]:
+def faults(load: Load, content: dict[str, Any]) -> dict[str, str]:
     """Place → message of every fault."""
     with pytest.raises(PanelError) as caught:
-        load(given)
+        load(content)
     assert not caught.value.unreadable
     assert len({fault.place for fault in caught.value.faults}) == len(caught.value.faults)
     return {fault.place: fault.message for fault in caught.value.faults}
@@ -129,11 +129,11 @@ def test_what_is_loaded_can_not_be_changed(load: Load) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "namespace"),
+    ("written", "namespace"),
     [("", ""), ("/", ""), ("robot1", "/robot1"), ("/robot1", "/robot1"), ("/a/b/", "/a/b")],
 )
-def test_a_namespace_is_written_one_way(load: Load, given: str, namespace: str) -> None:
-    assert load(tables(namespace=given)).namespace == namespace
+def test_a_namespace_is_written_one_way(load: Load, written: str, namespace: str) -> None:
+    assert load(tables(namespace=written)).namespace == namespace
 
 
 def test_what_the_panel_listens_to_and_publishes(load: Load) -> None:
@@ -151,9 +151,9 @@ def test_pages_and_interlocks_are_found_by_id(load: Load) -> None:
 
 
 def test_the_revision_changes_with_the_file(load: Load) -> None:
-    one, same, other = load(tables()), load(tables()), load(tables(title="Other"))
-    assert one.revision == same.revision
-    assert one.revision != other.revision
+    loaded_panel, same, other = load(tables()), load(tables()), load(tables(title="Other"))
+    assert loaded_panel.revision == same.revision
+    assert loaded_panel.revision != other.revision
 
 
 def test_a_default_may_be_as_long_as_its_input(load: Load) -> None:
@@ -167,7 +167,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "place", "message"),
+    ("content", "place", "message"),
     [
         (without(tables(), "title"), "title", "is missing"),
         (without(tables(), "page"), "page", "is missing"),
@@ -356,11 +356,11 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
     ],
 )
 def test_a_fault_is_named_with_its_place(
-    load: Load, given: dict[str, Any], place: str, message: str
+    load: Load, content: dict[str, Any], place: str, message: str
 ) -> None:
-    found = faults(load, given)
-    assert list(found) == [place]
-    assert message in found[place]
+    reported = faults(load, content)
+    assert list(reported) == [place]
+    assert message in reported[place]
 
 
 PARAMETER = {
@@ -451,13 +451,13 @@ def test_a_fault_of_an_input_or_a_display_is_named_with_its_place(
     load: Load, widget: dict[str, Any], place: str, message: str
 ) -> None:
     page = {"id": "one", "title": "One", "widget": [widget]}
-    found = faults(load, tables(page=[page]))
-    assert list(found) == [f"page[0].widget[0].{place}"]
-    assert message in found[f"page[0].widget[0].{place}"]
+    reported = faults(load, tables(page=[page]))
+    assert list(reported) == [f"page[0].widget[0].{place}"]
+    assert message in reported[f"page[0].widget[0].{place}"]
 
 
 @pytest.mark.parametrize(
-    ("given", "place", "where"),
+    ("content", "place", "where"),
     [
         (
             without(tables(interlock=[{**INTERLOCK, "title": "Cell"}]), "title"),
@@ -477,9 +477,9 @@ def test_a_fault_of_an_input_or_a_display_is_named_with_its_place(
     ],
 )
 def test_a_key_that_stands_too_far_below_is_one_fault(
-    load: Load, given: dict[str, Any], place: str, where: str
+    load: Load, content: dict[str, Any], place: str, where: str
 ) -> None:
-    assert faults(load, given) == {place: f"unknown key; it belongs to {where}"}
+    assert faults(load, content) == {place: f"unknown key; it belongs to {where}"}
 
 
 def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> None:
@@ -555,15 +555,15 @@ def test_a_widget_id_is_unique_over_all_pages(load: Load) -> None:
 
 
 def test_all_faults_of_the_shape_are_reported_at_once(load: Load) -> None:
-    given = with_widget(1, topic="free", span=0)
-    del given["title"]
-    assert list(faults(load, given)) == ["title", f"{BUTTON}.span", f"{BUTTON}.topic"]
+    content = with_widget(1, topic="free", span=0)
+    del content["title"]
+    assert list(faults(load, content)) == ["title", f"{BUTTON}.span", f"{BUTTON}.topic"]
 
 
 def test_all_faults_of_names_and_messages_are_reported_at_once(load: Load) -> None:
-    given = with_widget(1, interlock="other", message={"data": 5})
-    given["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "id": "b", "type": TEXT}]
-    assert sorted(faults(load, given)) == [
+    content = with_widget(1, interlock="other", message={"data": 5})
+    content["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "id": "b", "type": TEXT}]
+    assert sorted(faults(load, content)) == [
         "interlock[0].field",
         "interlock[1].field",
         f"{BUTTON}.interlock",
@@ -635,8 +635,8 @@ def test_invalid_toml_file_is_unreadable(tmp_path: Path, data: bytes, reason: st
 
 
 def test_an_unknown_field_is_no_fault_of_the_input_in_it(load: Load) -> None:
-    found = faults(load, with_widget(1, message={"date": "{message}"}))
-    assert found == {f"{BUTTON}.message.date": "unknown field; std_msgs/msg/String has data"}
+    reported = faults(load, with_widget(1, message={"date": "{message}"}))
+    assert reported == {f"{BUTTON}.message.date": "unknown field; std_msgs/msg/String has data"}
 
 
 def test_a_mark_of_the_byte_order_is_no_fault(tmp_path: Path) -> None:
@@ -654,10 +654,10 @@ def test_a_file_that_is_not_there_is_unreadable(tmp_path: Path, name: str, reaso
 
 
 def test_a_fault_of_shape_hides_no_fault_of_meaning(load: Load) -> None:
-    given = with_widget(1, message={"dat": "x"}) | {"titel": "x"}
-    given["page"][0]["widget"][3] = {**HEARD, "kind": "redaout"}
-    given["interlock"] = [{**INTERLOCK, "max_age": 1}]
-    assert set(faults(load, given)) == {
+    content = with_widget(1, message={"dat": "x"}) | {"titel": "x"}
+    content["page"][0]["widget"][3] = {**HEARD, "kind": "redaout"}
+    content["interlock"] = [{**INTERLOCK, "max_age": 1}]
+    assert set(faults(load, content)) == {
         "titel",
         "interlock[0].max_age",
         "page[0].widget[3].kind",
@@ -666,7 +666,7 @@ def test_a_fault_of_shape_hides_no_fault_of_meaning(load: Load) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "place"),
+    ("content", "place"),
     [
         (tables(page=[{"id": "one", "title": "One", "text": "x"}]), "page[0].text"),
         (tables(interlock=[{**INTERLOCK, "publish": 1}]), "interlock[0].publish"),
@@ -675,9 +675,9 @@ def test_a_fault_of_shape_hides_no_fault_of_meaning(load: Load) -> None:
     ],
 )
 def test_keys_named_like_something_else_keep_their_place(
-    load: Load, given: dict[str, Any], place: str
+    load: Load, content: dict[str, Any], place: str
 ) -> None:
-    assert list(faults(load, given)) == [place]
+    assert list(faults(load, content)) == [place]
 
 
 @pytest.mark.parametrize(
@@ -694,10 +694,10 @@ def test_file_that_exhausts_the_parser_is_unreadable(tmp_path: Path, content: st
 
 @pytest.mark.parametrize("field", ["header", "ranges"])
 def test_a_readout_is_of_one_value(load: Load, field: str) -> None:
-    given = with_widget(3, topic="/scan", type="sensor_msgs/msg/LaserScan", field=field)
-    found = faults(load, given)
-    assert list(found) == [f"{READOUT}.field"]
-    assert "a readout shows one value" in found[f"{READOUT}.field"]
+    content = with_widget(3, topic="/scan", type="sensor_msgs/msg/LaserScan", field=field)
+    reported = faults(load, content)
+    assert list(reported) == [f"{READOUT}.field"]
+    assert "a readout shows one value" in reported[f"{READOUT}.field"]
 
 
 def interface(tmp_path: Path, text: str = "bool[2] closed\nfloat32 kelvin\n") -> None:
@@ -722,10 +722,10 @@ def test_a_panel_may_bring_interfaces_beside_it(load: Load, tmp_path: Path) -> N
 
 def test_an_interface_file_with_a_fault_is_named(load: Load, tmp_path: Path) -> None:
     interface(tmp_path, "bool closed\nfloat31 kelvin\n")
-    found = faults(load, with_doors("closed"))
-    assert list(found) == [f"{READOUT}.type"]
-    assert found[f"{READOUT}.type"].startswith('"cell_msgs/msg/Doors" can\'t be used: ')
-    assert "msgs/cell_msgs/msg/Doors.msg:2: " in found[f"{READOUT}.type"]
+    reported = faults(load, with_doors("closed"))
+    assert list(reported) == [f"{READOUT}.type"]
+    assert reported[f"{READOUT}.type"].startswith('"cell_msgs/msg/Doors" can\'t be used: ')
+    assert "msgs/cell_msgs/msg/Doors.msg:2: " in reported[f"{READOUT}.type"]
 
 
 def test_an_interface_file_that_the_panel_does_not_need_may_have_a_fault(
@@ -736,7 +736,7 @@ def test_an_interface_file_that_the_panel_does_not_need_may_have_a_fault(
         (tmp_path / f"msgs/cell_msgs/msg/{name}.msg").write_text("float31 kelvin\n")
     load(with_doors("closed[0]"))
     notes = map(str, check_panel(tmp_path / "cell.toml").notes)
-    (note,) = (one for one in notes if one.startswith("note: interfaces"))
+    (note,) = (line for line in notes if line.startswith("note: interfaces"))
     assert note.startswith(
         "note: interfaces[0], line 1: cell_msgs/msg/Tool can't be used, and this panel "
     )
@@ -760,9 +760,9 @@ def test_what_the_kiosk_itself_needs_must_be_usable(
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("float31 kelvin\n")
     page = {"id": "one", "title": "One", "widget": widgets}
-    found = faults(load, {"interfaces": ["msgs"], **tables(page=[page])})
-    assert list(found) == ["interfaces[0]"]
-    assert found["interfaces[0]"].startswith(f'the panel needs this type: "{name}" can\'t')
+    reported = faults(load, {"interfaces": ["msgs"], **tables(page=[page])})
+    assert list(reported) == ["interfaces[0]"]
+    assert reported["interfaces[0]"].startswith(f'the panel needs this type: "{name}" can\'t')
 
 
 def test_the_types_that_the_kiosk_needs_are_those_that_it_uses() -> None:
@@ -774,15 +774,15 @@ def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:
     interface(tmp_path)
     empty = tmp_path / "empty"
     empty.mkdir()
-    found = faults(load, {**with_doors("closed"), "interfaces": ["msgs", "empty"]})
-    assert found == {
+    reported = faults(load, {**with_doors("closed"), "interfaces": ["msgs", "empty"]})
+    assert reported == {
         "interfaces[1]": f"{empty} has no interfaces: "
         "they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
     }
 
 
 @pytest.mark.parametrize(
-    ("given", "place", "why"),
+    ("folders", "place", "why"),
     [
         (["none"], "interfaces[0]", "is not a folder: it must be a ROS package or have some in it"),
         ([5], "interfaces[0]", "must be the path of a folder, not 5"),
@@ -790,10 +790,10 @@ def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:
         ("msgs", "interfaces", 'must be a list of folders: write ["folder"]'),
     ],
 )
-def test_interfaces_are_folders(load: Load, given: Any, place: str, why: str) -> None:
-    found = faults(load, {"interfaces": given, **tables()})
-    assert list(found) == [place]
-    assert why in found[place]
+def test_interfaces_are_folders(load: Load, folders: Any, place: str, why: str) -> None:
+    reported = faults(load, {"interfaces": folders, **tables()})
+    assert list(reported) == [place]
+    assert why in reported[place]
 
 
 @pytest.mark.parametrize(
@@ -818,9 +818,9 @@ def test_a_fault_of_a_call_or_an_action_is_named(
     load: Load, widget: dict[str, Any], key: str, message: str
 ) -> None:
     page = {"id": "one", "title": "One", "widget": [MESSAGE, widget]}
-    found = faults(load, tables(page=[page]))
-    assert list(found) == [f"page[0].widget[1].{key}"]
-    assert message in found[f"page[0].widget[1].{key}"]
+    reported = faults(load, tables(page=[page]))
+    assert list(reported) == [f"page[0].widget[1].{key}"]
+    assert message in reported[f"page[0].widget[1].{key}"]
 
 
 def test_a_call_and_an_action_are_taken(load: Load) -> None:

@@ -35,14 +35,14 @@ def load(folder: Path, old: str = "", new: str = "") -> Panel:
 
 
 def faults(folder: Path, old: str, new: str) -> list[str]:
-    with pytest.raises(PanelError) as found:
+    with pytest.raises(PanelError) as caught:
         load(folder, old, new)
-    return [f"{one.place}: {one.message}" for one in found.value.faults]
+    return [f"{fault.place}: {fault.message}" for fault in caught.value.faults]
 
 
 def notes(folder: Path, old: str, new: str) -> list[str]:
     load(folder, old, new)
-    return [f"{one.place}: {one.message}" for one in check_panel(folder / "panel.toml").notes]
+    return [f"{note.place}: {note.message}" for note in check_panel(folder / "panel.toml").notes]
 
 
 def test_a_text_is_a_table_of_languages_and_a_plain_one_stays_a_text(tmp_path: Path) -> None:
@@ -128,14 +128,14 @@ def test_a_fault_has_the_language_in_its_place(tmp_path: Path, old: str, new: st
 
 
 def test_a_text_that_lacks_a_language_of_others_is_a_note(tmp_path: Path) -> None:
-    found = notes(tmp_path, ', ja = "速度", de = "Geschwindigkeit"', "")
-    assert 'page[0].group[0].widget[0].label: has no de and no ja; it is shown in "en"' in found
-    assert not any("has no" in one for one in notes(tmp_path, "", ""))
+    reported = notes(tmp_path, ', ja = "速度", de = "Geschwindigkeit"', "")
+    assert 'page[0].group[0].widget[0].label: has no de and no ja; it is shown in "en"' in reported
+    assert not any("has no" in note for note in notes(tmp_path, "", ""))
 
 
 def test_a_language_that_the_panel_leaves_out_needs_no_texts(tmp_path: Path) -> None:
     new = 'mode = "demo"\nlanguages = ["en", "de"]'
-    assert not any("has no" in one for one in notes(tmp_path, 'mode = "demo"', new))
+    assert not any("has no" in note for note in notes(tmp_path, 'mode = "demo"', new))
 
 
 def test_readers_choose_among_the_languages_of_the_panel(tmp_path: Path) -> None:

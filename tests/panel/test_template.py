@@ -87,12 +87,12 @@ def test_a_list_can_not_stand_in_a_text() -> None:
 
 
 @pytest.mark.parametrize(
-    ("where", "found"),
+    ("where", "value"),
     [("x", "{a}"), ("x.y", "{a}"), ("z[1].w", "{b}"), ("z[7]", [1, {"w": "{b}"}]), ("", None)],
 )
-def test_what_stands_at_a_field_is_found(where: str, found: Any) -> None:
+def test_what_stands_at_a_field_is_found(where: str, value: Any) -> None:
     template = {"x": "{a}", "z": [1, {"w": "{b}"}]}
-    assert value_at(template, where) == (template if found is None else found)
+    assert value_at(template, where) == (template if value is None else value)
 
 
 def test_now_is_the_time_at_which_it_is_asked_for() -> None:

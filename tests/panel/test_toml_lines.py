@@ -21,9 +21,9 @@ def paths(value: Any, path: Path = ()) -> Iterator[Path]:
         inner = value.items()
     elif isinstance(value, list):
         inner = enumerate(value)
-    for key, one in inner:
+    for key, nested in inner:
         yield (*path, key)
-        yield from paths(one, (*path, key))
+        yield from paths(nested, (*path, key))
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ class Writer:
     def tables(self, path: Path, written: list[str], taken: list[Key], depth: int) -> None:
         """Tables with headers, and those in them."""
         for key, read in self.keys(2):
-            if read in [one for _, one in taken]:
+            if read in [read_key for _, read_key in taken]:
                 continue
             name = [*written, key]
             many = self.one_of(0, 1, 2)  # 0: one table and no list

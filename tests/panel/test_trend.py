@@ -17,7 +17,9 @@ TREND: Final[Table] = {"id": "course", "kind": "trend", "label": "Course", "pen"
 
 
 def faults(trend: Table, **more: Any) -> list[str]:
-    return [f"{one.place}: {one.message}" for one in find_faults(panel_of(trend, **more), INTERFACES)]
+    return [
+        f"{fault.place}: {fault.message}" for fault in find_faults(panel_of(trend, **more), INTERFACES)
+    ]
 
 
 def trend(**more: Any) -> Trend:
@@ -58,10 +60,10 @@ def test_a_topic_has_one_type_in_all_pens() -> None:
     assert "page[0].widget[0].pen[1].type: /speed is std_msgs/msg/Float32 here" in fault
 
 
-@pytest.mark.parametrize("given", ["10", "5s", "32d", "0m", "1 h", "-1h", "1w"])
-def test_invalid_duration_is_refused(given: str) -> None:
+@pytest.mark.parametrize("window", ["10", "5s", "32d", "0m", "1 h", "-1h", "1w"])
+def test_invalid_duration_is_refused(window: str) -> None:
     with pytest.raises(ValidationError, match=r"is not a duration|is out of range"):
-        trend(window=given)
+        trend(window=window)
 
 
 def test_a_trend_has_one_to_eight_pens() -> None:
@@ -94,9 +96,9 @@ def test_all_trends_together_have_a_limit() -> None:
 
 def test_a_field_counts_once_and_for_each_robot() -> None:
     robots = [{"id": f"r{n}", "name": f"R{n}", "namespace": f"/r{n}"} for n in range(3)]
-    one, shared = panel_of(TREND), panel_of(TREND, {**TREND, "id": "b"})
-    assert taken(one) == taken(shared) == history_bytes(86_400)
-    assert taken(panel_of(TREND, robot=robots)) == 3 * taken(one)
+    single, shared = panel_of(TREND), panel_of(TREND, {**TREND, "id": "b"})
+    assert taken(single) == taken(shared) == history_bytes(86_400)
+    assert taken(panel_of(TREND, robot=robots)) == 3 * taken(single)
 
 
 def test_the_check_says_what_a_trend_takes() -> None:
@@ -104,12 +106,12 @@ def test_the_check_says_what_a_trend_takes() -> None:
     panel = panel_of({**TREND, "pen": pens, "disk": True})
     notes = [note.message for note in find_notes(panel, INTERFACES) if ".widget" in note.place]
     assert notes == ["keeps 24h of 4 pens: 3.9 MB of memory, and as much on disk"]
-    one = find_notes(panel_of({**TREND, "pen": pens[:1]}), INTERFACES)
-    assert [note.message for note in one][-1:] == ["keeps 24h of 1 pen: 1.0 MB of memory"]
+    single_pen_notes = find_notes(panel_of({**TREND, "pen": pens[:1]}), INTERFACES)
+    assert [note.message for note in single_pen_notes][-1:] == ["keeps 24h of 1 pen: 1.0 MB of memory"]
 
 
 def test_the_simulated_robot_has_each_pen() -> None:
     pens = [PEN, {**PEN, "topic": "/other", "unit": "%", "scale": 100.0}]
-    shown = [one for one in needs_of(trend(pen=pens), INTERFACES) if isinstance(one, Shown)]
-    found = [(one.topic, one.unit, one.scale) for one in shown]
-    assert found == [("/speed", "", 1.0), ("/other", "%", 100.0)]
+    shown = [need for need in needs_of(trend(pen=pens), INTERFACES) if isinstance(need, Shown)]
+    rows = [(need.topic, need.unit, need.scale) for need in shown]
+    assert rows == [("/speed", "", 1.0), ("/other", "%", 100.0)]

@@ -115,8 +115,8 @@ def test_an_input_fits_a_field_of_its_type(widgets: tuple[Mapping[str, Any], ...
 def test_an_input_of_another_type_is_reported_with_the_type_of_the_field(
     widgets: tuple[Mapping[str, Any], ...], fault: str
 ) -> None:
-    (found,) = faults(*widgets)
-    assert found.startswith(f"page[0].widget[1].message.data: {fault}")
+    (reported,) = faults(*widgets)
+    assert reported.startswith(f"page[0].widget[1].message.data: {fault}")
 
 
 def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
@@ -126,9 +126,9 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
         f'{where}: input "message" gives text; the field is float64'
     ]
     table = {**SELECT, "options": [{"value": {**ZERO, "y": "far"}, "label": "Far"}]}
-    (found,) = faults(table, sent(TWIST, {"linear": "{s}", "angular": ZERO}))
+    (reported,) = faults(table, sent(TWIST, {"linear": "{s}", "angular": ZERO}))
     gives = 'input "s" gives {x = 0, y = "far", z = 0}'
-    assert found == f"page[0].widget[1].message.linear.y: {gives}; the field is float64"
+    assert reported == f"page[0].widget[1].message.linear.y: {gives}; the field is float64"
 
 
 @pytest.mark.parametrize(
@@ -208,8 +208,8 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
     ],
 )  # fmt: skip
 def test_a_fault_of_an_input_or_a_display_is_reported(widget: Mapping[str, Any], fault: str) -> None:
-    (found,) = faults(widget)
-    assert found.startswith(f"page[0].widget[0].{fault}")
+    (reported,) = faults(widget)
+    assert reported.startswith(f"page[0].widget[0].{fault}")
 
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -266,15 +266,15 @@ def test_now_fills_a_time_anywhere_in_a_message(widget: Mapping[str, Any]) -> No
 def test_now_fills_nothing_but_a_time(
     type_name: str, message: dict[str, Any], place: str, fault: str
 ) -> None:
-    found = faults(sent(type_name, message))
-    assert {one.split(": ")[0] for one in found} == {f"page[0].widget[0].message.{place}"}
-    assert found[0].startswith(f"page[0].widget[0].message.{place}: {fault}")
+    reported = faults(sent(type_name, message))
+    assert {text.split(": ")[0] for text in reported} == {f"page[0].widget[0].message.{place}"}
+    assert reported[0].startswith(f"page[0].widget[0].message.{place}: {fault}")
 
 
 @pytest.mark.parametrize("kind", ["text", "toggle", "parameter"])
 def test_no_input_is_called_now(kind: str) -> None:
-    one: Mapping[str, Any] = {"text": MESSAGE, "toggle": TOGGLE, "parameter": PARAMETER}[kind]
-    assert faults({**one, "id": "now"}, std("String", "{now}")) == [
+    table: Mapping[str, Any] = {"text": MESSAGE, "toggle": TOGGLE, "parameter": PARAMETER}[kind]
+    assert faults({**table, "id": "now"}, std("String", "{now}")) == [
         f'page[0].widget[0].id: "now" is reserved, as {NOW_IS}: choose another id'
     ]
     assert faults({**std("String", "x"), "id": "now"}) == []
@@ -341,7 +341,10 @@ def test_every_distribution_has_the_services_of_parameters(distro: str) -> None:
         SET: (["parameters"], ["results"]),
     }
     for (_, type_name), (request, response) in of_services.items():
-        assert [fields(one) for one in interfaces.service_types(type_name)] == [request, response]
+        assert [fields(service_type) for service_type in interfaces.service_types(type_name)] == [
+            request,
+            response,
+        ]
     changes = ["new_parameters", "changed_parameters", "deleted_parameters"]
     assert fields(EVENT_TYPE) == ["stamp", "node", *changes]
 
@@ -426,8 +429,10 @@ TIMES: Final = {
 )
 def test_a_time_has_formats_of_its_own(kind: str, more: dict[str, Any], key: str) -> None:
     type_name, field = TIMES[kind]
-    found = faults({**HEARD, "type": type_name, "field": field, **more})
-    assert [one.partition(": ")[0] for one in found] == ([f"page[0].widget[0].{key}"] if key else [])
+    reported = faults({**HEARD, "type": type_name, "field": field, **more})
+    assert [text.partition(": ")[0] for text in reported] == (
+        [f"page[0].widget[0].{key}"] if key else []
+    )
 
 
 def test_a_lamp_of_a_time_is_refused() -> None:

@@ -107,7 +107,7 @@ class TinyPeer:
 
     async def stop(self) -> None: ...
 
-    def found(self, zids: Iterable[str]) -> None:
+    def appeared(self, zids: Iterable[str]) -> None:
         self.said += [f"found {zid}" for zid in zids]
 
     def lost(self, zids: Iterable[str]) -> None:

@@ -191,8 +191,8 @@ class Client:
 
     def tokens(self) -> list[str]:
         """The bridge's liveliness tokens as `<kind>/<key>/<type>[/<qos>]`, with `/` for `§`."""
-        found = self.session.liveliness().get("@/*/@ros2_lv/**", timeout=5)
-        keys = [str(reply.ok.key_expr) for reply in found if reply.ok is not None]
+        replies = self.session.liveliness().get("@/*/@ros2_lv/**", timeout=5)
+        keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
         others = [key for key in keys if key.count("/") > 2 and not key.startswith(self._own)]
         return sorted(key.split("/@ros2_lv/")[1].replace("§", "/") for key in others)
 

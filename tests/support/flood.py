@@ -31,7 +31,7 @@ async def flood(port: int, address: str, path: str, connections: int, seconds: f
     answers: Counter[str] = Counter()
     until = time.monotonic() + seconds
     work = [ask(port, address, path, until, answers) for _ in range(connections)]
-    await asyncio.wait([asyncio.ensure_future(one) for one in work], timeout=seconds + 2)
+    await asyncio.wait([asyncio.ensure_future(job) for job in work], timeout=seconds + 2)
     return answers
 
 

@@ -31,9 +31,9 @@ def poses(size: int) -> Large:
 
 def path(size: int) -> Large:
     """Poses with a frame id each."""
-    one = HEADER + POSE
-    count = size // len(one)
-    body = HEADER + struct.pack("<I", count) + HEADER + bytes(4) + POSE + one * (count - 1)
+    element = HEADER + POSE
+    count = size // len(element)
+    body = HEADER + struct.pack("<I", count) + HEADER + bytes(4) + POSE + element * (count - 1)
     return Large("nav_msgs/msg/Path", f"poses[{count - 1}].pose.position.x", 5.0, LITTLE + body)
 
 

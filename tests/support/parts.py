@@ -73,15 +73,15 @@ GROWS = 0.1  # per second of waiting
 
 
 def until(
-    what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float | None = None
+    condition: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float | None = None
 ) -> Any:
     """Waits for a condition and returns its value; fails with `why` at the timeout. Without `every_s`
     the interval between checks grows with the waiting time: a check may be a request, which takes CPU
     time from the process that it waits for."""
     began = time.monotonic()
     while True:
-        if found := what():
-            return found
+        if result := condition():
+            return result
         waited = time.monotonic() - began
         if waited > within_s:
             raise AssertionError(f"not within {within_s} s: {why}")
@@ -389,15 +389,15 @@ class Server:
 
     def robot(self, name: str) -> "Server":
         """The same server, for requests about one of its robots."""
-        one = copy(self)
-        one.base = f"/robots/{name}"
-        return one
+        server = copy(self)
+        server.base = f"/robots/{name}"
+        return server
 
     def by(self, way: str) -> "Server":
         """The same server, with presses by "post" or by "socket"."""
-        one = copy(self)
-        one.way = way
-        return one
+        server = copy(self)
+        server.way = way
+        return server
 
     def answers(self) -> bool:
         assert self.process.running, self.process.text
@@ -411,12 +411,12 @@ class Server:
 
     def snapshot(self) -> dict[str, Any]:
         text = self.http.get(f"{self.base}/events?once=1").text
-        found: dict[str, Any] = json.loads(events_in(text)[0][1])
-        return found
+        content: dict[str, Any] = json.loads(events_in(text)[0][1])
+        return content
 
     def widget(self, name: str) -> dict[str, Any]:
-        found: dict[str, Any] = self.snapshot()["widgets"][name]
-        return found
+        shown: dict[str, Any] = self.snapshot()["widgets"][name]
+        return shown
 
     def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
         """The response to a press, repeated while it is over the rate limit, as programs do."""
@@ -426,8 +426,8 @@ class Server:
             answer = self._press(widget, press)
             return None if answer.status_code == 429 else answer
 
-        found: httpx.Response = until(pressed, "there is room for a press", every_s=0.05)
-        return found
+        response: httpx.Response = until(pressed, "there is room for a press", every_s=0.05)
+        return response
 
     def _press(self, widget: str, press: Mapping[str, Any]) -> httpx.Response:
         if self.way == "socket":

@@ -36,14 +36,14 @@ class Row:
 
     kind: Literal["run", "elsewhere", "not_run"]
     command: str
-    given: Mapping[str, str | int]
+    values: Mapping[str, str | int]
 
     def fits(self, command: str) -> bool:
         pattern = ".*".join(map(re.escape, self.command.split("*")))
         return re.fullmatch(pattern, command, re.DOTALL) is not None
 
     def text(self, key: str) -> str:
-        return str(self.given.get(key, ""))
+        return str(self.values.get(key, ""))
 
 
 def pages() -> list[Path]:
@@ -81,14 +81,14 @@ def rows() -> tuple[Row, ...]:
     tables = tomllib.loads(text)
     kinds = re.findall(r"^\[\[(\w+)\]\]$", text, re.MULTILINE)
     left = {kind: iter(tables.get(kind, [])) for kind in KINDS}
-    found = []
+    found_rows = []
     for kind in kinds:
-        given = dict(next(left[kind]))
-        command = given.pop("command")
-        unknown = set(given) - KEYS[kind]
+        values = dict(next(left[kind]))
+        command = values.pop("command")
+        unknown = set(values) - KEYS[kind]
         assert not unknown, f"{TABLE.name}: [[{kind}]] {command!r} has no {', '.join(sorted(unknown))}"
-        found.append(Row(kind, command, given))
-    return tuple(found)
+        found_rows.append(Row(kind, command, values))
+    return tuple(found_rows)
 
 
 def row_of(command: str) -> Row | None:
@@ -97,7 +97,11 @@ def row_of(command: str) -> Row | None:
 
 def commands_for(test: str) -> list[str]:
     """The commands that another test runs, each once, as pages show them."""
-    mine = (one.command for one in shown() if (row := row_of(one.command)) and row.text("test") == test)
+    mine = (
+        shown_command.command
+        for shown_command in shown()
+        if (row := row_of(shown_command.command)) and row.text("test") == test
+    )
     return list(dict.fromkeys(mine))
 
 

@@ -25,7 +25,7 @@ def why(reason: TextLike | None) -> TextLike:
         return reason or ""
     about: dict[str, Any] = dict(reason.params)
     if reason.code in BETWEEN:
-        return why([one for one in about["parts"] if getattr(one, "code", "") not in ADVICE][-1])
+        return why([part for part in about["parts"] if getattr(part, "code", "") not in ADVICE][-1])
     framed = about.get(FRAMES.get(reason.code, ""))
     return why(framed) if framed else reason
 
@@ -33,8 +33,8 @@ def why(reason: TextLike | None) -> TextLike:
 def coded(reason: TextLike | None, *names: str) -> tuple[Any, ...]:
     """The code of the sentence that says why ("" for what is none), and some of its parameters in
     English; None for one that it does not have."""
-    found = why(reason)
-    if not isinstance(found, Text):
+    sentence = why(reason)
+    if not isinstance(sentence, Text):
         return ("", *(None for _ in names))
-    about: dict[str, Any] = dict(found.params)
-    return (found.code, *(english(about.get(name)) for name in names))
+    about: dict[str, Any] = dict(sentence.params)
+    return (sentence.code, *(english(about.get(name)) for name in names))

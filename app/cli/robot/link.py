@@ -206,7 +206,7 @@ def report_lost(names: Sequence[str], code: str = "topic_unrouted") -> int:
 def lost_text(about: str, code: str = "topic_unrouted") -> str:
     """The doctor's finding about what the bridge has lost, with what to do."""
     lost = Finding(code, about)
-    return f"{lost.what} {lost.do}"
+    return f"{lost.sentence} {lost.do}"
 
 
 def topic_named(graph: GraphSnapshot, place: Place, wanted: str) -> tuple[RobotGraph, SurveyedTopic]:

@@ -32,8 +32,8 @@ def yaml_text(value: Any, shape: Shape) -> str:
 def _lines(value: Any, shape: Shape, indent: str) -> Iterator[str]:
     if is_dataclass(value):
         fields = list(message_fields(value))
-        for name, one in fields:
-            yield from _entry(f"{indent}{name}:", one, shape, indent)
+        for name, field in fields:
+            yield from _entry(f"{indent}{name}:", field, shape, indent)
         if not fields:
             yield f"{indent}{{}}"
     elif _is_list(value):
@@ -111,8 +111,8 @@ def csv_line(value: Any, shape: Shape) -> str:
 
 def _scalars(value: Any, shape: Shape) -> Iterator[Any]:
     if is_dataclass(value):
-        for _, one in message_fields(value):
-            yield from _scalars(one, shape)
+        for _, field in message_fields(value):
+            yield from _scalars(field, shape)
     elif not _is_list(value):
         yield _text(value, shape) if isinstance(value, str) else value
     elif not shape.lists or not len(value):

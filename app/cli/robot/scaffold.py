@@ -126,7 +126,7 @@ def _write(target: Path, text: str, force: bool) -> None:
 
 def _summary(target: Path, draft: Draft, live: bool) -> Iterator[str]:
     """What was written, and what to do next. `live`: the controls are not commented out."""
-    widgets = [one for page in draft.pages.values() for one in page]
+    widgets = [widget for page in draft.pages.values() for widget in page]
     acting = sum(widget.control for widget in widgets)
     yield (
         f"{target}: {len(draft.pages)} page(s), {len(widgets) - acting} display(s),"

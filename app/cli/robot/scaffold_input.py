@@ -28,10 +28,10 @@ JITTER_S: Final = 0.2
 
 def robot_at(graph: GraphSnapshot, namespace: str) -> tuple[RobotGraph, str]:
     """The robot that the pages are made of, and the part of a namespace that is below its bridge's."""
-    for robot in sorted(graph.robots, key=lambda one: -len(one.namespace)):
+    for robot in sorted(graph.robots, key=lambda candidate: -len(candidate.namespace)):
         if f"{namespace}/".startswith(f"{robot.namespace}/") and (namespace or not robot.namespace):
             return robot, namespace.removeprefix(robot.namespace)
-    return max(graph.robots, key=lambda one: len(one.topics)), ""
+    return max(graph.robots, key=lambda candidate: len(candidate.topics)), ""
 
 
 def usable(graph: GraphSnapshot) -> GraphSnapshot:
@@ -39,7 +39,7 @@ def usable(graph: GraphSnapshot) -> GraphSnapshot:
     ROS 2, and those beyond the `MOST_ROBOTS` with the most topics."""
     robots = [robot for robot in graph.robots if NAMESPACE.fullmatch(robot.namespace)]
     robots = [robot for robot in robots if "__" not in robot.namespace]
-    fullest = sorted(robots, key=lambda one: -len(one.topics))[:MOST_ROBOTS]
+    fullest = sorted(robots, key=lambda robot: -len(robot.topics))[:MOST_ROBOTS]
     return replace(graph, robots=tuple(robot for robot in graph.robots if robot in fullest))
 
 
@@ -57,8 +57,10 @@ async def read_scaffold_input(
         ],
         actions=[_server(action, below) for action in robot.actions if _is_below(action.name, below)],
         parameters=parameters,
-        samples={name: one.message for name, one in heard.items() if one.message is not None},
-        periods={name: period for name, one in heard.items() if (period := one.period_s) is not None},
+        samples={name: topic.message for name, topic in heard.items() if topic.message is not None},
+        periods={
+            name: period for name, topic in heard.items() if (period := topic.period_s) is not None
+        },
         unreadable=unreadable,
         denied=_names(
             (topic.name for topic in robot.topics if topic_forwarding(robot, topic) == "denied"), below
@@ -142,24 +144,24 @@ async def _listen(
     """What arrived on each topic that has a use, by the topic's name: until it is enough of all, or
     time is up."""
     wanted = {
-        one.key: one
-        for one in shown(topics)
-        if one.publishers and one.type in interfaces.structures and _has_use(one, interfaces)
+        topic.key: topic
+        for topic in shown(topics)
+        if topic.publishers and topic.type in interfaces.structures and _has_use(topic, interfaces)
     }
-    found = {one.name: Heard() for one in wanted.values()}
+    heard_on = {topic.name: Heard() for topic in wanted.values()}
     if not wanted:
-        return found
+        return heard_on
     own = [endpoint_for(topic, topic.type) for topic in wanted.values()]
     with suppress(TimeoutError):
         async with asyncio.timeout(listen_s):
             async for key, sample in observer.listen(own):
                 topic = wanted[key]
-                heard = found[topic.name]
+                heard = heard_on[topic.name]
                 if not sample.cached:
                     heard.arrivals.append(sample.at)
                 if heard.message is None:
                     with suppress(DecodeError):  # of another definition than the one known here
                         heard.message = interfaces.decode(topic.type, bytes(sample.payload))
-                if all(found[one.name].is_enough(one.latched) for one in wanted.values()):
+                if all(heard_on[topic.name].is_enough(topic.latched) for topic in wanted.values()):
                     break
-    return found
+    return heard_on

@@ -52,8 +52,8 @@ class TopicReader:
         waited for while a bridge may still announce it."""
 
         def is_forwarded(graph: GraphSnapshot) -> bool:
-            found = shown_topics(graph, place.namespace).get(f"/{name.lstrip('/')}")
-            return found is not None and found[1].announced
+            shown = shown_topics(graph, place.namespace).get(f"/{name.lstrip('/')}")
+            return shown is not None and shown[1].announced
 
         graph = await settled_graph(observer, graph, place, is_forwarded)
         robot, topic = topic_named(graph, place, name)

@@ -45,22 +45,22 @@ async def _list(options: Any) -> int:
     async with opened(place) as (observer, graph):
         graph = await settled_graph(observer, graph, place)
         check_namespace(graph, place.namespace)
-        found = {
-            name: one
-            for name, one in sorted(shown_topics(graph, place.namespace).items())
+        listed = {
+            name: topic
+            for name, topic in sorted(shown_topics(graph, place.namespace).items())
             if options.include_hidden_topics or not is_hidden(name)
         }
     if options.count_topics:
-        print(len(found))
+        print(len(listed))
     elif options.json:
-        print(json.dumps([_plain(name, *one) for name, one in found.items()], indent=1))
+        print(json.dumps([_plain(name, *topic) for name, topic in listed.items()], indent=1))
     else:
-        for line in _lines(found, options.show_types, options.verbose):
+        for line in _lines(listed, options.show_types, options.verbose):
             print(one_line(line))
-    if not found:
+    if not listed:
         print(nothing_there(graph.robots, place.namespace), file=sys.stderr, flush=True)
         return GONE
-    states = {name: topic_forwarding(*one) for name, one in found.items()}
+    states = {name: topic_forwarding(*topic) for name, topic in listed.items()}
     return report_lost([name for name, state in states.items() if state == "lost"])
 
 
@@ -69,8 +69,8 @@ def is_hidden(name: str) -> bool:
     return "/_" in name
 
 
-def _lines(found: Found, types: bool, verbose: bool) -> Iterator[str]:
-    for name, (robot, topic) in found.items():
+def _lines(listed: Found, types: bool, verbose: bool) -> Iterator[str]:
+    for name, (robot, topic) in listed.items():
         yield f"{name} [{', '.join(topic.types)}]" if types or verbose else name
         if verbose:
             for word, endpoints in (("publisher", topic.publishers), ("subscriber", topic.subscribers)):
@@ -79,9 +79,9 @@ def _lines(found: Found, types: bool, verbose: bool) -> Iterator[str]:
                 yield f"  not forwarded: {words}"
 
 
-def _described(robot: RobotGraph, one: TopicEndpoint) -> str:
-    nodes = " or ".join(f"{robot.namespace}{node}" for node in one.nodes) or "(node unknown)"
-    return f"{nodes}, {one.qos}" + (f", {one.dds}" if one.dds else "")
+def _described(robot: RobotGraph, endpoint: TopicEndpoint) -> str:
+    nodes = " or ".join(f"{robot.namespace}{node}" for node in endpoint.nodes) or "(node unknown)"
+    return f"{nodes}, {endpoint.qos}" + (f", {endpoint.dds}" if endpoint.dds else "")
 
 
 def _plain(name: str, robot: RobotGraph, topic: SurveyedTopic) -> dict[str, Any]:

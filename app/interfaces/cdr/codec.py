@@ -94,7 +94,7 @@ class Codec:
 
 
 def _message_class(structure: Structure) -> type[Any]:
-    fields: list[Any] = [(one.attribute, Any) for one in structure.fields]
+    fields: list[Any] = [(field.attribute, Any) for field in structure.fields]
     return make_dataclass(
         structure.name.rpartition("/")[2],
         fields or [(PLACEHOLDER, int, field(default=0, repr=False))],

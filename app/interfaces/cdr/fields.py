@@ -157,8 +157,8 @@ class _RowWalk(_MessageWalk):
         for marks in scan.rows:
             self._count += 1
             if self._count <= most:
-                found = {path: self.value_at(m, at) for m, at in marks.items() for path in m.paths}
-                self._rows.append(tuple(found.get(name or "") for name in fields))
+                values = {path: self.value_at(m, at) for m, at in marks.items() for path in m.paths}
+                self._rows.append(tuple(values.get(name or "") for name in fields))
         scan.rows.clear()
 
 

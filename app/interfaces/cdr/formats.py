@@ -35,8 +35,8 @@ LENGTH_BYTES: Final = 4  # bytes of the count before a text or a sequence
 def group_runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
     """The fields in order; consecutive single numbers of one size are grouped."""
 
-    def size(one: Field) -> Any:
-        return SIZES.get(one.type.name) if one.type.container == "one" else None
+    def size(field: Field) -> Any:
+        return SIZES.get(field.type.name) if field.type.container == "one" else None
 
     for each, group in groupby(fields, size):
         together = list(group)

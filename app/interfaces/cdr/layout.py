@@ -24,10 +24,12 @@ def padded_sizes(kind: Type, fields: FieldsOf) -> PaddedSizes | None:
     if is_number(kind):
         size, count = SIZES[kind.name], kind.size if kind.container == "array" else 1
         return tuple(-phase % size + size * count for phase in range(PHASES))
-    one = combined_sizes((part.type for part in fields(kind.name)), fields) if kind.is_nested else None
-    if one is None or kind.container == "one":
-        return one
-    return tuple(end_offset(one, phase, kind.size) - phase for phase in range(PHASES))
+    sizes = (
+        combined_sizes((part.type for part in fields(kind.name)), fields) if kind.is_nested else None
+    )
+    if sizes is None or kind.container == "one":
+        return sizes
+    return tuple(end_offset(sizes, phase, kind.size) - phase for phase in range(PHASES))
 
 
 def combined_sizes(kinds: Iterable[Type], fields: FieldsOf) -> PaddedSizes | None:
@@ -41,9 +43,10 @@ def combined_sizes(kinds: Iterable[Type], fields: FieldsOf) -> PaddedSizes | Non
     return whole
 
 
-def concatenated(one: PaddedSizes, next_one: PaddedSizes) -> PaddedSizes:
+def concatenated(sizes: PaddedSizes, next_sizes: PaddedSizes) -> PaddedSizes:
     return tuple(
-        size + next_one[(phase + size) % PHASES] for phase, size in zip(range(PHASES), one, strict=True)
+        size + next_sizes[(phase + size) % PHASES]
+        for phase, size in zip(range(PHASES), sizes, strict=True)
     )
 
 

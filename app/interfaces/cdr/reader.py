@@ -53,12 +53,12 @@ def value_reader(kind: Type, order: ByteOrder) -> Read:
         return _number_list_reader(kind, order)
     step = _numbers_step([kind], order)
 
-    def one(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+    def read_number(data: "memoryview[int]", at: int) -> tuple[Any, int]:
         values: list[Any] = []
         end = step(data, at, values)
         return values[0], end
 
-    return one
+    return read_number
 
 
 def _field_step(run: Sequence[Field], order: ByteOrder, nested: Callable[[str], Read]) -> ReadStep:
@@ -67,12 +67,12 @@ def _field_step(run: Sequence[Field], order: ByteOrder, nested: Callable[[str], 
         return _numbers_step([step.type for step in run], order)
     read = _field_reader(kind, order, nested)
 
-    def one(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+    def read_value(data: "memoryview[int]", at: int, values: list[Any]) -> int:
         value, at = read(data, at)
         values.append(value)
         return at
 
-    return one
+    return read_value
 
 
 def _numbers_step(kinds: Sequence[Type], order: ByteOrder) -> ReadStep:
@@ -106,8 +106,8 @@ def _field_reader(kind: Type, order: ByteOrder, nested: Callable[[str], Read]) -
     if is_number(kind):
         return _number_list_reader(kind, order)
     text = _string_reader if kind.name == "string" else _wstring_reader
-    one = nested(kind.name) if kind.is_nested else text(order)
-    return one if kind.container == "one" else _sequence_reader(kind, one, order)
+    read_element = nested(kind.name) if kind.is_nested else text(order)
+    return read_element if kind.container == "one" else _sequence_reader(kind, read_element, order)
 
 
 def _sequence_reader(kind: Type, read: Read, order: ByteOrder) -> Read:
@@ -200,10 +200,10 @@ def _wstring_reader(order: ByteOrder, most: int | None = None) -> Read:
         units = unpack_from(f"{order}{read}I", data, at)
         if any(unit > MAX_UTF16_UNIT for unit in units):
             raise ValueError("a wstring has a unit beyond UTF-16's")
-        found = array("H", units).tobytes()
+        text = array("H", units).tobytes()
         cut = read < count
         decode = utf_16_le_decode if NATIVE == "<" else utf_16_be_decode
-        return decode(found, "strict", not cut)[0] + ELLIPSIS * cut, at + count * LENGTH_BYTES
+        return decode(text, "strict", not cut)[0] + ELLIPSIS * cut, at + count * LENGTH_BYTES
 
     return text
 

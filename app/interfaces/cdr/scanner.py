@@ -83,7 +83,7 @@ class Scan:
         at, step = self.at, self._step
         left = SLICE_ELEMENTS
         while left:
-            do, one, other = ops[step]
+            do, operand, other = ops[step]
             step += 1
             if do is TEXT:
                 at = (at + 3) & -LENGTH_BYTES
@@ -92,12 +92,12 @@ class Scan:
                 if not size or body[at - 1]:
                     raise ValueError(f"a text that ends at {at} is cut off or has no end")
             elif do is PASS:
-                at += one[at % PHASES]
+                at += operand[at % PHASES]
             elif do is NUMBERS:
                 at = (at + 3) & -LENGTH_BYTES
                 if count := words[at >> 2]:
-                    at = (at + LENGTH_BYTES + one - 1) & -one
-                    at += count * one
+                    at = (at + LENGTH_BYTES + operand - 1) & -operand
+                    at += count * operand
                 else:
                     at += LENGTH_BYTES
             elif do is EACH:
@@ -105,11 +105,11 @@ class Scan:
                 if count:
                     loops.append(count)
                 else:
-                    step = one
+                    step = operand
             elif do is NEXT:
                 if loops[-1] > 1:
                     loops[-1] -= 1
-                    step = one
+                    step = operand
                 else:
                     loops.pop()
                 left -= 1
@@ -120,7 +120,7 @@ class Scan:
                 self.at = at
                 return True
             else:
-                at, step = HANDLERS[do](self, at, step, one)
+                at, step = HANDLERS[do](self, at, step, operand)
         self.at, self._step = at, step
         return False
 

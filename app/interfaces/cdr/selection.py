@@ -51,9 +51,11 @@ class Selection:
         """The paths that end here or below."""
         yield from self.paths
         chosen = (*self.by_field.values(), *self.by_sibling.values())
-        inner = chain(self.fields.values(), self.by_index.values(), *(one.values() for one in chosen))
-        for one in inner:
-            yield from one.all_paths()
+        inner = chain(
+            self.fields.values(), self.by_index.values(), *(by_value.values() for by_value in chosen)
+        )
+        for selection in inner:
+            yield from selection.all_paths()
 
 
 class Resolver:
@@ -139,46 +141,46 @@ class Resolver:
         """The type of a field of an element; None if it does not exist."""
         at = element
         for name in path.split("."):
-            found = next((one.type for one in self._fields(at) if one.name == name), None)
-            if found is None:
+            field_type = next((field.type for field in self._fields(at) if field.name == name), None)
+            if field_type is None:
                 return None
-            at = found
+            at = field_type
         return at
 
     def _key_value(self, key: Key, kind: Type, holder: str, path: str) -> Any:
         """The key's value with the field's type; for an integer field also by a constant's name."""
-        what = f'"{key.path}" (in "{path}") is {kind}'
+        place = f'"{key.path}" (in "{path}") is {kind}'
         if kind.is_nested or kind.container != "one" or kind.name in FLOAT_TYPES:
-            raise InterfaceError(f"{what}: a key is a text, a whole number or a bool")
+            raise InterfaceError(f"{place}: a key is a text, a whole number or a bool")
         text = str(key.value)
         if kind.name in STRING_TYPES:
             return text
         constants = self._structures[holder].constants
-        found = BOOLS.get(text) if kind.name == "bool" else constants.get(text)
-        if found is None and kind.name != "bool":
-            found = int(text) if text.lstrip("-").isdecimal() else text
+        value = BOOLS.get(text) if kind.name == "bool" else constants.get(text)
+        if value is None and kind.name != "bool":
+            value = int(text) if text.lstrip("-").isdecimal() else text
         try:
-            return scalar_check(kind)(found)
+            return scalar_check(kind)(value)
         except FieldError as error:
             has = f"; constants of {holder}: {', '.join(constants)}" if constants else ""
-            raise InterfaceError(f'{what}, and "{text}" is none: {error.message}{has}') from None
+            raise InterfaceError(f'{place}, and "{text}" is none: {error.message}{has}') from None
 
     def _fields(self, kind: Type) -> Iterable[Any]:
         return self._structures[kind.name].fields if kind.is_nested and kind.container == "one" else ()
 
     def _known_fields_text(self, at: Type, around: Type) -> str:
-        own = [one.name for one in self._fields(at.element)]
-        lists = [one.name for one in self._fields(around) if one.type.container != "one"]
+        own = [field.name for field in self._fields(at.element)]
+        lists = [field.name for field in self._fields(around) if field.type.container != "one"]
         elements = f"its elements have {', '.join(own)}; " if own else ""
         return f"{elements}the lists beside it are {', '.join(lists)}"
 
     def _field_type(self, at: Type, name: str, path: str) -> Type:
         inner = list(self._fields(at))
-        for one in inner:
-            if one.name == name:
-                found: Type = one.type
-                return found
-        has = f"has {', '.join(one.name for one in inner)}" if inner else "has no fields of its own"
+        for known in inner:
+            if known.name == name:
+                field_type: Type = known.type
+                return field_type
+        has = f"has {', '.join(known.name for known in inner)}" if inner else "has no fields of its own"
         raise InterfaceError(f'there is no "{name}" (in "{path}"): {at} {has}')
 
 

@@ -121,14 +121,14 @@ class _ProgramBuilder:
         """Adds the fields of a structure, then the elements that are selected by lists beside
         theirs."""
         inner = {} if wanted is None else wanted.fields
-        keys = _keys_beside(inner, {one.name: one.type for one in self._fields(type_name)})
+        keys = _keys_beside(inner, {field.name: field.type for field in self._fields(type_name)})
         places: dict[str, Mark] = {}
-        for one in self._fields(type_name):
-            child = inner.get(one.name)
+        for part in self._fields(type_name):
+            child = inner.get(part.name)
             if child is not None and child.by_sibling:
-                places[one.name] = Mark(one.type)
-                self.add(ScanStep.NOTE, places[one.name])
-            self._add_field(one.type, child, keys.get(one.name), in_list)
+                places[part.name] = Mark(part.type)
+                self.add(ScanStep.NOTE, places[part.name])
+            self._add_field(part.type, child, keys.get(part.name), in_list)
         for name, place in places.items():
             for key, values in inner[name].by_sibling.items():
                 choice = self._make_choice(place.type)
@@ -190,14 +190,14 @@ class _ProgramBuilder:
     def _select_elements(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
         """Adds a list with selected elements, or one that is a key itself."""
         looked = Selection(lookup=key)
-        found: dict[Lookup, Mapping[Any, Selection]] = {}
+        selections: dict[Lookup, Mapping[Any, Selection]] = {}
         for path, values in wanted.by_field.items():
             lookup = Lookup(Type(""), set(values))
             _descend(looked, path).lookup = lookup
-            found[lookup] = values
+            selections[lookup] = values
         choice = self._make_choice(kind, looked)
         choice.lookup = key
-        self._add_choice(ScanStep.CHOOSE, choice, kind, found, wanted, looked)
+        self._add_choice(ScanStep.CHOOSE, choice, kind, selections, wanted, looked)
 
     def _make_choice(self, kind: Type, looked: Selection | None = None) -> Choice:
         alone = looked is None or not (looked.lookup or looked.fields)
@@ -210,7 +210,7 @@ class _ProgramBuilder:
         do: ScanStep,
         choice: Choice,
         kind: Type,
-        found: Mapping[Lookup, Mapping[Any, Selection]],
+        selections: Mapping[Lookup, Mapping[Any, Selection]],
         wanted: Selection,
         looked: Selection | None = None,
     ) -> None:
@@ -220,13 +220,15 @@ class _ProgramBuilder:
         if choice.sizes is None:
             self._add_field(kind.element, looked, in_list=True)
             self.add(ScanStep.CHOSEN)
-        choice.indexes = {index: self._add_element(kind, one) for index, one in wanted.by_index.items()}
-        for lookup, values in found.items():
+        choice.indexes = {
+            index: self._add_element(kind, selection) for index, selection in wanted.by_index.items()
+        }
+        for lookup, values in selections.items():
             choice.by_lookup[lookup] = {
-                value: self._add_element(kind, one) for value, one in values.items()
+                value: self._add_element(kind, selection) for value, selection in values.items()
             }
-            for value, one in values.items():
-                choice.ambiguous_paths[lookup, value] = tuple(one.all_paths())
+            for value, selection in values.items():
+                choice.ambiguous_paths[lookup, value] = tuple(selection.all_paths())
         choice.after = self._next_step
 
     def _add_element(self, kind: Type, wanted: Selection) -> int:

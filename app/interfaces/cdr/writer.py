@@ -45,14 +45,14 @@ def _numbers_writer(kinds: Sequence[Type], names: Sequence[str]) -> Write:
 def _field_writer(kind: Type, nested: Callable[[str], Write]) -> Write:
     if is_number(kind):
         return _number_list_writer(kind)
-    one = (
+    write_element = (
         nested(kind.name)
         if kind.is_nested
         else _write_string
         if kind.name == "string"
         else _write_wstring
     )
-    return one if kind.container == "one" else _sequence_writer(kind, one)
+    return write_element if kind.container == "one" else _sequence_writer(kind, write_element)
 
 
 def _sequence_writer(kind: Type, write: Write) -> Write:

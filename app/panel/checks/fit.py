@@ -28,7 +28,9 @@ def fit_notes(panel: Panel) -> Iterator[Note]:
         if page.template:
             yield Note(f"page[{p}]", f"{page.template} decides what fits: look at it in a browser")
             continue
-        short = {size: reason(panel, page, Screen.of(size, panel.mm_per_px)) for size in panel.screens}
+        short = {
+            size: reason(panel, page, Screen.from_size(size, panel.mm_per_px)) for size in panel.screens
+        }
         fitting = [size for size, why in short.items() if not why]
         said = [f"fits {', '.join(fitting)}"] if fitting else []
         said += [f"does not fit {size}: {why}" for size, why in short.items() if why]

@@ -51,7 +51,7 @@ class Screen:
     mm: float
 
     @classmethod
-    def of(cls, size: str, mm_per_px: float) -> Self:
+    def from_size(cls, size: str, mm_per_px: float) -> Self:
         """From a size like "1280x800"."""
         width, height = map(int, size.split("x"))
         return cls(width, height, 1 / mm_per_px)

@@ -12,7 +12,7 @@ from app.panel.widgets.families import TopicField
 def number_field_faults(
     place: str, source: TopicField, noun: str, interfaces: Interfaces
 ) -> Iterator[Fault]:
-    """Faults of a field that must be one number; `what` is it, with its article."""
+    """Faults of a field that must be one number; `noun` names it, with its article."""
     faults = list(field_faults(place, source.type, source.field, interfaces))
     yield from faults
     if not faults and (field_type := interfaces.field_type(source.type, source.field)) not in NUMBERS:

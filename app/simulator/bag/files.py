@@ -198,25 +198,32 @@ def _ends(about: ReaderMetadata) -> tuple[int, int]:
 
 
 def _stored(file: "ReaderProtocol", topics: Collection[str]) -> Iterator[Recorded]:
-    used = [one for one in file.connections if one.topic in topics]
+    used = [connection for connection in file.connections if connection.topic in topics]
     with closing(file.messages(used)) as messages:
         for connection, at_ns, payload in messages:
             yield at_ns, connection.topic, bytes(payload)
 
 
-def _of_connection(one: Connection) -> RecordedTopic:
-    encoding: str = getattr(one.ext, "serialization_format", FORMAT)
-    offered: list[OfferedQos] = getattr(one.ext, "offered_qos_profiles", [])
-    return RecordedTopic(one.topic, one.msgtype, encoding, _qos(offered), one.digest, one.msgcount)
+def _of_connection(connection: Connection) -> RecordedTopic:
+    encoding: str = getattr(connection.ext, "serialization_format", FORMAT)
+    offered: list[OfferedQos] = getattr(connection.ext, "offered_qos_profiles", [])
+    return RecordedTopic(
+        connection.topic,
+        connection.msgtype,
+        encoding,
+        _qos(offered),
+        connection.digest,
+        connection.msgcount,
+    )
 
 
 def _qos(offered: Sequence[Any]) -> Qos:
     """As the first publisher offered it; reliable and volatile if the file does not have it."""
     if not offered:
         return Qos()
-    one: OfferedQos = offered[0]
+    offer: OfferedQos = offered[0]
     return Qos(
-        one.reliability is not QosReliability.BEST_EFFORT,
-        one.durability is QosDurability.TRANSIENT_LOCAL,
-        max(one.depth, 1),
+        offer.reliability is not QosReliability.BEST_EFFORT,
+        offer.durability is QosDurability.TRANSIENT_LOCAL,
+        max(offer.depth, 1),
     )

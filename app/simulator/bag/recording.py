@@ -73,18 +73,20 @@ class Recording:
             why = f"it has {number} of {self._count} messages"
             raise RecordingError(f"{self._path} is damaged: {why}{rescue(self._path)}")
 
-    def _add(self, one: RecordedTopic) -> None:
+    def _add(self, topic: RecordedTopic) -> None:
         """Adds a topic as ROS 2 has them; another one is noted."""
-        known = self.topics.get(one.topic)
-        if one.format != FORMAT:
-            self.notes.append(f"{one.topic} is left out: it is recorded as {one.format}, not as CDR")
-        elif not TOPIC.fullmatch(one.topic) or not MESSAGE_TYPE.fullmatch(one.type):
-            self.notes.append(f"{one.topic} ({one.type}) is left out: it is no ROS 2 topic")
+        known = self.topics.get(topic.topic)
+        if topic.format != FORMAT:
+            self.notes.append(
+                f"{topic.topic} is left out: it is recorded as {topic.format}, not as CDR"
+            )
+        elif not TOPIC.fullmatch(topic.topic) or not MESSAGE_TYPE.fullmatch(topic.type):
+            self.notes.append(f"{topic.topic} ({topic.type}) is left out: it is no ROS 2 topic")
         elif known is None:
-            self.topics[one.topic] = SimulatedTopic(one.type, one.qos, one.hash)
-        elif known.type != one.type:
-            what = f"{one.topic} is {known.type} and {one.type} in the recording"
-            self.notes.append(f"{what}: messages of both are replayed as the first")
+            self.topics[topic.topic] = SimulatedTopic(topic.type, topic.qos, topic.hash)
+        elif known.type != topic.type:
+            conflict = f"{topic.topic} is {known.type} and {topic.type} in the recording"
+            self.notes.append(f"{conflict}: messages of both are replayed as the first")
 
 
 def _cdr(topic: str, payload: bytes) -> bytes:

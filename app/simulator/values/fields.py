@@ -59,12 +59,12 @@ class PanelFields:
         """The fields that have another value than `message` gives them."""
         fixed_by_table = self.entry(topic).message
         paths = (
-            one
-            for one in self.paths.get(topic, ())
-            if get(fixed_by_table, self.interfaces.typed_steps(type_name, one)) is None
+            path
+            for path in self.paths.get(topic, ())
+            if get(fixed_by_table, self.interfaces.typed_steps(type_name, path)) is None
         )
         made = (_Field(self, topic, type_name, path, shown, message).made() for path in paths)
-        return [one for one in made if one is not None]
+        return [signal for signal in made if signal is not None]
 
 
 class _Field:
@@ -72,23 +72,23 @@ class _Field:
 
     def __init__(
         self,
-        of: PanelFields,
+        panel_fields: PanelFields,
         topic: str,
         type_name: str,
         path: str,
         shown: Sequence[Shown],
         message: Message,
     ) -> None:
-        self._of = of
+        self._panel_fields = panel_fields
         self._topic = topic
         self._type = type_name
         self._path = path
         self._shown = [shown_field for shown_field in shown if shown_field.field == path]
         self._message = message
-        self._kind = of.interfaces.type_at(type_name, path)
-        self._entry = of.entry(topic)
+        self._kind = panel_fields.interfaces.type_at(type_name, path)
+        self._entry = panel_fields.entry(topic)
         self._limits = self._entry.ranges.get(path) or self._entry.range
-        self._phase = (phase_of(f"{topic} {path}") + of.phase) % 1
+        self._phase = (phase_of(f"{topic} {path}") + panel_fields.phase) % 1
 
     def made(self) -> FieldSignal | None:
         """None where the message's own value is the best."""
@@ -96,7 +96,7 @@ class _Field:
             return None
         interlocks = [
             interlock
-            for interlock in self._of.panel.interlocks
+            for interlock in self._panel_fields.panel.interlocks
             if (interlock.topic, interlock.field) == (self._topic, self._path)
         ]
         if interlocks:
@@ -111,7 +111,7 @@ class _Field:
 
     def _still(self, field: FieldSignal) -> FieldSignal:
         """The field; one that confirms presses changes with them only."""
-        if (self._topic, self._path) not in self._of.confirmed:
+        if (self._topic, self._path) not in self._panel_fields.confirmed:
             return field
         first = field.signal(0.0)
         return replace(field, signal=fixed(False if isinstance(first, bool) else first), moving=False)
@@ -167,8 +167,8 @@ class _Field:
         )
         if self._limits:
             return Span(self._limits[0], self._limits[1], guess.shape)
-        if given := next(limits, None):
-            return _limited(given, guess)
+        if limit := next(limits, None):
+            return _limited(limit, guess)
         if unit is None:
             return guess
         low, high = sorted((end - unit.offset) / unit.scale for end in (guess.low, guess.high))
@@ -182,18 +182,18 @@ class _Field:
             return moving(Span(self._limits[0], self._limits[1]), kind, entry.period_s, 0.0)
         others = [value for shown_field in self._shown for value in shown_field.values]
         others += [*self._constants, *interlocks[0].constants]
-        offset = self._of.offsets[self._topic, self._path]
+        offset = self._panel_fields.offsets[self._topic, self._path]
         return permitting(interlocks, kind, others, offset, entry.period_s)
 
     @cached_property
     def _parent(self) -> str:
         """The type of the message that the field is in."""
         around = parent_path(self._path)
-        return self._of.interfaces.field_type(self._type, around) if around else self._type
+        return self._panel_fields.interfaces.field_type(self._type, around) if around else self._type
 
     @property
     def _constants(self) -> list[Any]:
-        structure = self._of.interfaces.structures.get(self._parent)
+        structure = self._panel_fields.interfaces.structures.get(self._parent)
         return [] if structure is None else field_constants(field_name(self._path), structure)
 
     @cached_property
@@ -201,7 +201,7 @@ class _Field:
         """The values that it has as a field of a type whose fields belong together; none elsewhere."""
         if self._parent not in KNOWN and self._type not in KNOWN:
             return []
-        steps = self._of.interfaces.typed_steps(self._type, self._path)
+        steps = self._panel_fields.interfaces.typed_steps(self._type, self._path)
         values = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
         return list(dict.fromkeys(value for value in values if value is not None))
 

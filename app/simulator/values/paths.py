@@ -27,40 +27,45 @@ def put(fields: Fields, type_name: str, path: str, value: Any, structures: Struc
 
 
 def _put(
-    fields: Fields, structure: Structure, steps: Sequence[PathStep], value: Any, of: Structures
+    fields: Fields, structure: Structure, steps: Sequence[PathStep], value: Any, structures: Structures
 ) -> None:
     name, *rest = steps
-    field = next(one for one in structure.fields if one.name == name)
+    field = next(field for field in structure.fields if field.name == name)
     if not rest:
         fields[str(name)] = value
     elif isinstance(rest[0], str):
         inner = fields.setdefault(str(name), {})
-        _put(inner, of[field.type.name], rest, value, of)
+        _put(inner, structures[field.type.name], rest, value, structures)
     else:
         items = fields[str(name)] = list(fields.get(str(name), field.default_value))
-        index = _index(fields, items, structure, field.type, rest[0], of)
+        index = _index(fields, items, structure, field.type, rest[0], structures)
         _grow(items, field.type, index)
         if len(rest) == 1:
             items[index] = value
         else:
             items[index] = dict(items[index])
-            _put(items[index], of[field.type.name], rest[1:], value, of)
+            _put(items[index], structures[field.type.name], rest[1:], value, structures)
 
 
 def _index(
-    fields: Fields, items: list[Any], structure: Structure, kind: Type, step: PathStep, of: Structures
+    fields: Fields,
+    items: list[Any],
+    structure: Structure,
+    kind: Type,
+    step: PathStep,
+    structures: Structures,
 ) -> int:
     """Which element a step names."""
     if not isinstance(step, Key):
         return int(step)
     first = step.path.partition(".")[0]
-    if kind.is_nested and any(field.name == first for field in of[kind.name].fields):
+    if kind.is_nested and any(field.name == first for field in structures[kind.name].fields):
         for number, item in enumerate(items):
             if get(item, path_steps(step.path)) == step.value:
                 return number
         index = 0 if kind.container == "array" else len(items)
         items[index : index + 1] = [{}]
-        _put(items[index], of[kind.name], path_steps(step.path), step.value, of)
+        _put(items[index], structures[kind.name], path_steps(step.path), step.value, structures)
         return index
     if not any(field.name == first for field in structure.fields):
         return 0
@@ -94,7 +99,7 @@ def _get_by_key(fields: Mapping[str, Any], name: str, key: Key, rest: Sequence[P
     keys = fields.get(key.path)
     if not isinstance(keys, list | tuple):
         keys = [get(item, path_steps(key.path)) for item in items]
-    index = next((i for i, one in enumerate(keys) if one == key.value), len(items))
+    index = next((i for i, element_key in enumerate(keys) if element_key == key.value), len(items))
     return get(items[index], rest) if index < len(items) else None
 
 

@@ -83,7 +83,7 @@ JOINTS_LIVE: Final[Table] = {
     "state": "live",
     "note": "",
     "said": "",
-    "joint_values": [number(one) for one in ("+27.1", "+41.6", "-38.2", "-4.8")],
+    "joint_values": [number(text) for text in ("+27.1", "+41.6", "-38.2", "-4.8")],
     "joint_bars": [58.0, 50.8, 31.4, 48.7],
     "joint_levels": ["normal"] * 4,
 }
@@ -102,7 +102,7 @@ JOINT_ROWS: Final = (
         JOINTS_LIVE
         | {
             "said": say("joint_more", first=BEYOND_RANGE, number=2),
-            "joint_values": [number(one) for one in ("+158.1", "+140.2", "-38.2", "+195.0")],
+            "joint_values": [number(text) for text in ("+158.1", "+140.2", "-38.2", "+195.0")],
             "joint_bars": [96.5, 97.7, 31.4, 100.0],
             "joint_levels": ["near", "high", "normal", "high_high"],
         },

@@ -68,7 +68,7 @@ TRENDS: Final = (
         "eight pens",
         "trend",
         {"label": texts.TEMPERATURES.table, "keys": False, "max_age_s": 60}
-        | {"pen": [PENS["pen"][1] | {"label": texts.zone(of).table} for of in range(1, 9)]},
+        | {"pen": [PENS["pen"][1] | {"label": texts.zone(zone).table} for zone in range(1, 9)]},
         {"state": "live", "note": "", "fault": ""}
         | {f"text{pen}": number(f"{5.6 - pen / 5:.1f}") for pen in range(8)}
         | {f"state{pen}": "live" for pen in range(8)},

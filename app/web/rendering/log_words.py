@@ -52,8 +52,8 @@ def outcome_of(outcome: str) -> TextLike:
 def who_of(who: str) -> TextLike:
     """The name of a client in the reader's language; entries have it in English."""
     for name, code in _names():
-        if found := name.fullmatch(who):
-            return say(code, **found.groupdict())
+        if match := name.fullmatch(who):
+            return say(code, **match.groupdict())
     return who
 
 

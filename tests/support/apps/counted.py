@@ -33,13 +33,13 @@ async def sizes(request: Request) -> dict[str, int]:
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
     wholes = (kiosk, kiosk.context, kiosk.commands, kiosk.peer)
     held_by = [part for whole in wholes for part in vars(whole).values()]
-    parts = [one for one in held_by if type(one).__module__.startswith("app.")]
+    parts = [holder for holder in held_by if type(holder).__module__.startswith("app.")]
     for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):
-        held |= {f"{type(part).__name__}.{name}": len(one) for name, one in sized(part)}
+        held |= {f"{type(part).__name__}.{name}": len(value) for name, value in sized(part)}
     return held
 
 
 def sized(part: Any) -> Iterator[tuple[str, Sized]]:
-    for name, one in vars(part).items():
-        if isinstance(one, Sized) and not isinstance(one, str):
-            yield name, one
+    for name, value in vars(part).items():
+        if isinstance(value, Sized) and not isinstance(value, str):
+            yield name, value

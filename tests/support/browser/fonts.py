@@ -17,7 +17,7 @@ SETS: Final[Mapping[str, Sequence[str]]] = {
 
 def fonts_file(name: str, folder: Path) -> Path:
     """A fontconfig file with only one of the sets."""
-    folders = "".join(f"<dir>{one}</dir>" for one in SETS[name])
+    folders = "".join(f"<dir>{folder}</dir>" for folder in SETS[name])
     path = folder / "fonts.conf"
     path.write_text(
         '<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd">'

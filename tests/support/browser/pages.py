@@ -42,14 +42,14 @@ def asked(button: Locator) -> Locator:
     return dialog
 
 
-def place(found: Locator) -> FloatRect:
+def place(element: Locator) -> FloatRect:
     """The position of a visible element, in px of the window."""
-    box = found.bounding_box()
-    assert box is not None, f"{found} is not visible"
+    box = element.bounding_box()
+    assert box is not None, f"{element} is not visible"
     return box
 
 
-def middle(found: Locator) -> tuple[float, float]:
+def middle(element: Locator) -> tuple[float, float]:
     """The middle of a visible element, in px of the window."""
-    box = place(found)
+    box = place(element)
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

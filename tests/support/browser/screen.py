@@ -63,9 +63,9 @@ class KioskScreen:
             return [devtool for devtool in self._devtools("list") if devtool["type"] == "page"]
         return []
 
-    def _devtools(self, what: str) -> Any:
+    def _devtools(self, resource: str) -> Any:
         with http_client(f"http://127.0.0.1:{self.port}", ANSWER_WITHIN_S) as http:
-            return http.get(f"/json/{what}").json()
+            return http.get(f"/json/{resource}").json()
 
     def call(self, method: str, **params: Any) -> dict[str, Any] | None:
         """The result of a command to the page; None if it does not answer."""
@@ -74,8 +74,8 @@ class KioskScreen:
 
     def evaluate(self, expression: str) -> Any:
         """The value of an expression in the page; None if the page does not answer."""
-        given = {"expression": expression, "awaitPromise": True, "returnByValue": True}
-        return ((self.call("Runtime.evaluate", **given) or {}).get("result") or {}).get("value")
+        options = {"expression": expression, "awaitPromise": True, "returnByValue": True}
+        return ((self.call("Runtime.evaluate", **options) or {}).get("result") or {}).get("value")
 
     def lives(self) -> bool:
         """Whether exactly one page is shown, is the panel's, receives events and draws."""
@@ -98,8 +98,8 @@ class KioskScreen:
     def processes(self, kind: str) -> list[int]:
         """The processes of a kind: "browser", "renderer" or "GPU"."""
         browser = self._devtools("version")["webSocketDebuggerUrl"]
-        found = _called(browser, "SystemInfo.getProcessInfo", {}) or {}
-        return [one["id"] for one in found["processInfo"] if one["type"] == kind]
+        info = _called(browser, "SystemInfo.getProcessInfo", {}) or {}
+        return [process["id"] for process in info["processInfo"] if process["type"] == kind]
 
     def send(self, kind: str, number: signal.Signals) -> None:
         for pid in self.processes(kind):

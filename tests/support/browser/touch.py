@@ -203,12 +203,14 @@ class Keys:
 
     def type(self, text: str) -> None:
         """Each character; a line feed is Enter."""
-        for one in text:
+        for character in text:
             self._now += self._apart_s
             enter = {"key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13}
-            code = "Space" if one == " " else f"Key{one.upper()}"
-            about: dict[str, Any] = enter if one == "\n" else {"key": one, "code": code, "text": one}
-            if one == " ":
+            code = "Space" if character == " " else f"Key{character.upper()}"
+            about: dict[str, Any] = (
+                enter if character == "\n" else {"key": character, "code": code, "text": character}
+            )
+            if character == " ":
                 about["windowsVirtualKeyCode"] = 32
             for kind in ("keyDown", "keyUp"):
                 up = {} if kind == "keyDown" else {"text": ""}
@@ -217,9 +219,9 @@ class Keys:
                 )
 
 
-def overlap(page: Page, one: str, other: str) -> bool:
+def overlap(page: Page, selector: str, other: str) -> bool:
     """Whether two visible elements share a part of the screen."""
-    first, second = place(page.locator(one)), place(page.locator(other))
+    first, second = place(page.locator(selector)), place(page.locator(other))
     return (
         min(first["x"] + first["width"], second["x"] + second["width"]) - max(first["x"], second["x"])
         > 1
