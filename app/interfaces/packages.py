@@ -68,8 +68,7 @@ def _add_file(definitions: Definitions, file: Path, package: str) -> None:
 def usable_definitions(
     definitions: Definitions, known: Definitions, unread: Mapping[str, Path]
 ) -> Definitions:
-    """The usable definitions of `known` and `definitions`; `definitions` take precedence. `unread` as of
-    `find_idl_only`.
+    """The usable definitions of both; `definitions` take precedence. `unread` as of `find_idl_only`.
 
     Unusable are interfaces that reference missing or unusable ones, and those that contain themselves.
     Without service events in the distribution (humble), events and the hashes of services and actions
