@@ -102,7 +102,7 @@ def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
         name = tab.locator("span")
         assert name.evaluate("e => e.scrollWidth <= e.clientWidth"), name.text_content()
     last = place(page.get_by_role("button", name="Publish2"))
-    assert last["y"] + last["height"] <= 600  # a panel with one page has no tabs below
+    assert last["y"] + last["height"] <= 600  # a panel with one page has no rail
     page.get_by_role("link", name="Robot 7").click()
     expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")
     expect(page.locator("html[data-floor]")).to_be_attached()  # its scripts are there

@@ -205,7 +205,11 @@ def test_without_scripts_all_groups_are_there(cell: Server, without_scripts: Pag
 
 def test_a_phone_only_shows(cell: Server, page: Page) -> None:
     sized(page, 390, 844).goto(f"{cell.url}/pages/cell")
-    expect(page.locator("form.page").locator("button, input").locator("visible=true")).to_have_count(0)
+    pressed = page.locator("form.page").locator("button, input").locator("visible=true")
+    expect(pressed).to_have_count(1)  # Stop, in the lower left corner
+    stop = place(pressed)
+    assert stop["x"] < 10
+    assert stop["y"] + stop["height"] > 844 - 10
     for widget in ("boxes", "permission", "speed"):
         expect(page.locator(f"[data-widget={widget}] .value")).to_be_visible()
     expect(page.get_by_text("View only")).to_be_visible()

@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support.browser.finger import Touch
-from tests.support.browser.pages import middle
-from tests.support.browser.touch import PANEL, SIZES, permit, touched
+from tests.support.browser.pages import middle, place
+from tests.support.browser.touch import MM_PER_PX, PANEL, SIZES, overlap, permit, settled, touched
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
@@ -170,6 +170,65 @@ def uncovered(page: Page) -> bool:
     """Whether nothing lies over Stop."""
     script = "([x, y]) => document.elementFromPoint(x, y).closest('[data-widget=stop]') !== null"
     return bool(page.evaluate(script, list(middle(page.locator(STOP)))))
+
+
+# Parts of the rail that are below something else.
+COVERED: Final = """() => {
+  const found = [];
+  for (const part of document.querySelectorAll(".pages, .frame-keys, .frame-keys > .key > button")) {
+    const { left, top, right, bottom } = part.getBoundingClientRect();
+    for (const x of [left + 2, (left + right) / 2, right - 2]) {
+      for (const y of [top + 2, (top + bottom) / 2, bottom - 2]) {
+        const above = document.elementFromPoint(x, y);
+        const isRail = above.closest(".pages, .frame-keys") && !above.closest(".ask");
+        if (!isRail) found.push(above.className || above.tagName);
+      }
+    }
+  }
+  return found;
+}"""
+
+
+def opened_parts(page: Page) -> Iterator[tuple[str, str]]:
+    """(what was touched, what has opened), one after the other."""
+    for opener, sheet in (
+        (".menu-key", "#menu"),
+        (".lamps", "#links"),
+        ("[data-widget=reset] > button", "dialog:popover-open"),
+        ("[data-widget=pause] > button", "dialog:popover-open"),
+        ("#input-speed", ".keypad"),
+        ("#input-order", ".keyboard"),
+        ("#input-belt", ".keypad"),
+        ("#input-note", ".keyboard"),
+    ):
+        if not page.locator(opener).is_visible():
+            page.locator(".group-tab", has_text="Belt").first.tap()
+        page.locator(opener).tap()
+        expect(page.locator(sheet)).to_be_visible()
+        settled(page)
+        yield opener, sheet
+        if page.locator(".cancel-entry").count():
+            page.locator(".cancel-entry").tap()
+            settled(page)
+        else:
+            page.keyboard.press("Escape")
+        expect(page.locator(sheet)).to_be_hidden()
+        expect(page.locator("body[data-asks]")).to_have_count(0)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_nothing_that_opens_reaches_the_rail_with_stop_in_its_lower_left_corner(
+    touchscreen: Page, cell: Server, size: tuple[int, int]
+) -> None:
+    page = touched(touchscreen, cell, size)
+    stop = place(page.locator("[data-widget=stop]"))
+    assert stop["x"] < 12
+    assert stop["height"] >= 20 / MM_PER_PX - 0.5
+    keys = place(page.locator(".frame-keys"))
+    assert keys["y"] + keys["height"] == size[1]
+    for opener, sheet in opened_parts(page):
+        assert page.evaluate(COVERED) == [], opener
+        assert not overlap(page, sheet, ".frame-keys"), opener
 
 
 def test_a_double_tap_of_a_frame_key_asks_once(page: Page, cell: Server) -> None:

@@ -12,12 +12,12 @@ from app.panel.layout import COLUMNS, Group, Page
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
-from app.panel.widgets.tiles import GAP_MM, KEY_MM, MIDDLE, NARROW, TOUCH, Screen
+from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, NARROW, TOUCH, Screen
 
+LOW_GAP_MM: Final = 4.0  # between the buttons of the frame of a low screen
 GAP: Final = 12.0  # between groups, and between the rows of a group
 HEAD: Final = 48.0  # of a group
-TABS_OF_GROUPS: Final = 48.0
-TAB_MM: Final = 12.0
+TABS_OF_GROUPS: Final = TOUCH
 
 
 def fit_notes(panel: Panel) -> Iterator[Note]:
@@ -41,6 +41,8 @@ def reason(panel: Panel, page: Page, screen: Screen) -> str:
     """Why a page does not fit a screen; "" where it does."""
     if screen.width < NARROW:
         return ""  # a phone shows it without keys, and scrolls
+    if long := long_rail(panel, screen):
+        return long
     space = page_height(panel, page, screen)
     width = page_width(panel, screen)
     for rows in arranged(page, screen):
@@ -58,19 +60,36 @@ def reason(panel: Panel, page: Page, screen: Screen) -> str:
 
 def page_height(panel: Panel, page: Page, screen: Screen) -> float:
     """What the frame leaves for the groups."""
-    header = 56.0 if screen.is_wide else 48.0 if screen.width >= MIDDLE else 46.0
     robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
-    tabs = max(60.0 if screen.width >= MIDDLE else 52.0, TAB_MM * screen.mm)
-    has_tabs = len(panel.pages) > 1 or len(page.parts) > 1 or bool(panel.frame.widgets)
-    below = 0.0 if screen.is_wide or not has_tabs else tabs + 1
-    return screen.height - header - robots - below - 2 * screen.pad
+    return screen.height - screen.header - robots - 2 * screen.pad
 
 
 def page_width(panel: Panel, screen: Screen) -> float:
     """The width for the groups."""
-    rail = max(88.0, KEY_MM * screen.mm)
-    has_rail = screen.is_wide and (len(panel.pages) > 1 or bool(panel.frame.widgets))
-    return screen.width - (rail if has_rail else 0) - 2 * screen.pad
+    return screen.width - (screen.rail if has_rail(panel) else 0) - 2 * screen.pad
+
+
+def has_rail(panel: Panel) -> bool:
+    """Whether tabs or buttons of the frame stand at the side."""
+    return len(panel.pages) > 1 or bool(panel.frame.widgets)
+
+
+def long_rail(panel: Panel, screen: Screen) -> str:
+    """Why not all tabs are seen beside the buttons of the frame; "" where they are."""
+    tabs = len(panel.pages) if has_rail(panel) else 0
+    low = screen.height <= LOW_SCREEN
+    stops = {widget.id for widget in panel.stops}
+    keys = [
+        screen.touch(ENTRY_MM if low and widget.id not in stops else KEY_MM)
+        for widget in panel.frame.widgets
+    ]
+    gaps = (LOW_GAP_MM if low else GAP_MM) * screen.mm * (len(keys) - 1) if keys else 0.0
+    needed = tabs * TOUCH + sum(keys) + gaps + (8 + screen.pad if keys else 0.0)
+    robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
+    space = screen.height - screen.header - robots
+    if needed <= space:
+        return ""
+    return f"tabs and buttons of the frame need {needed:.0f} px of height and have {space:.0f}"
 
 
 def arranged(page: Page, screen: Screen) -> list[list[list[Group]]]:
@@ -109,7 +128,7 @@ def group_height(group: Group, screen: Screen, page: Page) -> float:
     if not alone:
         head = HEAD if group.title else screen.pad
     elif screen.width < MIDDLE and not screen.is_upright:
-        head = screen.pad
+        head = TABS_OF_GROUPS + screen.pad
     elif group is page.parts[0] or len(page.parts) == 2:
         head = HEAD if group.title else screen.pad
     else:

@@ -26,7 +26,7 @@ SLIDER_WIDTH: Final = 200.0
 NUMBER_WIDTH: Final = 100.0
 DISPLAY_WIDTH: Final = 80.0
 UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
-GAUGE_WIDTH: Final = 130.0
+GAUGE_WIDTH: Final = 126.0
 JOINTS_FRAME: Final = 41.0  # name and note
 JOINT, LOW_JOINT = 34.0, 25.0
 JOINTS_WIDTH: Final = 220.0
@@ -58,8 +58,8 @@ class Screen:
 
     @property
     def is_wide(self) -> bool:
-        """Whether all groups stand side by side, with the tabs at the side."""
-        return self.width >= WIDE and self.width >= self.height
+        """Whether all groups stand side by side."""
+        return self.width >= WIDE
 
     @property
     def is_upright(self) -> bool:
@@ -67,9 +67,22 @@ class Screen:
         return self.width < MIDDLE and self.height >= UPRIGHT
 
     @property
+    def header(self) -> float:
+        """The height of the frame's first line."""
+        return 56.0 if self.is_wide else 48.0 if self.width >= MIDDLE else 46.0
+
+    @property
+    def rail(self) -> float:
+        """The width of the tabs and buttons of the frame, at the side."""
+        key = KEY_MM * self.mm
+        if self.is_wide:
+            return max(88.0, key)
+        return max(96.0, key + 5) if self.width >= MIDDLE else max(112.0, key + 8)
+
+    @property
     def pad(self) -> float:
         """Around and inside groups."""
-        return 8.0 if self.width < MIDDLE else 12.0
+        return 12.0 if self.is_wide else 10.0 if self.width >= MIDDLE else 8.0
 
     def touch(self, millimetres: float) -> float:
         """The height of what is touched."""

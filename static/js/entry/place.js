@@ -1,9 +1,6 @@
-// Where a sheet lies: beside its field, never over it, the header or the keys of the frame.
+// Where a sheet lies: beside its field, never over it, the header or the rail with Stop.
 /** @typedef {{ left: number, right: number, top: number, bottom: number }} Area @typedef {{ left: number, top: number, lift: number, side: string, point: number }} Spot */
 const GAP_PX = 8;
-
-/** @type {(selector: string) => DOMRect | undefined} */
-const rect = (selector) => document.querySelector(selector)?.getBoundingClientRect();
 
 // What is kept free: the field with its name, a slider with its value; where there is less room, the field alone.
 /** @param {HTMLElement} input */
@@ -13,16 +10,11 @@ function fieldsOf(input) {
   return [whole, field].map((one) => one.getBoundingClientRect());
 }
 
-// The page, and where that is too small what is below it too, beside the keys of the frame.
-/** @returns {Area[]} */
-function areas() {
-  const { left, right, top, bottom } = rect("main");
-  const page = { left, right, top, bottom };
-  const tabs = rect(".pages");
-  const keys = rect(".frame-keys");
-  if (tabs?.top >= bottom - 1) return [page, { top, left: tabs.left, right: tabs.right, bottom: tabs.bottom }];
-  if (keys?.top >= bottom - 1) return [page, { top, left, right: keys.left, bottom: keys.bottom }];
-  return [page];
+// The page, beside the rail.
+/** @returns {Area} */
+function area() {
+  const { left, right, top, bottom } = document.querySelector("main").getBoundingClientRect();
+  return { left, right, top, bottom };
 }
 
 /** @param {HTMLElement} sheet @param {string} shape @param {Area} area */
@@ -82,15 +74,14 @@ export function place(sheet, input, shapes) {
 
 /** @param {HTMLElement} sheet @param {DOMRect[]} fields @param {string[]} shapes @returns {Spot} */
 function spotOf(sheet, fields, shapes) {
-  for (const area of areas()) {
-    for (const field of fields) {
-      for (const shape of shapes) {
-        const spot = shape === "tall" ? aside(sheet, field, area) : across(sheet, field, area, shape);
-        if (spot) return spot;
-      }
+  const page = area();
+  for (const field of fields) {
+    for (const shape of shapes) {
+      const spot = shape === "tall" ? aside(sheet, field, page) : across(sheet, field, page, shape);
+      if (spot) return spot;
     }
   }
-  return lowest(sheet, fields.at(-1), areas().at(-1));
+  return lowest(sheet, fields.at(-1), page);
 }
 
 // A screen that is too low for both: the end of the field is seen, and the sheet in its last shape.
