@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 
 from app.panel.widgets.trend import history_bytes
 from app.robot.history import FieldHistory
-from app.trends.file import TrendFile
+from app.trends.trend_file import TrendFile
 from bench.parts import Meter, family, rss_mib
 from bench.report.figures import percentile
 from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until

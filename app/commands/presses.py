@@ -33,7 +33,7 @@ from app.commands.receipts import (
     refused_receipt,
 )
 from app.commands.refusals import EarlyRefusals
-from app.commands.repeated import RepeatedPresses
+from app.commands.repeated_after_restart import RepeatedPresses
 from app.concurrency import CancellableWaits
 from app.errors import FieldError, InputError, LinkError, LogError, PressRefused
 from app.i18n import say

@@ -11,7 +11,7 @@ from app.i18n import render
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.rules import RecordRules
-from app.recording.directory import recording_name
+from app.recording.bounded_folder import recording_name
 from app.recording.mcap_file import Channel
 from app.recording.ring_buffer import RingBuffer, to_buffered
 from app.recording.writer import Recording, Recordings

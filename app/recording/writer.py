@@ -11,7 +11,7 @@ from typing import Any, Final
 from app.disk_writer import DiskWriter
 from app.errors import LogError, os_error_text
 from app.i18n import TextLike, say
-from app.recording.directory import RecordingDirectory
+from app.recording.bounded_folder import RecordingFolder
 from app.recording.mcap_file import Channel, McapFile
 from app.recording.ring_buffer import OVERHEAD_BYTES, Buffered
 
@@ -33,7 +33,7 @@ class Recordings:
     def __init__(self, path: Path, max_mb: float, robots: int) -> None:
         """Each of `robots` may have one open file; together they may fill half the folder."""
         most = int(max_mb * 1_000_000)
-        self._folder = RecordingDirectory(path, most)
+        self._folder = RecordingFolder(path, most)
         self.file_bytes = most // (2 * (robots + 1))
         self.ring_bytes = min(
             MAX_RING_BYTES // robots, self.file_bytes // 2

@@ -17,7 +17,7 @@ from app.transport.zenoh_config import Config, config_from, config_to
 
 if TYPE_CHECKING:
     from app.recording import Recordings
-    from app.trends.disk import TrendDisk
+    from app.trends.trend_writer import TrendWriter
 
 log = logging.getLogger("kiosk")
 
@@ -111,13 +111,13 @@ def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 
 
-def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendDisk | None":
+def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendWriter | None":
     """The histories on disk, if a trend of the panel is kept there."""
     if not any(trend.disk for trend in trends_of(panel)):
         return None
-    from app.trends.disk import TrendDisk
+    from app.trends.trend_writer import TrendWriter
 
-    disk = TrendDisk(settings.data_folder(mode_of(settings, panel)), panel)
+    disk = TrendWriter(settings.data_folder(mode_of(settings, panel)), panel)
     for session in fleet.sessions:
         disk.add(session.entry.id if session.entry else "", session.robot, session.show)
     return disk

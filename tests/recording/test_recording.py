@@ -21,7 +21,7 @@ from app.interfaces import Structure
 from app.panel import load_panel
 from app.panel.rules import RecordRules
 from app.recording import Recorder, Recordings
-from app.recording.directory import RecordingDirectory, recording_name
+from app.recording.bounded_folder import RecordingFolder, recording_name
 from app.recording.mcap_file import PRESS_TOPIC, UNFINISHED, Channel, McapFile
 from app.recording.ring_buffer import COPY_BELOW_BYTES, OVERHEAD_BYTES, RingBuffer, to_buffered
 from app.robot.state import RobotState, Sample
@@ -145,7 +145,7 @@ def test_names_sort_by_time_and_say_whose_and_what() -> None:
 def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path) -> None:
     left_by_a_killed_process(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a" + UNFINISHED]
-    RecordingDirectory(tmp_path, 100 * MB).open()
+    RecordingFolder(tmp_path, 100 * MB).open()
     (path,) = tmp_path.iterdir()
     assert path.name == "a.recovered.mcap"
     assert texts(tmp_path) == ["said"]
@@ -165,14 +165,14 @@ def left_by_a_killed_process(folder: Path) -> None:
 def test_an_empty_half_is_removed(tmp_path: Path) -> None:
     (tmp_path / f"a{UNFINISHED}").write_bytes(b"")
     (tmp_path / f"b{UNFINISHED}").write_bytes(os.urandom(1000))
-    RecordingDirectory(tmp_path, 100 * MB).open()
+    RecordingFolder(tmp_path, 100 * MB).open()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_another_process_still_writes_is_left_alone(tmp_path: Path) -> None:
     file = McapFile(tmp_path, "a", {})
     file.add(CHANNEL, PAYLOAD, 1, 1)
-    RecordingDirectory(tmp_path, 100 * MB).open()
+    RecordingFolder(tmp_path, 100 * MB).open()
     assert file.finish() == tmp_path / "a.mcap"
     assert texts(tmp_path) == ["said"]
 
@@ -185,7 +185,7 @@ def test_a_clock_that_was_set_back_does_not_make_the_newest_recording_the_oldest
     files = [tmp_path / f"{recording_name(moment, '', 'drive')}.mcap" for moment in moments]
     for file in files:
         file.write_bytes(bytes(300))
-    RecordingDirectory(tmp_path, 700).make_room(0)
+    RecordingFolder(tmp_path, 700).make_room(0)
     assert [file for file in files if file.exists()] == files[2:]
 
 
@@ -193,7 +193,7 @@ def test_the_oldest_recordings_go_and_nothing_else(tmp_path: Path) -> None:
     for number in range(10):
         (tmp_path / f"2026-{number}.mcap").write_bytes(bytes(MB))
     (tmp_path / "notes.txt").write_bytes(bytes(20 * MB))
-    RecordingDirectory(tmp_path, 5 * MB).make_room(2 * MB)
+    RecordingFolder(tmp_path, 5 * MB).make_room(2 * MB)
     kept = sorted(path.name for path in tmp_path.iterdir())
     assert kept == ["2026-7.mcap", "2026-8.mcap", "2026-9.mcap", "notes.txt"]
 
@@ -202,7 +202,7 @@ def test_a_recording_that_someone_removes_at_the_same_time_counts_nothing(tmp_pa
     (tmp_path / "2026-1.mcap").symlink_to(tmp_path / "removed")
     kept = tmp_path / "2026-2.mcap"
     kept.write_bytes(bytes(MB))
-    RecordingDirectory(tmp_path, MB).make_room(0)
+    RecordingFolder(tmp_path, MB).make_room(0)
     assert kept.exists()
 
 

@@ -28,7 +28,13 @@ from app.simulator.palletizing.states import (
     Reason,
     State,
 )
-from app.simulator.palletizing.supply import ENOUGH_BAR, FIRST_DIP_S, FIRST_DOOR_S, LOW_BAR, OPEN_S
+from app.simulator.palletizing.surroundings import (
+    ENOUGH_BAR,
+    FIRST_DIP_S,
+    FIRST_DOOR_S,
+    LOW_BAR,
+    OPEN_S,
+)
 
 STEP_S: Final = 0.1
 HOUR_S: Final = 3600

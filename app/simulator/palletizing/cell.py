@@ -21,7 +21,7 @@ from app.simulator.palletizing.states import (
     Reason,
     State,
 )
-from app.simulator.palletizing.supply import AirSupply, GuardDoor, Motor
+from app.simulator.palletizing.surroundings import AirSupply, GuardDoor, Motor
 
 BOXES: Final = 144  # of a full pallet
 LAYER: Final = 24

@@ -7,7 +7,7 @@ from typing import Any, Final
 from app.simulator.palletizing import cycle
 from app.simulator.palletizing.cell import PalletizingCell
 from app.simulator.palletizing.states import Reason, State
-from app.simulator.palletizing.supply import LOW_BAR, USUAL_BAR
+from app.simulator.palletizing.surroundings import LOW_BAR, USUAL_BAR
 from app.simulator.values.known_types import JOINTS, Moment, header, time
 
 Fields = dict[str, Any]

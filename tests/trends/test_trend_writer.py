@@ -17,10 +17,10 @@ from app.i18n import render
 from app.panel.model import Panel
 from app.robot.history import Bucket, FieldHistory
 from app.robot.state import RobotState
-from app.trends import disk as disks
-from app.trends.disk import TrendDisk
-from app.trends.file import NAME, FieldName, TrendFile
+from app.trends import trend_writer
 from app.trends.recorder import TrendRecorder
+from app.trends.trend_file import NAME, FieldName, TrendFile
+from app.trends.trend_writer import TrendWriter
 from tests.support.builders import INTERFACES, Table, panel_of, robot_there
 from tests.support.parts import ENOUGH_S
 
@@ -97,7 +97,7 @@ class Cell:
         panel = panel or panel_of(TREND)
         self.robot: RobotState = robot_there(panel)
         TrendRecorder(panel, INTERFACES, self.robot)
-        self.disk = TrendDisk(folder, panel)
+        self.disk = TrendWriter(folder, panel)
         self.shown = 0
         self.disk.add("", self.robot, self._show)
 
@@ -132,9 +132,9 @@ async def settled(condition: Any) -> None:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(disks, "WRITE_EVERY_S", 0.02)
+    monkeypatch.setattr(trend_writer, "WRITE_EVERY_S", 0.02)
     for limit in ("LOAD_TIMEOUT_S", "STOP_TIMEOUT_S"):  # for a busy machine
-        monkeypatch.setattr(disks, limit, ENOUGH_S)
+        monkeypatch.setattr(trend_writer, limit, ENOUGH_S)
 
 
 def test_restart_finds_the_stored_history(tmp_path: Path) -> None:
@@ -252,7 +252,7 @@ def test_a_folder_that_cannot_be_made_is_a_fault_and_no_end(tmp_path: Path) -> N
 def test_a_disk_that_stands_still_does_not_keep_the_panel_from_its_start(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(disks, "LOAD_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(trend_writer, "LOAD_TIMEOUT_S", 0.05)
     opened = TrendFile.__init__
     freed: list[bool] = []
 
@@ -298,7 +298,7 @@ def test_a_file_that_goes_while_it_is_written_is_begun_again_with_all_that_is_kn
 ) -> None:
     """Values of the run before and of this one, in several transactions."""
     caplog.set_level(logging.INFO)
-    monkeypatch.setattr(disks, "MOST_ROWS", 2)
+    monkeypatch.setattr(trend_writer, "MOST_ROWS", 2)
     folder = tmp_path / "data"
     path = folder / NAME
     now = time.time()

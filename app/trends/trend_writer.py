@@ -22,7 +22,7 @@ from app.panel.model import Panel
 from app.panel.widgets.trend import disk_fields, trends_of
 from app.robot.history import Bucket, FieldHistory, History, Level
 from app.robot.state import RobotState
-from app.trends.file import FieldName, Rows, TrendFile, remove_journal, set_aside
+from app.trends.trend_file import FieldName, Rows, TrendFile, remove_journal, set_aside
 
 log = logging.getLogger("kiosk.trends")
 
@@ -65,7 +65,7 @@ def _by_wall_clock(buckets: Iterable[Bucket], history: History) -> list[Bucket]:
     ]
 
 
-class TrendDisk:
+class TrendWriter:
     """The histories of all robots of a panel on disk, from `start` to `stop`."""
 
     def __init__(self, folder: Path, panel: Panel) -> None:

@@ -21,7 +21,7 @@ def recording_name(moment: float, robot: str, widget: str) -> str:
     return "-".join(filter(None, (at, robot, widget)))
 
 
-class RecordingDirectory:
+class RecordingFolder:
     """The folder of recordings. Its methods raise OSError if it can't be used."""
 
     def __init__(self, path: Path, max_bytes: int) -> None:
