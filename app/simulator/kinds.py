@@ -17,6 +17,7 @@ from app.panel.template import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand
+from app.panel.widgets.figure import Figure, TargetField
 from app.panel.widgets.gauge import Gauge, SetpointField
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
@@ -140,6 +141,25 @@ def _machine_state(display: MachineState, _: Interfaces) -> Iterator[Need]:
         )
 
 
+def _figure(figure: Figure, _: Interfaces) -> Iterator[Need]:
+    """Between nothing and its target."""
+    scale, most = figure.scale or 1.0, figure.target
+    end = (most - figure.offset) / scale if isinstance(most, float) else None
+    for shown in _shown(figure):
+        yield shown if end is None else replace(shown, low=min(0.0, end), high=max(0.0, end))
+    if isinstance(most, TargetField):
+        yield Shown(topic=most.topic, type=most.type, field=most.field, max_age_s=most.max_age_s)
+    for line in figure.lines:
+        yield Shown(
+            topic=line.topic,
+            type=line.type,
+            field=line.field,
+            scale=line.scale,
+            offset=line.offset,
+            max_age_s=line.max_age_s,
+        )
+
+
 def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
     """In its normal range for the most part, and at times beyond the limit above."""
     low, high = gauge.normal or (gauge.min, gauge.max)
@@ -241,6 +261,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Readout: _readout,
     Indicator: _indicator,
     MachineState: _machine_state,
+    Figure: _figure,
     Gauge: _gauge,
     Joints: _joints,
     Table: None,

@@ -11,6 +11,7 @@ from app.panel.machine_state import MachineState
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
+from app.panel.widgets.figure import Figure
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.joints import Joints
@@ -28,6 +29,7 @@ from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
 from app.view.camera_values import camera
 from app.view.display_values import indicator, readout, value
+from app.view.figure_values import figure
 from app.view.gauge_values import gauge
 from app.view.joint_values import joints
 from app.view.log_values import log
@@ -154,6 +156,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     LogView: lambda widget, robot, verdict, now: log(widget, robot),
     Indicator: lambda widget, robot, verdict, now: indicator(widget, robot, now),
     MachineState: lambda widget, robot, verdict, now: machine_state(widget, robot, now),
+    Figure: lambda widget, robot, verdict, now: figure(widget, robot, now),
     Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
     Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
     Table: lambda widget, robot, verdict, now: table(widget, robot, now),

@@ -68,7 +68,8 @@ function keysOf(root) {
 }
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
-// `data-value` for the value of an element such as a meter, or an attribute of the widget's root.
+// `data-value` for the value of an element such as a meter, `data-width` for the width of a bar in percent, or an
+// attribute of the widget's root.
 /** @type {Record<string, Show>} */
 const SHOW = {
   enabled: (root, value) => {
@@ -146,6 +147,7 @@ function showInPlace(root, name, value) {
   setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
   const meter = root.querySelector(`[data-value="${name}"]`);
   if (meter) meter.value = value ?? meter.min;
+  root.querySelector(`[data-width="${name}"]`)?.setAttribute("width", `${value ?? 0}%`);
   if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
 }
 

@@ -28,7 +28,9 @@ def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     first, note, *fits = said.out.splitlines()
-    assert first == f'{SHIPPED}: good: "Robot cell 1", 5 page(s), 47 widget(s)'
+    panel = load_panel(SHIPPED)
+    counted = f"{len(panel.pages)} page(s), {len(list(panel.widgets()))} widget(s)"
+    assert first == f'{SHIPPED}: good: "Robot cell 1", {counted}'
     assert note.startswith('  note: interlock[0] "operation", line 34: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
     assert [line.partition("fits ")[2] for line in fits] == ["", screens, screens, screens]
@@ -128,9 +130,20 @@ def test_a_note_is_no_fault_and_has_its_place(
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     assert said.err == ""
+    text = SHIPPED.read_text()
+
+    def line(*parts: str) -> int:
+        """The line of the last of these parts, each of which is below the one before."""
+        at = 0
+        for part in parts:
+            at = text.index(part, at)
+        return text[:at].count("\n") + 1
+
+    first = line("[[interlock]]")
+    second = line('id = "last_heard"', "span = 2")
     assert said.out.splitlines()[1:] == [
-        '  note: interlock[0] "operation", line 34: is worth a look',
-        '  note: page[1].group[0].widget[1].span "last_heard", line 373: is large',
+        f'  note: interlock[0] "operation", line {first}: is worth a look',
+        f'  note: page[1].group[0].widget[1].span "last_heard", line {second}: is large',
     ]
     load_panel(SHIPPED)
 

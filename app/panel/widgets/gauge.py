@@ -1,12 +1,10 @@
 """A moving analog indicator: a number on its scale, with its normal range, limits and set-point."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import pairwise
-from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, WithJsonSchema, WrapValidator
-from pydantic.json_schema import JsonSchemaValue
+from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
 from app.errors import Fault
 from app.interfaces import Interfaces
@@ -16,37 +14,18 @@ from app.panel.constants import NUMBERS
 from app.panel.values import number_text
 from app.panel.widgets.displays import FORMAT, Factor, format_fault
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
-from app.panel.widgets.numbers import MAX_EXACT_NUMBER, Number, Unit
-from app.panel.widgets.topic_fields import number_field_faults
+from app.panel.widgets.numbers import Number, Unit
+from app.panel.widgets.topic_fields import OrNumber, number_field_faults, number_or_table
 
 
 class SetpointField(TopicField):
     """A set-point that the robot reports, in the unit of the message."""
 
 
-class _OrNumber:
-    """A JSON schema that has a number beside the table."""
-
-    def __get_pydantic_json_schema__(
-        self, schema: Any, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"anyOf": [{"type": "number"}, handler(schema)]}
-
-
-def _number_or_table(value: Any, validate: Any) -> Any:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if number and isfinite(value) and abs(value) <= MAX_EXACT_NUMBER:
-        return float(value)
-    if isinstance(value, Mapping):
-        return validate(value)
-    expected = 'a number, or a table like { topic = "/setpoint", type = "std_msgs/msg/Float64" }'
-    raise ValueError(f"must be {expected}, not {format_value(value)}")
-
-
 if TYPE_CHECKING:
     Setpoint = float | SetpointField
 else:
-    Setpoint = Annotated[SetpointField, WrapValidator(_number_or_table), _OrNumber()]
+    Setpoint = Annotated[SetpointField, WrapValidator(number_or_table), OrNumber()]
 
 
 def _check_normal(value: Any) -> Any:

@@ -12,6 +12,7 @@ from app.panel.widgets import tiles
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.figure import Figure
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
@@ -62,6 +63,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script=True),
     "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
     "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
+    "figure": WidgetKind(Figure, tiles.FIGURE, styles=("own",), script=False),
     "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),

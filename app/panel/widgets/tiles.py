@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Self
 
 from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.figure import Figure
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.log_view import LogView
@@ -25,6 +26,8 @@ PARAMETER_WIDTH: Final = 314.0  # its entry and its key side by side
 SLIDER_WIDTH: Final = 200.0
 NUMBER_WIDTH: Final = 100.0
 DISPLAY_WIDTH: Final = 80.0
+FIGURE_HEIGHTS: Final = ((620, 95.0, 28.0), (560, 70.0, 24.0), (0, 46.0, 20.0))  # above, number, bar
+FIGURE_WIDTH: Final = 190.0
 UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
 GAUGE_WIDTH: Final = 126.0
 JOINTS_FRAME: Final = 41.0  # name and note
@@ -132,6 +135,11 @@ def _gauge_height(gauge: Gauge, screen: Screen) -> float:
     return LOW_UPRIGHT_GAUGE if screen.height <= LOW_SCREEN else UPRIGHT_GAUGE
 
 
+def _figure_height(figure: Figure, screen: Screen) -> float:
+    number, bar = next((number, bar) for above, number, bar in FIGURE_HEIGHTS if screen.height > above)
+    return number + (bar if figure.has_bar else 0.0)
+
+
 def _joints_height(widget: Joints, screen: Screen) -> float:
     return JOINTS_FRAME + len(widget.joints) * (LOW_JOINT if screen.height <= LOW_SCREEN else JOINT)
 
@@ -168,6 +176,7 @@ JOYSTICK: Final = Tile(
 LABEL: Final = Tile(lambda widget, screen: LABEL_HEIGHT, lambda widget, screen: DISPLAY_WIDTH)
 LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH)
 CAMERA: Final = Tile(lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH)
+FIGURE: Final = Tile(_figure_height, lambda widget, screen: FIGURE_WIDTH)
 GAUGE: Final = Tile(_gauge_height, lambda widget, screen: GAUGE_WIDTH)
 JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH)
 TABLE: Final = Tile(_table_height, lambda widget, screen: TABLE_WIDTH)

@@ -1,11 +1,45 @@
-"""Gauges, joints and tables in each of their states."""
+"""Figures, gauges, joints and tables in each of their states."""
 
 from typing import Final
 
 from app.i18n import Text, TextLike, number, say
+from app.i18n.values import filled_in
 from app.web.gallery import texts
 from app.web.gallery.examples import NOT_LIVE, OLD, TOPIC, Example, Table
 
+FIGURE: Final[Table] = TOPIC | {
+    "label": texts.BOXES_COUNT.table,
+    "target": 144,
+    "segments": 6,
+    "line": [
+        TOPIC | {"text": texts.MINUTES_LEFT.table},
+        TOPIC | {"text": texts.LAYER.table},
+    ],
+}
+COUNTED: Final[Table] = {
+    "state": "live",
+    "note": "",
+    "text": "87",
+    "rest": say("figure_target", target="144"),
+    "part": 60.4,
+    "line0": filled_in(texts.MINUTES_LEFT.shown, lambda text: text.replace("{value}", "11")),
+    "line1": filled_in(texts.LAYER.shown, lambda text: text.replace("{value}", "4")),
+}
+FIGURES: Final = (
+    Example("counted", "figure", FIGURE, COUNTED),
+    Example("without a target", "figure", FIGURE | {"target": None}, COUNTED | {"rest": ""}),
+    *(
+        Example(
+            state,
+            "figure",
+            FIGURE,
+            COUNTED
+            | {"state": state, "note": note}
+            | ({} if state == "old" else {"text": "—", "part": None}),
+        )
+        for state, note in NOT_LIVE.items()
+    ),
+)
 GAUGE: Final[Table] = TOPIC | {
     "label": texts.AIR_INLET.table,
     "unit": "bar",
