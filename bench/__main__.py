@@ -94,8 +94,8 @@ class Run:
         for turn in range(rounds):
             first = turn * len(peers) // rounds
             for name, peer in (*peers[first:], *peers[:first]):
-                what = f"{phase}: {name}"
-                with timed(f"{what}, round {turn + 1}"), self._store.faults(what):
+                step = f"{phase}: {name}"
+                with timed(f"{step}, round {turn + 1}"), self._store.faults(step):
                     self._store.add(phase, turn, name, measure(self._rig, peer))
 
 
@@ -103,9 +103,9 @@ PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth")
 
 
 @contextmanager
-def timed(what: str) -> Iterator[None]:
+def timed(step: str) -> Iterator[None]:
     """Prints what is being measured, and the time it took."""
-    print(what, end=" ", flush=True)
+    print(step, end=" ", flush=True)
     began = time.monotonic()
     yield
     print(f"({time.monotonic() - began:.1f} s)", flush=True)
@@ -113,7 +113,7 @@ def timed(what: str) -> Iterator[None]:
 
 def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:
     """The peers that work. For the others, the reason is stored."""
-    found = []
+    ready_peers = []
     for peer in peers:
         if not peer.installed():
             store.fault(peer.id, "not installed: `make bench-setup` does it")
@@ -122,8 +122,8 @@ def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:
             if fault := fault_of(peer, server, (), rig.robot, page):
                 store.fault(peer.id, fault)
             else:
-                found.append(peer)
-    return found
+                ready_peers.append(peer)
+    return ready_peers
 
 
 @contextmanager
@@ -147,19 +147,19 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--peers", help="ids with commas between; this panel and the floor always are")
     parser.add_argument("--results", type=Path, default=ROOT / "bench", help="folder to write to")
     parser.add_argument("--page", type=Path, help="page whose section is written again")
-    given = parser.parse_args(arguments)
-    if unknown := set(given.phases) - set(PHASES):
+    options = parser.parse_args(arguments)
+    if unknown := set(options.phases) - set(PHASES):
         parser.error(f"no such phase: {', '.join(sorted(unknown))}; there are {', '.join(PHASES)}")
-    wanted = given.peers.split(",") if given.peers else [peer.id for peer in PEERS]
+    wanted = options.peers.split(",") if options.peers else [peer.id for peer in PEERS]
     rivals = [peer for peer in PEERS if peer.id in (*wanted, "floor")]
-    given.results.mkdir(parents=True, exist_ok=True)
-    store = Store(given.results / "results.json")
+    options.results.mkdir(parents=True, exist_ok=True)
+    store = Store(options.results / "results.json")
     sizes = QUICK if quick else Sizes()
     try:
         with ended_like_ctrl_c(), Rig(sizes) as rig:
             store.machine(rig.chromium.version, asdict(sizes) | {"quick": quick})
             run = Run(rig, store, [KIOSK, *proven(rig, store, rivals)])
-            for phase in given.phases or PHASES:
+            for phase in options.phases or PHASES:
                 getattr(run, phase)()
     except KeyboardInterrupt:
         print("interrupted; the results so far are kept", file=sys.stderr)
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str]) -> int:
         return 1
     finally:
         titles = {peer.id: peer.title for peer in (KIOSK, *PEERS)}
-        write(store.results, titles, given.results, given.page)
+        write(store.results, titles, options.results, options.page)
     ours = [where for where in store.results["faults"] if KIOSK.id in where or "growth" in where]
     return 1 if ours else 0
 

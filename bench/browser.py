@@ -125,9 +125,9 @@ class Watched:
     def watch(self) -> None:
         self.page.evaluate(WATCH, [self._shown, [value_of(topic) for topic in self._topics]])
 
-    def take(self, what: str) -> list[Any]:
+    def take(self, list_name: str) -> list[Any]:
         """Returns and clears the recorded `toggles`, `texts` or `ups`."""
-        return list(self.page.evaluate(f"bench.{what}.splice(0)"))
+        return list(self.page.evaluate(f"bench.{list_name}.splice(0)"))
 
     def kept(self) -> list[Any]:
         """(page's time, index of the topic, text) of everything that was shown, for a page opened with

@@ -51,10 +51,10 @@ def found_in_page(port: int, pattern: str) -> str:
     with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=CONNECT_S)) as server:
         server.request("GET", "/")
         page = server.getresponse().read().decode()
-    found = re.search(pattern, page)
-    if found is None:
+    match = re.search(pattern, page)
+    if match is None:
         raise ValueError(f"the page has no {pattern}")
-    return found.group(1)
+    return match.group(1)
 
 
 class Crowd:
@@ -76,7 +76,7 @@ class Crowd:
         path: str,
         say: list[str],
         say_bytes: list[str],
-        found: str,
+        id_pattern: str,
         answers: list[str] | None,
     ) -> int:
         """Connects clients until there are `count`. For the other arguments see `bench.peer.Bare`;
@@ -86,18 +86,18 @@ class Crowd:
             self._query, self._answer = bytes([0x81, len(query)]) + query.encode(), frame(answer)
         frames = [*map(frame, say), *(frame(bytes.fromhex(said)) for said in say_bytes)]
         while len(self._sockets) < count:
-            own = path.format(id=found_in_page(port, found)) if found else path
-            one = socket.create_connection(("127.0.0.1", port), CONNECT_S)
-            one.sendall(request(kind, f"127.0.0.1:{port}", own))
-            head = one.recv(RECEIVE)
+            own = path.format(id=found_in_page(port, id_pattern)) if id_pattern else path
+            client = socket.create_connection(("127.0.0.1", port), CONNECT_S)
+            client.sendall(request(kind, f"127.0.0.1:{port}", own))
+            head = client.recv(RECEIVE)
             ok = b" 101 " if kind == "websocket" else b" 200 "
             if ok not in head.split(b"\r\n", 1)[0]:
                 raise ConnectionError(head[:200].decode(errors="replace"))
-            one.sendall(b"".join(frames))
-            one.setblocking(False)
+            client.sendall(b"".join(frames))
+            client.setblocking(False)
             with self._lock:
-                self._sockets.append(one)
-                self._selector.register(one, selectors.EVENT_READ, [-1])
+                self._sockets.append(client)
+                self._selector.register(client, selectors.EVENT_READ, [-1])
         return len(self._sockets)
 
     def _run(self) -> None:
@@ -109,22 +109,22 @@ class Crowd:
                         self._read(key)
 
     def _read(self, key: selectors.SelectorKey) -> None:
-        one: Any = key.fileobj
+        client: Any = key.fileobj
         try:
-            data = one.recv(RECEIVE)
+            data = client.recv(RECEIVE)
         except OSError:
             data = b""
         at = time.monotonic_ns()
         if not data:
             self._lost += 1
-            self._selector.unregister(one)
+            self._selector.unregister(client)
             return
         self._bytes += len(data)
         if self._query and self._query in data:
-            one.sendall(self._answer)
+            client.sendall(self._answer)
         last = key.data
-        for found in NUMBER.findall(data):
-            number = int(found)
+        for digits in NUMBER.findall(data):
+            number = int(digits)
             if number > last[0]:
                 last[0] = number
                 self._came.append((number, at))
@@ -143,10 +143,10 @@ class Crowd:
 
     def leave(self) -> None:
         with self._lock:
-            for one in self._sockets:
-                if one in self._selector.get_map():
-                    self._selector.unregister(one)
-                one.close()
+            for client in self._sockets:
+                if client in self._selector.get_map():
+                    self._selector.unregister(client)
+                client.close()
             self._sockets = []
         self._lost = 0
         self.forget()

@@ -71,12 +71,12 @@ def family(pids: Iterable[int]) -> set[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and (stat := _stat(int(entry.name))):
             children.setdefault(int(stat[1]), []).append(int(entry.name))
-    found: set[int] = set()
+    members: set[int] = set()
     new = set(pids)
     while new:
-        found |= new
-        new = {child for pid in new for child in children.get(pid, [])} - found
-    return found
+        members |= new
+        new = {child for pid in new for child in children.get(pid, [])} - members
+    return members
 
 
 def cpu_s(pids: Iterable[int]) -> float:

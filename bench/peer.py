@@ -37,7 +37,7 @@ class Bare:
     path: str  # "{id}" is replaced by the match of `found`
     say: tuple[str | bytes, ...] = ()  # text and binary frames sent first
     port: int = 0
-    found: str = ""  # a pattern in the page, whose group is the client's id
+    id_pattern: str = ""  # a pattern in the page, whose group is the client's id
     answers: tuple[str, str] | None = (
         None  # a text frame of the server, and the response that it requires
     )

@@ -70,8 +70,8 @@ class OverZenoh:
         at = time.monotonic_ns()
         self.heard.append((at, sample.payload.to_bytes()[8:].split(b"\0")[0].decode()))
 
-    def _queryable(self, what: str, text: str) -> Any:
-        key = f"@/{self._zid}/ros2/{what}"
+    def _queryable(self, entity: str, text: str) -> Any:
+        key = f"@/{self._zid}/ros2/{entity}"
 
         def answer(query: zenoh.Query) -> None:
             with query:

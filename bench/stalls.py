@@ -23,17 +23,17 @@ async def _watch() -> None:
     while True:
         wall, cpu = time.perf_counter(), time.thread_time()
         await asyncio.sleep(EVERY_S)
-        found = {
+        figures = {
             "wall_ms": 1000 * (time.perf_counter() - wall - EVERY_S),
             "cpu_ms": 1000 * (time.thread_time() - cpu),
         }
-        for name, value in found.items():
+        for name, value in figures.items():
             _longest[name] = max(_longest[name], value)
 
 
 @asynccontextmanager
-async def _lifespan(of: Any) -> AsyncIterator[Any]:
-    async with _inner(of) as state:
+async def _lifespan(app: Any) -> AsyncIterator[Any]:
+    async with _inner(app) as state:
         watching = asyncio.create_task(_watch())
         yield state
         watching.cancel()
@@ -41,9 +41,9 @@ async def _lifespan(of: Any) -> AsyncIterator[Any]:
 
 @app.get("/stalls", include_in_schema=False)
 async def stalls() -> dict[str, float]:
-    found = dict(_longest)
+    longest = dict(_longest)
     _longest.update(wall_ms=0.0, cpu_ms=0.0)
-    return found
+    return longest
 
 
 app.router.lifespan_context = _lifespan

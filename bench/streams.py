@@ -146,10 +146,10 @@ def _loaded(server: Server, robot: RosNode, filming: RosNode, pages: list[Page])
     heard = len(robot.heard("/jog"))
     with _held(server) as ends:
         flooding.start()
-        found = _measured(server, FOR_S)
+        figures = _measured(server, FOR_S)
         flooding.join()
     at = robot.heard_at("/jog")[heard:]
-    return found | {
+    return figures | {
         "frames_per_s": [
             round((_frame(page) - first) / FOR_S, 1) for page, first in zip(pages, frames, strict=True)
         ],
@@ -185,11 +185,11 @@ def _held(server: Server) -> Iterator[list[str]]:
             at, number, lease = time.monotonic(), 0, ""
             begin = {"do": "begin", "inputs": {}, "seen": server.snapshot()["id"]}
             while said.get("state") not in ("ended", "refused"):
-                what = {"do": "beat", "number": number, "lease": lease} if lease else begin
+                message = {"do": "beat", "number": number, "lease": lease} if lease else begin
                 if over.is_set():
-                    what = {"do": "end", "why": "released", "lease": lease}
+                    message = {"do": "end", "why": "released", "lease": lease}
                 after = 1000 * (time.monotonic() - at)
-                socket.send(json.dumps({**what, "stamp": said["stamp"], "after": after}))
+                socket.send(json.dumps({**message, "stamp": said["stamp"], "after": after}))
                 said = json.loads(socket.recv(10))
                 at, number, lease = time.monotonic(), number + 1, said.get("lease", lease)
                 over.wait(BEAT_S)

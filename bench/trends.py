@@ -75,8 +75,12 @@ label = "Pen {n}"
 def size_of(field: FieldHistory) -> int:
     """The memory of a history, with what its lists reserve."""
     levels = (field.raw, *field.levels)
-    lists = (one for of in levels for one in (of.at, of.low, of.high, of.last, of.gaps))
-    return sum(map(sys.getsizeof, {id(one): one for one in lists}.values()))
+    lists = (
+        numbers
+        for level in levels
+        for numbers in (level.at, level.low, level.high, level.last, level.gaps)
+    )
+    return sum(map(sys.getsizeof, {id(numbers): numbers for numbers in lists}.values()))
 
 
 def day() -> dict[str, str]:
@@ -133,8 +137,8 @@ def view(server: Server, ended: threading.Event) -> None:
     """What a page asks for: all once, then what is new twice a second."""
     query: dict[str, float] = {"span_s": 600, "points": 600}
     while not ended.wait(0.5):
-        found = server.http.get("/widgets/course/trend", params=query).json()
-        query["since"] = math.floor(found["end"] / found["width_s"]) - 3
+        trend = server.http.get("/widgets/course/trend", params=query).json()
+        query["since"] = math.floor(trend["end"] / trend["width_s"]) - 3
 
 
 class Holding:
@@ -150,9 +154,9 @@ class Holding:
         with connect(f"ws://127.0.0.1:{self._server.port}/widgets/jog/hold") as socket:
             said, at = json.loads(socket.recv()), time.monotonic()
 
-            def say(**what: Any) -> dict[str, Any]:
+            def say(**message: Any) -> dict[str, Any]:
                 after = 1000 * (time.monotonic() - at)
-                socket.send(json.dumps({"stamp": said["stamp"], "after": after, **what}))
+                socket.send(json.dumps({"stamp": said["stamp"], "after": after, **message}))
                 heard: dict[str, Any] = json.loads(socket.recv())
                 return heard
 
@@ -221,13 +225,13 @@ def recording() -> dict[str, dict[str, str]]:
             server = live(bridge.endpoint, folder, KIOSK_PANEL=str(folder / "panel.toml"))
             until(server.ready, "ready", within_s=60)
             until(lambda: server.widget("jog")["enabled"], "the hold is free", within_s=60)
-            found = {"without values": measured(server, 0)}
+            figures = {"without values": measured(server, 0)}
             for number in range(PENS):
                 node.every(f"/pen{number}", {"data": float(number)}, 1 / HZ)
             until(lambda: server.widget("course")["state"] == "live", "values arrive")
-            found["4 × 100 Hz, no page"] = measured(server, 0)
-            found["4 × 100 Hz, two pages"] = measured(server, VIEWERS)
-            return found
+            figures["4 × 100 Hz, no page"] = measured(server, 0)
+            figures["4 × 100 Hz, two pages"] = measured(server, VIEWERS)
+            return figures
         finally:
             if server is not None:
                 server.end()

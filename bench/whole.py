@@ -109,9 +109,9 @@ class WholeKiosk:
         saying = threading.Thread(target=say)
         saying.start()
         time.sleep(0.5)
-        found = self.cost()
+        figures = self.cost()
         saying.join()
-        return found
+        return figures
 
     def closed_loop(self) -> dict[str, float]:
         """Milliseconds from the node's permission to the command that it has."""
@@ -132,12 +132,12 @@ class WholeKiosk:
 def main() -> None:
     with ExitStack() as stack:
         kiosk = WholeKiosk(stack)
-        found: dict[str, Any] = {"load_before": os.getloadavg()[0], "live_s": round(kiosk.live_s, 2)}
+        figures: dict[str, Any] = {"load_before": os.getloadavg()[0], "live_s": round(kiosk.live_s, 2)}
         time.sleep(2)
-        found["at rest"] = kiosk.cost()
-        found[f"{HZ:g} Hz"] = kiosk.loaded()
-        found["closed loop"] = kiosk.closed_loop()
-        print(json.dumps(found, indent=2))
+        figures["at rest"] = kiosk.cost()
+        figures[f"{HZ:g} Hz"] = kiosk.loaded()
+        figures["closed loop"] = kiosk.closed_loop()
+        print(json.dumps(figures, indent=2))
 
 
 if __name__ == "__main__":

@@ -130,11 +130,11 @@ def serving(command: str, folder: Path) -> Iterator[int]:
         server = subprocess.Popen([command, "run", "--port=0"], cwd=folder, env=env, stderr=stream)
     try:
         until = time.monotonic() + STARTS_WITHIN_S
-        while not (found := re.search(r"the panel is at http://[\d.]+:(\d+)", log.read_text())):
+        while not (match := re.search(r"the panel is at http://[\d.]+:(\d+)", log.read_text())):
             if server.poll() is not None or time.monotonic() > until:
                 raise ReleaseError(f"the installed server does not start:\n{log.read_text()}")
             time.sleep(0.1)
-        yield int(found[1])
+        yield int(match[1])
     finally:
         server.terminate()
         server.wait()
@@ -175,19 +175,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Makes and checks the files of a release.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--tag", help="the tag that this is a release of")
-    given = parser.parse_args()
+    options = parser.parse_args()
     try:
-        check_version(given.tag)
-        empty(given.folder)
-        wheel = build(given.folder)
-        describe(given.folder)
-        pack_docs(given.folder)
-        write_sums(given.folder)
+        check_version(options.tag)
+        empty(options.folder)
+        wheel = build(options.folder)
+        describe(options.folder)
+        pack_docs(options.folder)
+        write_sums(options.folder)
         try_out(wheel)
     except ReleaseError as error:
         print(error, file=sys.stderr)
         return 1
-    print("".join(f"{path}\n" for path in sorted(given.folder.iterdir())), end="")
+    print("".join(f"{path}\n" for path in sorted(options.folder.iterdir())), end="")
     return 0
 
 

@@ -69,12 +69,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.flaky(reruns=1))
     if wanted:
         left_out = [
-            one for one in items if (one.get_closest_marker("flaky") is None) is (wanted == "only")
+            item for item in items if (item.get_closest_marker("flaky") is None) is (wanted == "only")
         ]
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [one for one in items if one not in set(left_out)]
-    on_parts = Counter(one.path for one in items if needs_part(one))
-    in_browser = {one.path for one in items if takes_browser(one)}
+        items[:] = [item for item in items if item not in set(left_out)]
+    on_parts = Counter(item.path for item in items if needs_part(item))
+    in_browser = {item.path for item in items if takes_browser(item)}
 
     def place(item: pytest.Item) -> tuple[bool, int, Path, bool]:
         return item.path not in in_browser, -on_parts[item.path], item.path, not takes_browser(item)
@@ -103,7 +103,7 @@ def pytest_runtest_makereport(
     if report.failed:
         item.stash[FAILED] = True
         began = time.monotonic() - call.duration - 10
-        shown = [one for one in Process.latest if one.running or one.began > began]
+        shown = [process for process in Process.latest if process.running or process.began > began]
         report.sections += [("a process", process.describe()) for process in shown]
     return report
 

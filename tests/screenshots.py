@@ -37,8 +37,10 @@ def main() -> None:
                 loaded = load_panel(panel)
                 paths = {page.id: f"/pages/{page.id}" for page in loaded.pages}
                 looks = [("theme", theme) for theme in CHOICES["theme"]]
-                others = [one for one in loaded.readers_languages if one != loaded.language]
-                looks += [("language", one) for one in others]
+                others = [
+                    language for language in loaded.readers_languages if language != loaded.language
+                ]
+                looks += [("language", language) for language in others]
                 take_all(browser, server.url, name, paths, looks)
                 if panel == EXAMPLE:
                     take_all(browser, server.url, "gallery", {"": "/gallery"}, looks)

@@ -34,8 +34,8 @@ def results(**phases: Any) -> dict[str, Any]:
     return {"faults": {}, "sizes": {"crowds": [1, 500]}, **phases}
 
 
-def by_text(found: list[Target], text: str) -> Target:
-    return next(target for target in found if text in target.text)
+def by_text(judged: list[Target], text: str) -> Target:
+    return next(target for target in judged if text in target.text)
 
 
 @pytest.mark.parametrize(
@@ -114,10 +114,10 @@ def test_nothing_to_compare_with_is_no_ratio() -> None:
 
 
 def test_a_figure_is_the_median_of_the_rounds_that_have_it() -> None:
-    found = {"down": {"rounds": [{"kiosk": {"p50": p50}} for p50 in (3.0, 1.0, 2.0, None)]}}
-    assert figure(found, "down", "kiosk", "p50") == 2.0
-    assert math.isnan(figure(found, "down", "plain", "p50"))
-    assert math.isnan(figure(found, "up", "kiosk", "p50"))
+    measured = {"down": {"rounds": [{"kiosk": {"p50": p50}} for p50 in (3.0, 1.0, 2.0, None)]}}
+    assert figure(measured, "down", "kiosk", "p50") == 2.0
+    assert math.isnan(figure(measured, "down", "plain", "p50"))
+    assert math.isnan(figure(measured, "up", "kiosk", "p50"))
 
 
 def test_the_best_rival_is_neither_this_panel_nor_the_floor() -> None:
@@ -129,24 +129,24 @@ def test_targets_are_judged_by_what_was_measured() -> None:
     down = phase(
         kiosk={"p50": 1.2, "p99": 3.7}, floor={"p50": 0.9, "p99": 1.0}, plain={"p50": 1.2, "p99": 1.9}
     )
-    found = targets(results(down=down))
-    assert by_text(found, "best rival's: at most 1 ×").reached is True
-    assert by_text(found, "of the floor's").measured == "1.33 ×"
-    assert by_text(found, "of the floor's").reached is True
-    assert by_text(found, "of its own p50").reached is False
+    judged = targets(results(down=down))
+    assert by_text(judged, "best rival's: at most 1 ×").reached is True
+    assert by_text(judged, "of the floor's").measured == "1.33 ×"
+    assert by_text(judged, "of the floor's").reached is True
+    assert by_text(judged, "of its own p50").reached is False
 
 
 def test_a_limit_that_is_to_be_kept_under_is_not_kept_at_it() -> None:
     cost = phase(kiosk={"server_1000": 4.0, "server_wide": 19.9})
-    found = targets(results(cost=cost))
-    assert by_text(found, "1 kHz on a topic: server").reached is False
-    assert by_text(found, "100 topics").reached is True
+    judged = targets(results(cost=cost))
+    assert by_text(judged, "1 kHz on a topic: server").reached is False
+    assert by_text(judged, "100 topics").reached is True
 
 
 def test_memory_of_each_client_counts_in_kilobytes() -> None:
-    found = targets(results(cost=phase(kiosk={"mib_1": 70.0, "mib_500": 94.0})))
-    assert by_text(found, "memory of each").measured == "50.4 kB"
-    assert by_text(found, "memory of each").reached is True
+    judged = targets(results(cost=phase(kiosk={"mib_1": 70.0, "mib_500": 94.0})))
+    assert by_text(judged, "memory of each").measured == "50.4 kB"
+    assert by_text(judged, "memory of each").reached is True
 
 
 def test_target_without_a_measurement_is_not_reached() -> None:
@@ -155,25 +155,25 @@ def test_target_without_a_measurement_is_not_reached() -> None:
 
 def test_growth_is_given_for_each_axis_that_was_measured() -> None:
     points = [[1, 2.0, 60.0, 0.1], [4, 5.0, 61.0, 0.1], [8, 9.0, 62.3, 0.1]]
-    (one,) = grown(results(growth={"rounds": [{"robots": {"points": points}}]}))
-    assert one.axis.unit == "robot"
-    assert one.cpu_slope.per_unit == pytest.approx(1.0)
-    assert one.cpu_slope.linear
-    assert one.mib == (60.0, 61.0, 62.3)
+    (growth,) = grown(results(growth={"rounds": [{"robots": {"points": points}}]}))
+    assert growth.axis.unit == "robot"
+    assert growth.cpu_slope.per_unit == pytest.approx(1.0)
+    assert growth.cpu_slope.linear
+    assert growth.mib == (60.0, 61.0, 62.3)
 
 
 def test_the_results_are_given_with_whatever_there_is(tmp_path: Path) -> None:
     page = tmp_path / "benchmark.md"
     page.write_text(f"before\n{BEGIN}\nwhat was there\n{END}\nafter\n")
-    found = results(up=phase(kiosk={"p50": 1.0, "p99": 2.5}), faults={"nicegui": "not installed"})
-    write(found, TITLES, tmp_path, page)
+    measured = results(up=phase(kiosk={"p50": 1.0, "p99": 2.5}), faults={"nicegui": "not installed"})
+    write(measured, TITLES, tmp_path, page)
     text = page.read_text()
     assert text.startswith(f"before\n{BEGIN}\n")
     assert text.endswith(f"{END}\nafter\n")
     assert "what was there" not in text
     assert "| this panel | – | – | 1.00 / 2.50 |" in text
     assert "NiceGUI: not installed" in text
-    assert whole(found, TITLES) == (tmp_path / "results.md").read_text()
+    assert whole(measured, TITLES) == (tmp_path / "results.md").read_text()
 
 
 def test_a_page_without_the_section_stays_as_it_is(tmp_path: Path) -> None:

@@ -26,9 +26,9 @@ def test_an_error_that_no_client_is_to_blame_for_is_500(name: str) -> None:
 
 
 def below(kind: type[KioskError]) -> Iterator[type[KioskError]]:
-    for one in kind.__subclasses__():
-        yield one
-        yield from below(one)
+    for subclass in kind.__subclasses__():
+        yield subclass
+        yield from below(subclass)
 
 
 def test_the_tree_in_the_docstring_has_every_error() -> None:

@@ -121,10 +121,10 @@ def imported() -> Mapping[str, list[str]]:
         "import json; from tests.test_imports import MODULES, read_imports;"
         " print(json.dumps({module: [*read_imports(module)] for module in MODULES}))"
     )
-    found: dict[str, list[str]] = json.loads(
+    modules: dict[str, list[str]] = json.loads(
         subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, text=True)
     )
-    return found
+    return modules
 
 
 def of_project(module: str) -> set[str]:

@@ -45,14 +45,14 @@ def test_what_does_no_harm_stays_as_it_is(text: str) -> None:
 
 def test_every_control_character_and_mark_of_direction_becomes_its_escape() -> None:
     marks = {"ALM", "BN", "LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
-    found = [
+    characters = [
         char
         for char in map(chr, range(0x10000))
         if unicodedata.category(char) in ("Cc", "Cs", "Zl", "Zp")
         or (unicodedata.bidirectional(char) in marks - {"BN"})
         or char in "\u061c\u200e\u200f"
     ]
-    shown = {char: printable(char) for char in found if char not in "\n\t"}
+    shown = {char: printable(char) for char in characters if char not in "\n\t"}
     assert shown == {char: f"\\u{ord(char):04x}" for char in shown}
     assert len(shown) > 2048 + 65
 

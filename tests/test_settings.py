@@ -76,20 +76,22 @@ def test_kiosk_hosts_adds_names_in_lower_case() -> None:
     assert settings.hosts == ("127.0.0.1", "localhost", "[::1]", "cell1.local", "10.0.0.7")
 
 
-@pytest.mark.parametrize(("given", "level"), [("debug", "debug"), ("WARN", "warn"), ("Fatal", "fatal")])
-def test_the_log_level_is_one_of_ros_in_any_case(given: str, level: str) -> None:
-    assert Settings.from_environment({"KIOSK_LOG_LEVEL": given}).log_level == level
+@pytest.mark.parametrize(
+    ("written", "level"), [("debug", "debug"), ("WARN", "warn"), ("Fatal", "fatal")]
+)
+def test_the_log_level_is_one_of_ros_in_any_case(written: str, level: str) -> None:
+    assert Settings.from_environment({"KIOSK_LOG_LEVEL": written}).log_level == level
 
 
-@pytest.mark.parametrize("given", ["warning", "trace", "10"])
-def test_an_unknown_log_level_is_refused_with_those_that_there_are(given: str) -> None:
+@pytest.mark.parametrize("written", ["warning", "trace", "10"])
+def test_an_unknown_log_level_is_refused_with_those_that_there_are(written: str) -> None:
     with pytest.raises(SettingsError, match=r"KIOSK_LOG_LEVEL .*debug, info, warn, error, fatal"):
-        Settings.from_environment({"KIOSK_LOG_LEVEL": given})
+        Settings.from_environment({"KIOSK_LOG_LEVEL": written})
 
 
-@pytest.mark.parametrize(("given", "dev"), [("1", True), ("yes", True), ("0", False)])
-def test_kiosk_dev_is_for_development(given: str, dev: bool) -> None:
-    assert Settings.from_environment({"KIOSK_DEV": given}).dev is dev
+@pytest.mark.parametrize(("written", "dev"), [("1", True), ("yes", True), ("0", False)])
+def test_kiosk_dev_is_for_development(written: str, dev: bool) -> None:
+    assert Settings.from_environment({"KIOSK_DEV": written}).dev is dev
 
 
 def test_databases_live_in_the_users_state_folder(
@@ -143,7 +145,7 @@ def test_proxies_are_addresses_and_networks_and_none_without_a_word() -> None:
     assert settings.proxies == ("127.0.0.1", "192.0.2.0/24", "::1")
 
 
-@pytest.mark.parametrize("given", ["*", "proxy.local", "192.0.2.1/24", "127.0.0.1:80", "[::1]"])
-def test_a_proxy_that_could_be_any_or_no_client_is_refused(given: str) -> None:
+@pytest.mark.parametrize("written", ["*", "proxy.local", "192.0.2.1/24", "127.0.0.1:80", "[::1]"])
+def test_a_proxy_that_could_be_any_or_no_client_is_refused(written: str) -> None:
     with pytest.raises(SettingsError, match="KIOSK_PROXIES has "):
-        Settings.from_environment({"KIOSK_PROXIES": given})
+        Settings.from_environment({"KIOSK_PROXIES": written})

@@ -78,7 +78,7 @@ def _presses(peer: Peer, robot: Robot, page: Page) -> None:
 
 
 def _done(
-    do: Callable[[], object], effect: Callable[[], bool], what: str, again_s: float = math.inf
+    do: Callable[[], object], effect: Callable[[], bool], goal: str, again_s: float = math.inf
 ) -> None:
     """Acts, again every `again_s`, until the effect is seen."""
     due = 0.0
@@ -90,4 +90,4 @@ def _done(
             do()
         return effect()
 
-    until(look, what, THEN_WITHIN_S if math.isinf(again_s) else FOUND_WITHIN_S)
+    until(look, goal, THEN_WITHIN_S if math.isinf(again_s) else FOUND_WITHIN_S)

@@ -134,9 +134,9 @@ def ending(*ends: Callable[[], object]) -> Callable[[], None]:
 
     def end() -> None:
         failures = []
-        for one in ends:
+        for end in ends:
             try:
-                one()
+                end()
             except Exception as failure:
                 failures.append(failure)
         if failures:

@@ -40,10 +40,10 @@ def single(rig: Rig, peer: Peer) -> Figures:
         server = stack.enter_context(rig.running(peer, topics, folder=folder))
         browser = stack.enter_context(rig.unattended(peer, server, topics))
         time.sleep(SETTLE_S)
-        found = {"rest_mib": rss_mib(family(server.pids))}
+        figures = {"rest_mib": rss_mib(family(server.pids))}
         for hz in RATES:
-            found |= loaded(rig, peer, server, browser, topics, hz, f"{hz}")
-        return found
+            figures |= loaded(rig, peer, server, browser, topics, hz, f"{hz}")
+        return figures
 
 
 def wide(rig: Rig, peer: Peer) -> Figures:
@@ -68,28 +68,28 @@ def loaded(
         time.sleep(SETTLE_S / 2)
     servers, shown = Meter(lambda: family(server.pids)), Meter(browser.pids)
     time.sleep(rig.sizes.window_s)
-    found = {
+    figures = {
         f"server_{name}": servers.percent(),
         f"browser_{name}": shown.percent(),
         f"rss_{name}": rss_mib(family(server.pids)),
     }
     rig.robot("quiet")
-    return found
+    return figures
 
 
 def many(rig: Rig, peer: Peer) -> Figures:
     """The cost of bare streams beside one page, all on one topic; empty if only a page can connect."""
     topics = (TOPIC,)
     with rig.running(peer, topics) as server, rig.page(peer, server, peer.robot, topics):
-        found: Figures = {}
+        all_figures: Figures = {}
         if server.bare is None:
-            return found
+            return all_figures
         with crowd() as clients:
             for count in rig.sizes.crowds:
                 join(clients, server, count)
                 figures = crowded(rig, peer.robot, server, clients, count)
-                found |= {f"{name}_{count}": figure for name, figure in figures.items()}
-        return found
+                all_figures |= {f"{name}_{count}": figure for name, figure in figures.items()}
+        return all_figures
 
 
 def join(clients: Commanded, server: Running, count: int) -> None:
@@ -104,7 +104,7 @@ def join(clients: Commanded, server: Running, count: int) -> None:
         path=server.bare.path,
         say=[said for said in server.bare.say if isinstance(said, str)],
         say_bytes=[said.hex() for said in server.bare.say if isinstance(said, bytes)],
-        found=server.bare.found,
+        id_pattern=server.bare.id_pattern,
         answers=server.bare.answers,
     )
 

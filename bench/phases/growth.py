@@ -47,12 +47,12 @@ class Growth:
         }
 
     def topics(self) -> Points:
-        def one(count: int) -> Point:
+        def point(count: int) -> Point:
             topics = tuple(f"/t{number}" for number in range(count))
             with self._served(Kiosk(), topics) as (server, _):
                 return self._measure(count, server, topics, HZ)
 
-        return [one(count) for count in self._some(TOPICS)]
+        return [point(count) for count in self._some(TOPICS)]
 
     def rate(self) -> Points:
         with self._served(Kiosk(), (TOPIC,)) as (server, _):
@@ -63,11 +63,11 @@ class Growth:
             return [self._measure(size, server, (TOPIC,), HZ, size=size) for size in self._some(SIZES)]
 
     def widgets(self) -> Points:
-        def one(count: int) -> Point:
+        def point(count: int) -> Point:
             with self._served(Kiosk(widgets=count), (TOPIC,)) as (server, _):
                 return self._measure(count, server, (TOPIC,), HZ)
 
-        return [one(count) for count in self._some(WIDGETS)]
+        return [point(count) for count in self._some(WIDGETS)]
 
     def clients(self) -> Points:
         points: Points = []
@@ -78,7 +78,7 @@ class Growth:
         return points
 
     def robots(self) -> Points:
-        def one(count: int) -> Point:
+        def point(count: int) -> Point:
             ids = [f"robot{number}" for number in range(1, count + 1)]
             ways = [f"/{name}" for name in ids]
             locators = self._rig.robot("robots", namespaces=ways)
@@ -89,7 +89,7 @@ class Growth:
                 return self._measure(count, server, (TOPIC,), HZ, ways=ways)
 
         try:
-            return [one(count) for count in self._some(ROBOTS)]
+            return [point(count) for count in self._some(ROBOTS)]
         finally:
             self._rig.robot("robots", namespaces=[])
 

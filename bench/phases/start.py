@@ -18,25 +18,25 @@ def start(rig: Rig, peer: Peer) -> dict[str, Any]:
     The page is loaded with an empty browser cache."""
     with scratch(peer) as folder:
         with _started(rig, peer, folder) as (_, first):
-            found: dict[str, Any] = {f"first_{name}": seconds for name, seconds in first.items()}
+            figures: dict[str, Any] = {f"first_{name}": seconds for name, seconds in first.items()}
         with _started(rig, peer, folder) as (server, second):
-            found |= second
+            figures |= second
             rig.robot("repeat", way=peer.robot, values=[True], period_s=SAID_EVERY_S)
             time.sleep(2 * SAID_EVERY_S)
-            found["html_ms"] = 1000 * _spent(lambda: _get(server.url))
-            found["shown_ms"], found["bytes"] = rig.chromium.load(server.url, peer.shown)
-        return found
+            figures["html_ms"] = 1000 * _spent(lambda: _get(server.url))
+            figures["shown_ms"], figures["bytes"] = rig.chromium.load(server.url, peer.shown)
+        return figures
 
 
 @contextmanager
 def _started(rig: Rig, peer: Peer, folder: Path) -> Iterator[tuple[Running, dict[str, float]]]:
     began = time.monotonic()
     with rig.running(peer, folder=folder) as server:
-        found = {"answers_s": rig.started_s}
+        figures = {"answers_s": rig.started_s}
         if peer.id == "kiosk":  # the other peers have no readiness check
             until_answers(server.url + "readyz", lambda: True)
-            found["ready_s"] = time.monotonic() - began
-        yield server, found
+            figures["ready_s"] = time.monotonic() - began
+        yield server, figures
 
 
 def _spent(do: Callable[[], object]) -> float:

@@ -43,7 +43,7 @@ def toggles_matched(
     `slack_ms` is the tolerance between the clocks.
     """
     left = deque(shown)
-    found: list[float] = []
+    delays: list[float] = []
     for turn, (at, value) in enumerate(said):
         while left and left[0][0] < at - slack_ms:  # of a change that counts as lost
             left.popleft()
@@ -51,8 +51,8 @@ def toggles_matched(
         again = said[turn + 2][0] if turn + 2 < len(said) else math.inf
         if not left or (missing > 0 and left[0][0] >= again - slack_ms) or left[0][1] != value:
             continue
-        found.append(left.popleft()[0] - at)
-    return Matched(tuple(found), len(said) - len(found))
+        delays.append(left.popleft()[0] - at)
+    return Matched(tuple(delays), len(said) - len(delays))
 
 
 def presses_matched(

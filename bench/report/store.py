@@ -50,9 +50,9 @@ class Store:
         rounds[turn][name] = {key: _rounded(figure) for key, figure in figures.items()}
         self._save()
 
-    def fault(self, where: str, what: str) -> None:
-        print(f"{where}: {what}", file=sys.stderr, flush=True)
-        self.results["faults"][where] = what.strip().splitlines()[0][:300]
+    def fault(self, where: str, error: str) -> None:
+        print(f"{where}: {error}", file=sys.stderr, flush=True)
+        self.results["faults"][where] = error.strip().splitlines()[0][:300]
         self._save()
 
     @contextmanager
@@ -73,8 +73,8 @@ class Store:
 def figure(results: Results, phase: str, peer: str, name: str) -> float:
     """The median over the rounds; NaN if it was not measured."""
     rounds = results.get(phase, {}).get("rounds", [])
-    found = [of[peer][name] for of in rounds if name in of.get(peer, {})]
-    return median([one for one in found if one is not None])
+    values = [figures[peer][name] for figures in rounds if name in figures.get(peer, {})]
+    return median([value for value in values if value is not None])
 
 
 def _rounded(value: Any) -> Any:
@@ -82,7 +82,7 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.4g}") if math.isfinite(value) else None
     if isinstance(value, (list, tuple)):
-        return [_rounded(one) for one in value]
+        return [_rounded(item) for item in value]
     return value
 
 

@@ -83,35 +83,37 @@ def noise(results: Results) -> str:
 
 def _doubt(results: Results) -> float:
     rounds = results.get("down", {}).get("rounds", [])
-    return max((of["doubt_ms"] for peers in rounds for of in peers.values()), default=math.nan)
+    return max(
+        (figures["doubt_ms"] for peers in rounds for figures in peers.values()), default=math.nan
+    )
 
 
 def main_table(results: Results, titles: Titles) -> str:
-    def of(phase: str, name: str, shape: str = ".2f", per: float = 1.0) -> Cell:
+    def cell_of(phase: str, name: str, shape: str = ".2f", per: float = 1.0) -> Cell:
         return lambda peer: number(figure(results, phase, peer, name) / per, shape)
 
     def several(*cells: Cell) -> Cell:
         return lambda peer: slashed(cell(peer) for cell in cells)
 
     columns: Mapping[str, Cell] = {
-        "put → DOM": several(of("down", "p50"), of("down", "p99")),
-        "ROS put → bridge → DOM": several(of("bridge", "p50"), of("bridge", "p99")),
-        "released → robot": several(of("up", "p50"), of("up", "p99")),
-        "start s": of("start", "answers_s"),
-        "page kB": of("start", "bytes", ".0f", 1000),
-        "page shown ms": of("start", "shown_ms", ".0f"),
-        "memory MiB": of("cost", "rest_mib", ".0f"),
+        "put → DOM": several(cell_of("down", "p50"), cell_of("down", "p99")),
+        "ROS put → bridge → DOM": several(cell_of("bridge", "p50"), cell_of("bridge", "p99")),
+        "released → robot": several(cell_of("up", "p50"), cell_of("up", "p99")),
+        "start s": cell_of("start", "answers_s"),
+        "page kB": cell_of("start", "bytes", ".0f", 1000),
+        "page shown ms": cell_of("start", "shown_ms", ".0f"),
+        "memory MiB": cell_of("cost", "rest_mib", ".0f"),
         "server idle / 100 Hz / 1 kHz": several(
-            *(of("cost", f"server_{hz}", ".1f") for hz in (0, 100, 1000))
+            *(cell_of("cost", f"server_{hz}", ".1f") for hz in (0, 100, 1000))
         ),
-        "server 100 × 50 Hz": of("cost", "server_wide", ".0f"),
-        "browser 1 kHz": of("cost", "browser_1000", ".0f"),
+        "server 100 × 50 Hz": cell_of("cost", "server_wide", ".0f"),
+        "browser 1 kHz": cell_of("cost", "browser_1000", ".0f"),
     }
     return peers_table(columns, titles)
 
 
 def load_table(results: Results, titles: Titles) -> str:
-    def of(load: str) -> Cell:
+    def cell_of(load: str) -> Cell:
         names = {"server": ".1f", "browser": ".1f", "rss": ".0f"}
         return lambda peer: slashed(
             number(figure(results, "cost", peer, f"{name}_{load}"), shape)
@@ -119,7 +121,7 @@ def load_table(results: Results, titles: Titles) -> str:
         )
 
     loads = {"idle": "0", "100 Hz": "100", "1 kHz": "1000", "100 topics × 50 Hz": "wide"}
-    table = peers_table({title: of(load) for title, load in loads.items()}, titles)
+    table = peers_table({title: cell_of(load) for title, load in loads.items()}, titles)
     return table and f"Server CPU % / browser CPU % / server MiB\n\n{table}"
 
 
@@ -141,32 +143,32 @@ def crowd_table(results: Results, titles: Titles) -> str:
 
 
 def stalled_table(results: Results, titles: Titles) -> str:
-    def of(name: str, shape: str) -> Cell:
+    def cell_of(name: str, shape: str) -> Cell:
         return lambda peer: number(figure(results, "stalled", peer, name), shape)
 
     columns = {
-        "server grows, MiB": of("grown_mib", ".1f"),
-        "others before, p50": of("before_p50", ".1f"),
-        "p99": of("before_p99", ".1f"),
-        "during the stall, p50": of("during_p50", ".1f"),
-        "p99 then": of("during_p99", ".1f"),
-        "age of the first value shown after, ms": of("first_ms", ".0f"),
-        "old values shown": of("old", ".0f"),
+        "server grows, MiB": cell_of("grown_mib", ".1f"),
+        "others before, p50": cell_of("before_p50", ".1f"),
+        "p99": cell_of("before_p99", ".1f"),
+        "during the stall, p50": cell_of("during_p50", ".1f"),
+        "p99 then": cell_of("during_p99", ".1f"),
+        "age of the first value shown after, ms": cell_of("first_ms", ".0f"),
+        "old values shown": cell_of("old", ".0f"),
     }
     return peers_table(columns, titles)
 
 
 def start_table(results: Results, titles: Titles) -> str:
-    def of(name: str, shape: str) -> Cell:
+    def cell_of(name: str, shape: str) -> Cell:
         return lambda peer: number(figure(results, "start", peer, name), shape)
 
     columns = {
-        "process → HTTP 200, s": of("answers_s", ".2f"),
-        "→ commands reach the robot, s": of("ready_s", ".2f"),
-        "the first time, s": of("first_ready_s", ".2f"),
-        "page's answer, ms": of("html_ms", ".1f"),
-        "request → state shown, ms": of("shown_ms", ".0f"),
-        "bytes": of("bytes", ",.0f"),
+        "process → HTTP 200, s": cell_of("answers_s", ".2f"),
+        "→ commands reach the robot, s": cell_of("ready_s", ".2f"),
+        "the first time, s": cell_of("first_ready_s", ".2f"),
+        "page's answer, ms": cell_of("html_ms", ".1f"),
+        "request → state shown, ms": cell_of("shown_ms", ".0f"),
+        "bytes": cell_of("bytes", ",.0f"),
     }
     return peers_table(columns, titles)
 
@@ -174,22 +176,26 @@ def start_table(results: Results, titles: Titles) -> str:
 def growth_table(results: Results) -> str:
     rows = [
         [
-            one.axis.text,
-            ", ".join(f"{x:g}" for x in one.xs),
-            ", ".join(f"{y:.1f}" for y in one.cpu),
-            f"{one.cpu_slope.per_unit * one.axis.per:.3g} per {one.axis.unit}",
-            ", ".join(f"{y:.0f}" for y in one.mib),
-            f"{one.mib_slope.per_unit * one.axis.per * 1024:.3g} KiB per {one.axis.unit}",
-            _linear(one),
+            growth.axis.text,
+            ", ".join(f"{x:g}" for x in growth.xs),
+            ", ".join(f"{y:.1f}" for y in growth.cpu),
+            f"{growth.cpu_slope.per_unit * growth.axis.per:.3g} per {growth.axis.unit}",
+            ", ".join(f"{y:.0f}" for y in growth.mib),
+            f"{growth.mib_slope.per_unit * growth.axis.per * 1024:.3g} KiB per {growth.axis.unit}",
+            _linear(growth),
         ]
-        for one in grown(results)
+        for growth in grown(results)
     ]
     head = ["what grows", "at", "server CPU %", "slope", "MiB", "slope", "linear or better"]
     return table([head, *rows]) if rows else ""
 
 
-def _linear(one: Grown) -> str:
-    worse = [what for what, of in (("CPU", one.cpu_slope), ("memory", one.mib_slope)) if not of.linear]
+def _linear(growth: Grown) -> str:
+    worse = [
+        noun
+        for noun, slope in (("CPU", growth.cpu_slope), ("memory", growth.mib_slope))
+        if not slope.linear
+    ]
     return f"no: {', '.join(worse)}" if worse else "yes"
 
 
@@ -200,7 +206,7 @@ def targets_table(results: Results) -> str:
 
 
 def faults(results: Results, titles: Titles) -> str:
-    lines = [f"- {titles.get(where, where)}: {what}" for where, what in results["faults"].items()]
+    lines = [f"- {titles.get(where, where)}: {error}" for where, error in results["faults"].items()]
     return "\n".join(lines)
 
 

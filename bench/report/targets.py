@@ -33,9 +33,9 @@ def targets(results: Results) -> list[Target]:
 def best_rival(results: Results, phase: str, name: str) -> tuple[str, float]:
     """(id, value) of the best peer besides this panel and the floor; ("", NaN) without one."""
     rounds = results.get(phase, {}).get("rounds", [])
-    peers = {peer for of in rounds for peer in of} - {KIOSK, FLOOR, FLOOR_AGAIN}
-    found = [(figure(results, phase, peer, name), peer) for peer in sorted(peers)]
-    known = [one for one in found if not math.isnan(one[0])]
+    peers = {peer for figures in rounds for peer in figures} - {KIOSK, FLOOR, FLOOR_AGAIN}
+    rivals = [(figure(results, phase, peer, name), peer) for peer in sorted(peers)]
+    known = [rival for rival in rivals if not math.isnan(rival[0])]
     value, peer = min(known, default=(math.nan, ""))
     return peer, value
 
@@ -63,9 +63,9 @@ def _costs(results: Results) -> Iterator[Target]:
     yield _below("1 kHz on a topic: server", cost("server_1000"), 4, "% of a core")
     yield _below("1 kHz on a topic: browser", cost("browser_1000"), 4, "% of a core")
     yield _below("100 topics × 50 Hz: server", cost("server_wide"), 20, "% of a core")
-    for name, what in (("p99", "p99"), ("crowd", "server's CPU")):
+    for name, noun in (("p99", "p99"), ("crowd", "server's CPU")):
         of_plain = ratio(cost(f"{name}_{CROWD}"), cost(f"{name}_{CROWD}", PLAIN))
-        yield _times(f"{CROWD} clients at 10 Hz: {what}, of the plain way's", of_plain, 1.0)
+        yield _times(f"{CROWD} clients at 10 Hz: {noun}, of the plain way's", of_plain, 1.0)
     fewest = min(results.get("sizes", {}).get("crowds", [1]))
     each = (cost(f"mib_{CROWD}") - cost(f"mib_{fewest}")) * MB_PER_MIB * 1000 / (CROWD - fewest)
     yield _below(f"{CROWD} clients: memory of each", each, 60, "kB")
@@ -151,7 +151,7 @@ def grown(results: Results) -> list[Grown]:
 def _grown(axis: Axis, points: list[list[float]]) -> Grown:
     xs, cpu, mib, noise = (tuple(column) for column in zip(*points, strict=True))
 
-    def of(ys: tuple[float, ...], doubt: float) -> Slope:
+    def fitted(ys: tuple[float, ...], doubt: float) -> Slope:
         return slope(list(zip(xs, ys, strict=True)), doubt)
 
-    return Grown(axis, xs, cpu, mib, of(cpu, max(noise)), of(mib, NOISE_MIB))
+    return Grown(axis, xs, cpu, mib, fitted(cpu, max(noise)), fitted(mib, NOISE_MIB))

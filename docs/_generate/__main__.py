@@ -45,9 +45,9 @@ def filled(text: str, parts: Mapping[str, str], name: str) -> str:
     """The page with its parts; ValueError where it has no place for one."""
     for part, made in parts.items():
         begin, end = f"<!-- {part} -->\n", f"<!-- /{part} -->\n"
-        before, found, rest = text.partition(begin)
+        before, marker, rest = text.partition(begin)
         _, ended, after = rest.partition(end)
-        if not found or not ended:
+        if not marker or not ended:
             raise ValueError(f"{name} has no section between {begin.strip()} and {end.strip()}")
         text = f"{before}{begin}{made}\n{end}{after}"
     return text

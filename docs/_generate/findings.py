@@ -23,4 +23,4 @@ def _table(severity: str) -> str:
 def _shown(sentence: str) -> str:
     """With `…` for the name that it is about, and names of the other parameters in italics."""
     text = sentence.replace("{about}", "…").replace("{hint}", "")
-    return re.sub(r"\{(\w+)\}", lambda found: f"*{found[1].replace('_', ' ')}*", text)
+    return re.sub(r"\{(\w+)\}", lambda match: f"*{match[1].replace('_', ' ')}*", text)

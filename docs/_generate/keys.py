@@ -31,11 +31,11 @@ def key_tables() -> dict[str, str]:
 
 def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     """A value of every key, by "table.key": those of tests/everything.toml, then those of our own."""
-    found: dict[str, Any] = {}
+    examples: dict[str, Any] = {}
 
     def walk(name: str, table: Mapping[str, Any]) -> None:
         for key, value in table.items():
-            found.setdefault(f"{name}.{key}", value)
+            examples.setdefault(f"{name}.{key}", value)
             inner = value if isinstance(value, list) else [value]
             if _by_name(tables[name]["properties"].get(key, {})):
                 inner = list(value.values())
@@ -45,7 +45,7 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))
     own: dict[str, Any] = WORDS["examples"]
-    return found | own
+    return examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:
@@ -123,5 +123,5 @@ def toml(value: Any) -> str:
         case list():
             return f"[{', '.join(map(toml, value))}]"
         case dict():
-            return f"{{ {', '.join(f'{key} = {toml(one)}' for key, one in value.items())} }}"
+            return f"{{ {', '.join(f'{key} = {toml(item)}' for key, item in value.items())} }}"
     return f"{value}"

@@ -25,8 +25,8 @@ COLUMNS: Final = ("What the panel says", "Code", "What to do")
 def lock_tables() -> dict[str, str]:
     """The Markdown of each group, by its name, and of the links to other languages."""
     links = ", ".join(f"[{own_name(tag)}](locks.{tag}.md)" for tag in translations())
-    found = {f"locks {group}": _table(codes) for group, codes in groups(ADVICE).items()}
-    return {"locks languages": f"In other languages: {links}." if links else ""} | found
+    tables = {f"locks {group}": _table(codes) for group, codes in groups(ADVICE).items()}
+    return {"locks languages": f"In other languages: {links}." if links else ""} | tables
 
 
 def groups(advice: Mapping[str, Any]) -> dict[str, Mapping[str, str]]:

@@ -29,10 +29,10 @@ GALLERY: Final = PROJECT / "app/web/gallery"
 @cache
 def modules() -> dict[Path, ast.Module]:
     """Every module of `app/` but the catalogue of sentences, and the gallery, which shows examples."""
-    found = sorted((PROJECT / "app").rglob("*.py"))
+    paths = sorted((PROJECT / "app").rglob("*.py"))
     return {
         path: ast.parse(path.read_text(encoding="utf-8"))
-        for path in found
+        for path in paths
         if not {CATALOGUE, GALLERY} & {*path.parents}
     }
 
@@ -50,8 +50,8 @@ def place(path: Path) -> str:
 def paths_table() -> str:
     """Each path of HTTP, with the function that answers."""
     rows = [("Path", "Function", "File"), ("---",) * 3]
-    for path, found in nodes().items():
-        for node in found:
+    for path, module_nodes in nodes().items():
+        for node in module_nodes:
             if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef):
                 rows += [(f"`{route}`", f"`{node.name}`", place(path)) for route in _routes(node)]
     return _markdown(sorted(rows[2:]), rows[:2])
@@ -81,19 +81,19 @@ def _slug(name: str) -> str:
 
 def models() -> dict[str, type[BaseModel]]:
     """The classes of the tables, by the names that the file gives them."""
-    found: dict[str, type[BaseModel]] = {ROOT: Panel}
+    known: dict[str, type[BaseModel]] = {ROOT: Panel}
 
     def walk(model: type[BaseModel]) -> None:
         for key, field in model.model_fields.items():
             for inner in _models_in(field.annotation):
                 kind = inner.model_fields.get("kind")
                 name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
-                if name not in found:
-                    found[name] = inner
+                if name not in known:
+                    known[name] = inner
                     walk(inner)
 
     walk(Panel)
-    return found
+    return known
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -103,8 +103,8 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models_in(inner)
 
 
-def _file_of(of: type) -> str:
-    return place(Path(inspect.getfile(of)))
+def _file_of(model: type) -> str:
+    return place(Path(inspect.getfile(model)))
 
 
 def sentences_table() -> str:
@@ -115,7 +115,7 @@ def sentences_table() -> str:
         # A code that comes by a variable and is an ordinary word is only somewhere in the text.
         named = saying or [path for path, texts in _texts().items() if code in texts]
         rows.append((shown(SENTENCES[code]), f"`{code}`", ", ".join(map(place, named))))
-    return _markdown(rows, [("Sentence", "Code", "HoldMessage in"), ("---",) * 3])
+    return _markdown(rows, [("Sentence", "Code", "Used in"), ("---",) * 3])
 
 
 @cache
@@ -124,25 +124,25 @@ def _texts() -> dict[Path, frozenset[str]]:
     return {
         path: frozenset(
             node.value
-            for node in found
+            for node in module_nodes
             if isinstance(node, ast.Constant) and isinstance(node.value, str)
         )
-        for path, found in nodes().items()
+        for path, module_nodes in nodes().items()
     }
 
 
 @cache
 def _said() -> dict[Path, frozenset[str]]:
     """The codes that each module names; "lamp_*" for those that it puts together."""
-    return {path: frozenset(_codes(found)) for path, found in nodes().items()}
+    return {path: frozenset(_codes(module_nodes)) for path, module_nodes in nodes().items()}
 
 
 def _says(names: frozenset[str], code: str) -> bool:
     return code in names or any(name[-1] == "*" and code.startswith(name[:-1]) for name in names)
 
 
-def _codes(found: Iterable[ast.AST]) -> Iterator[str]:
-    for node in found:
+def _codes(module_nodes: Iterable[ast.AST]) -> Iterator[str]:
+    for node in module_nodes:
         match node:
             case ast.Constant(value=str(code)) if "_" in code and code in SENTENCES:
                 yield code

@@ -82,27 +82,27 @@ def panel_schema() -> Schema:
         "title": "A panel file",
         **tables[ROOT],
     }
-    found: Schema = _renamed(whole | {"definitions": dict(sorted(by_name.items()))}, names)
-    return found
+    renamed: Schema = _renamed(whole | {"definitions": dict(sorted(by_name.items()))}, names)
+    return renamed
 
 
 def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, Schema]:
     """The tables by the names that the file gives them: a widget's is its kind."""
-    found = {ROOT: root}
+    known = {ROOT: root}
 
     def walk(table: Schema) -> None:
         for key, prop in table["properties"].items():
             for ref in _refs(prop):
                 inner = definitions[ref.removeprefix(REF)]
                 name = of_kind(inner["properties"].get("kind", {}).get("const")) or key
-                if name not in found:
-                    found[name] = inner
+                if name not in known:
+                    known[name] = inner
                     walk(inner)
-                elif found[name] is not inner:
+                elif known[name] is not inner:
                     raise ValueError(f'two tables that differ are called "{name}"')
 
     walk(root)
-    return found
+    return known
 
 
 def of_kind(kind: str | None) -> str | None:
@@ -114,15 +114,15 @@ def kinds_of(tables: Mapping[str, Schema]) -> dict[str, Schema]:
     return {name: table for name, table in tables.items() if "kind" in table["properties"]}
 
 
-def _refs(of: Any) -> Iterator[str]:
-    if isinstance(of, Mapping):
-        if "$ref" in of:
-            yield of["$ref"]
-        for key, value in of.items():
+def _refs(node: Any) -> Iterator[str]:
+    if isinstance(node, Mapping):
+        if "$ref" in node:
+            yield node["$ref"]
+        for key, value in node.items():
             if key != "discriminator":
                 yield from _refs(value)
-    elif isinstance(of, list):
-        for value in of:
+    elif isinstance(node, list):
+        for value in node:
             yield from _refs(value)
 
 
@@ -146,7 +146,7 @@ def about(table: str, key: str) -> str:
 def _plain(table: str, key: str, prop: Schema) -> Schema:
     """Without null, which TOML does not have, and without titles that repeat the key."""
     made = {name: value for name, value in prop.items() if name != "title"}
-    one_of = [one for one in made.pop("anyOf", []) if one != {"type": "null"}]
+    one_of = [option for option in made.pop("anyOf", []) if option != {"type": "null"}]
     if {"type": "integer"} in one_of and {"type": "number"} in one_of:
         one_of.remove({"type": "integer"})
     made |= one_of[0] if len(one_of) == 1 else {"anyOf": one_of} if one_of else {}
@@ -166,9 +166,9 @@ def _plain(table: str, key: str, prop: Schema) -> Schema:
     return made
 
 
-def _one_or_more(one: Schema) -> Schema:
-    several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
-    return {"anyOf": [one, several]}
+def _one_or_more(schema: Schema) -> Schema:
+    several = {"type": "array", "items": schema, "minItems": 1, "uniqueItems": True}
+    return {"anyOf": [schema, several]}
 
 
 def _widget(kinds: Mapping[str, Schema]) -> Schema:
@@ -208,9 +208,9 @@ def _any_of(props: list[Schema]) -> Schema:
     return {"description": "\n\n".join(texts), **(bare[0] if len(bare) == 1 else {"anyOf": bare})}
 
 
-def _renamed(of: Any, names: Mapping[str, str]) -> Any:
-    if isinstance(of, list):
-        return [_renamed(value, names) for value in of]
-    if not isinstance(of, dict):
-        return of
-    return {key: names.get(v, v) if key == "$ref" else _renamed(v, names) for key, v in of.items()}
+def _renamed(node: Any, names: Mapping[str, str]) -> Any:
+    if isinstance(node, list):
+        return [_renamed(value, names) for value in node]
+    if not isinstance(node, dict):
+        return node
+    return {key: names.get(v, v) if key == "$ref" else _renamed(v, names) for key, v in node.items()}

@@ -110,7 +110,7 @@ class Cell:
         self.engine.evaluate()
 
     def publish_entries(self, alarm: str, *rows: tuple[object, ...]) -> None:
-        described = next(one for one in self.panel.alarms if one.id == alarm)
+        described = next(definition for definition in self.panel.alarms if definition.id == alarm)
         self.engine.entries_received("", alarm, entries_of(described, rows), self.now)
         self.engine.evaluate()
 

@@ -35,8 +35,8 @@ FREE = Limits(required=False)
 
 def kinds(folder: Path) -> list[tuple[str, str, str]]:
     """(kind, press, outcome), the oldest first."""
-    found = [row.entry for row in rows(folder, Filter(every=True), None, 10_000)]
-    return [(entry.kind, entry.press, entry.outcome) for entry in reversed(found)]
+    entries = [row.entry for row in rows(folder, Filter(every=True), None, 10_000)]
+    return [(entry.kind, entry.press, entry.outcome) for entry in reversed(entries)]
 
 
 async def until_commits(disk: "Disk", count: int) -> None:
@@ -331,12 +331,12 @@ def test_damage_while_it_runs_begins_a_new_log_whose_numbers_go_on(tmp_path: Pat
     run(tmp_path, work)
     (aside,) = tmp_path.glob("*damaged*.sqlite3")
     assert aside.stat().st_size > 0
-    found = [row.entry for row in rows(tmp_path, Filter(every=True), None, 10)]
-    assert [(e.seq, e.kind, e.of) for e in reversed(found)][:2] == [
+    entries = [row.entry for row in rows(tmp_path, Filter(every=True), None, 10)]
+    assert [(e.seq, e.kind, e.of) for e in reversed(entries)][:2] == [
         (3, "began", None),
         (4, "closed", 2),
     ]
-    assert aside.name in found[-1].reason
+    assert aside.name in entries[-1].reason
     assert verify(tmp_path).fault == ""
 
 

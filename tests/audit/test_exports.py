@@ -223,11 +223,11 @@ def test_one_export_at_a_time_and_it_is_whole(kiosk: Server) -> None:
 
 
 def children(kiosk: Server) -> list[int]:
-    found: list[int] = []
+    pids: list[int] = []
     for task in Path(f"/proc/{kiosk.process.pid}/task/").iterdir():
         with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
-            found += map(int, (task / "children").read_text().split())
-    return found
+            pids += map(int, (task / "children").read_text().split())
+    return pids
 
 
 def test_an_export_that_breaks_off_is_not_taken_for_whole(kiosk: Server) -> None:
@@ -349,9 +349,9 @@ def test_a_search_that_takes_long_is_done_by_another_process(
     large(tmp_path, 100)
 
     async def work(log: OperatorLog) -> None:
-        found = await log.rows(Filter(text="number 3"), 90, 3)
-        assert [row.entry.seq for row in found] == [79, 77, 75]
-        assert found == queries.rows(tmp_path, Filter(text="number 3"), 90, 3)
+        matching = await log.rows(Filter(text="number 3"), 90, 3)
+        assert [row.entry.seq for row in matching] == [79, 77, 75]
+        assert matching == queries.rows(tmp_path, Filter(text="number 3"), 90, 3)
         log.close()
         with pytest.raises(LogError, match="shutting down"):
             await log.rows(Filter(), None, 3)

@@ -77,11 +77,11 @@ def test_no_press_is_sent_when_the_log_is_gone_and_a_new_one_says_so(
 
     run(folder, work)
     (head,) = heads
-    found = entries(folder)
-    assert (found[0].kind, found[0].prev) == ("began", head.hash)
-    assert json.loads(found[0].values) == {"first": found[0].seq} == {"first": head.seq + 1}
-    assert f"up to entry {head.seq}, was removed or renamed" in found[0].reason
-    assert [(e.kind, e.press) for e in found[1:]] == [
+    written = entries(folder)
+    assert (written[0].kind, written[0].prev) == ("began", head.hash)
+    assert json.loads(written[0].values) == {"first": written[0].seq} == {"first": head.seq + 1}
+    assert f"up to entry {head.seq}, was removed or renamed" in written[0].reason
+    assert [(e.kind, e.press) for e in written[1:]] == [
         ("closed", "p1"),
         ("resumed", ""),
         ("pressed", "p3"),
@@ -102,9 +102,9 @@ def test_what_was_renamed_has_all_that_was_written(tmp_path: Path) -> None:
     apart = tmp_path / "apart"
     apart.mkdir()
     (tmp_path / LOGROTATE).rename(apart / NAME)
-    found = verify(apart)
-    assert (found.fault, found.count) == ("", 41)
-    assert verify(tmp_path, found.head).fault == ""
+    verified = verify(apart)
+    assert (verified.fault, verified.count) == ("", 41)
+    assert verify(tmp_path, verified.head).fault == ""
 
 
 def test_what_stands_in_the_place_of_the_log_is_kept(tmp_path: Path) -> None:
@@ -130,8 +130,8 @@ def test_a_file_that_belongs_to_the_log_is_made_again_and_nothing_is_lost(tmp_pa
         await log.pressed(pressed(2))
 
     run(tmp_path, work)
-    found = verify(tmp_path)
-    assert (found.fault, found.count) == ("", 5)
+    verified = verify(tmp_path)
+    assert (verified.fault, verified.count) == ("", 5)
     assert f"{WAL} was removed or renamed" in entries(tmp_path)[3].reason
 
 

@@ -73,10 +73,10 @@ def test_nothing_is_lost_by_kills_under_presses(
         server = live(bridge.endpoint, tmp_path, KIOSK_DATA=str(data))
         killed_under_presses(server, node, chance, receipts)
     last = servers(live(bridge.endpoint, tmp_path, KIOSK_DATA=str(data)))
-    found = verify(data)
-    assert found.fault == "", seed
+    verified = verify(data)
+    assert verified.fault == "", seed
     entries = all_entries(data)
-    assert found.count == len(entries)
+    assert verified.count == len(entries)
     pressed = {entry.press: entry for entry in entries if entry.kind == "pressed"}
     closed = {entry.press: entry for entry in entries if entry.kind == "closed"}
     assert len(receipts) >= KILLS

@@ -93,38 +93,38 @@ def continued(folder: Path, press_id: str = "p3", reason: Text = PUBLISHED) -> N
 
 
 def entries(folder: Path, **wanted: Any) -> list[Entry]:
-    found = rows(folder, Filter(every=True, **wanted), None, 100)
-    return [row.entry for row in reversed(found)]
+    newest_first = rows(folder, Filter(every=True, **wanted), None, 100)
+    return [row.entry for row in reversed(newest_first)]
 
 
 def test_an_old_file_is_read_and_verified_as_it_is(folder: Path) -> None:
-    found = entries(folder)
-    assert [(one.seq, one.reason, one.text) for one in found][2] == (3, SENT, "")
-    assert found[2].reason_text == SENT
+    read = entries(folder)
+    assert [(entry.seq, entry.reason, entry.text) for entry in read][2] == (3, SENT, "")
+    assert read[2].reason_text == SENT
     assert (verify(folder).count, verify(folder).fault) == (4, "")
     (unended,) = open_presses(folder, "", ["say"], 0)
     assert (unended.press.press, unended.reason, unended.code) == ("p2", "", "")
 
 
 def test_an_old_file_is_opened_continued_and_verified(folder: Path) -> None:
-    before = [tuple(one) for one in entries(folder)]
+    before = [tuple(entry) for entry in entries(folder)]
     continued(folder)
-    found = entries(folder)
-    assert [tuple(one) for one in found[:4]] == before
-    assert (verify(folder).count, verify(folder).fault) == (len(found), "")
-    assert {one.text for one in found[:4]} == {""}
-    assert [json.loads(one.text)["code"] for one in found[4:] if one.reason] == [
+    read = entries(folder)
+    assert [tuple(entry) for entry in read[:4]] == before
+    assert (verify(folder).count, verify(folder).fault) == (len(read), "")
+    assert {entry.text for entry in read[:4]} == {""}
+    assert [json.loads(entry.text)["code"] for entry in read[4:] if entry.reason] == [
         "press_unknown_server_ended",
         "log_began",
         "published",
     ]
-    said = found[-1].reason_text
+    said = read[-1].reason_text
     assert isinstance(said, Text)
     assert said == say("published", topic="/say", time="11:00:00")
-    assert found[-1].reason == str(said)
-    assert [one.seq for one in entries(folder, text="Sent on /say")] == [3, found[-1].seq]
+    assert read[-1].reason == str(said)
+    assert [entry.seq for entry in entries(folder, text="Sent on /say")] == [3, read[-1].seq]
     continued(folder, "p4")
-    assert (verify(folder).count, verify(folder).fault) == (len(found) + 3, "")
+    assert (verify(folder).count, verify(folder).fault) == (len(read) + 3, "")
 
 
 def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
@@ -133,7 +133,7 @@ def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
     continued(folder)
     (tmp_path / "de.po").write_text('msgid "published"\nmsgstr "Gesendet auf {topic}, {time}."\n')
     with catalogues_in(tmp_path):
-        old, new = (one for one in entries(folder) if one.outcome == "published")
+        old, new = (entry for entry in entries(folder) if entry.outcome == "published")
         assert (old.reason_in("de"), old.reason_in("en")) == (SENT, SENT)
         assert (new.reason_in("de"), new.reason_in("en")) == (
             "Gesendet auf /say, 11:00:00.",
@@ -189,7 +189,7 @@ def test_a_code_that_was_changed_is_found(folder: Path, change: str, seq: int) -
 def test_an_entry_whose_code_this_version_does_not_know_is_shown_as_it_was_written() -> None:
     strange = new_entry("refused", reason="As it was.")._replace(text='{"code": "gone", "params": {}}')
     broken = strange._replace(text='{"code": 1')
-    assert [one.reason_in("xx") for one in (strange, broken)] == ["As it was."] * 2
+    assert [entry.reason_in("xx") for entry in (strange, broken)] == ["As it was."] * 2
 
 
 @pytest.mark.parametrize("language", ["en", "ja", "de"])

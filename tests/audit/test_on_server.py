@@ -185,8 +185,8 @@ def test_a_second_worker_does_not_start(tmp_path: Path) -> None:
 
 def test_the_head_is_said_at_the_start_and_on_the_page(demo: Server) -> None:
     until(lambda: "operator's log: " in demo.process.text, "the head is logged")
-    found = re.search(r"operator's log: (\d+) entries, head ([0-9a-f]{64})", demo.process.text)
-    assert found
+    match = re.search(r"operator's log: (\d+) entries, head ([0-9a-f]{64})", demo.process.text)
+    assert match
     demo.press("operation", "for the head")
     head = verify(demo.data)
     assert f"{head.count} entries, head <code>{head.head}</code>" in demo.http.get("/log").text

@@ -323,7 +323,9 @@ def test_a_flood_on_a_server(demo: Server) -> None:
     for _ in range(ENOUGH):
         assert demo.press("drive", inputs={"speed": 99}).status_code == 422
     for _ in range(20):
-        said = until(lambda: (one := held())["status"] != 429 and one, "there is room for a hold")
+        said = until(
+            lambda: (response := held())["status"] != 429 and response, "there is room for a hold"
+        )
         assert (said["state"], said["status"]) == ("refused", 422)
         assert "Speed is 99" in said["reason"]
     left_out = ENOUGH + 20 - OF_BROWSER.burst

@@ -51,13 +51,13 @@ def read(folder: Path, **wanted: Any) -> list[Entry]:
 
 def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> None:
     (written,) = store.append([pressed()])
-    (found,) = read(tmp_path)
-    assert found == written
-    assert (found.seq, found.boot, found.address, found.who, found.seen) == (
+    (entry,) = read(tmp_path)
+    assert entry == written
+    assert (entry.seq, entry.boot, entry.address, entry.who, entry.seen) == (
         1, "boot1", "10.0.0.7", "Kim", "boot-7",
     )  # fmt: skip
-    assert abs(found.at - time.time() * 1000) < 5000
-    assert found.hash == found.computed_hash()
+    assert abs(entry.at - time.time() * 1000) < 5000
+    assert entry.hash == entry.computed_hash()
 
 
 @pytest.mark.parametrize("reason", ['Nein: "ö"\\', say("interlock_waiting", topic="/ö")])
@@ -88,8 +88,8 @@ def test_entries_go_on_in_one_chain_when_the_file_is_opened_again(tmp_path: Path
         fill(store, 2)
         head = store.head
         store.close()
-    found = verify(tmp_path)
-    assert (found.fault, found.count, found.head) == ("", 12, head.hash)
+    verified = verify(tmp_path)
+    assert (verified.fault, verified.count, verified.head) == ("", 12, head.hash)
 
 
 @pytest.mark.parametrize(
@@ -97,9 +97,9 @@ def test_entries_go_on_in_one_chain_when_the_file_is_opened_again(tmp_path: Path
 )
 def test_every_text_can_be_written_and_verified(store: Store, tmp_path: Path, text: str) -> None:
     store.append([new_entry("refused", FROM, {"message": text}, widget="w", reason=text)])
-    (found,) = read(tmp_path)
-    assert found.reason == clean_text(text)
-    assert len(found.reason) <= 510
+    (entry,) = read(tmp_path)
+    assert entry.reason == clean_text(text)
+    assert len(entry.reason) <= 510
     assert verify(tmp_path).fault == ""
 
 
@@ -305,10 +305,10 @@ def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / NAME) as db:
         db.execute("DELETE FROM entry WHERE seq = 6")
     db.close()
-    found = verify(tmp_path)
-    assert found.fault == ""
-    assert found.head != head
-    assert verify(tmp_path, found.head).fault == ""
+    verified = verify(tmp_path)
+    assert verified.fault == ""
+    assert verified.head != head
+    assert verify(tmp_path, verified.head).fault == ""
     assert main(["verify", "--data", str(tmp_path), "--head", head]) == 1
 
 
@@ -320,8 +320,8 @@ def test_old_entries_go_and_what_is_left_can_be_verified(store: Store, tmp_path:
     year_later = time.time_ns() // 1_000_000 + 366 * DAY_MS
     before = store.head
     while store.remove_old(365, 512, year_later):
-        found = verify(tmp_path)
-        assert found.fault == ""
+        verified = verify(tmp_path)
+        assert verified.fault == ""
         if store.head.count <= 2:
             break
     removed = read(tmp_path)[0]

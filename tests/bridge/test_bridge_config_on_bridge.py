@@ -57,7 +57,7 @@ def test_the_panel_works_through_it_and_nothing_else_does(
         names = ("start", "add", "count")
         until(lambda: all(kiosk.widget(name)["enabled"] for name in names), "they are open")
         pressed = {name: kiosk.press(name, inputs={}).json() for name in names}
-        assert {name: one["outcome"] for name, one in pressed.items()} == {
+        assert {name: receipt["outcome"] for name, receipt in pressed.items()} == {
             "start": "published",
             "add": "succeeded",
             "count": "accepted",

@@ -217,7 +217,7 @@ def test_calls_that_wait_hold_up_no_press(
     servers: Callable[[Server], Server],
 ) -> None:
     names = [f"wait_{n}" for n in range(3 * (BRIDGE_TRAITS.max_unanswered + 1))]
-    panel = PANEL + "".join(waiting_widget(*one) for one in enumerate(names))
+    panel = PANEL + "".join(waiting_widget(*numbered_name) for numbered_name in enumerate(names))
     kiosk = servers(live_server(cyclone_bridge, tmp_path, panel))
     robot.subscribe(topic="/said", type="std_msgs/msg/String")
     robot.answer_slow(seconds=None)
@@ -344,8 +344,8 @@ def test_a_goal_is_canceled_from_the_panel(kiosk: Server, robot: CycloneRobot) -
     assert (nothing.status_code, nothing.json()["outcome"]) == (409, "refused")
 
 
-def cancel(kiosk: Server, **given: Any) -> httpx.Response:
-    return kiosk.http.post("/widgets/count/cancel", json=given)
+def cancel(kiosk: Server, **fields: Any) -> httpx.Response:
+    return kiosk.http.post("/widgets/count/cancel", json=fields)
 
 
 def test_a_cancel_of_a_goal_that_is_over_stops_no_other(kiosk: Server, robot: CycloneRobot) -> None:
@@ -477,12 +477,12 @@ def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
 def locked_until_found(kiosk: Server) -> None:
     """A goal that was cut off: at no time another can be sent, before the robot reports it."""
 
-    def found() -> bool:
+    def unlocked() -> bool:
         shown = kiosk.widget("count")
         assert not shown["enabled"], shown
         return bool(shown["goal"] == "EXECUTING")
 
-    until(found, "it is found again")
+    until(unlocked, "it is found again")
     assert kiosk.widget("count")["stoppable"]
 
 
@@ -553,7 +553,7 @@ def test_a_late_answer_corrects_what_every_browser_shows(
     other = page.context.new_page()
     other.goto(kiosk.url)
     page.get_by_role("button", name="Slow", exact=True).click()
-    results = [one.locator('[data-widget="slow"] .result') for one in (page, other)]
+    results = [browser_page.locator('[data-widget="slow"] .result') for browser_page in (page, other)]
     for result in results:
         expect(result).to_contain_text("No response within 1 s")
         expect(result).to_have_attribute("data-outcome", "timed_out")

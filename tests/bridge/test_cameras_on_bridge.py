@@ -185,17 +185,17 @@ def test_without_scripts_the_newest_picture_is_on_the_page(
     without_scripts.goto(kiosk.url)
     picture = widget(without_scripts, "packed").locator("img")
     expect(picture).to_be_visible()
-    with without_scripts.expect_response(re.compile("/packed/frame$")) as found:
+    with without_scripts.expect_response(re.compile("/packed/frame$")) as loaded:
         without_scripts.reload()
-    assert found.value.headers["content-type"] == "image/png"
-    assert found.value.headers["x-content-type-options"] == "nosniff"
+    assert loaded.value.headers["content-type"] == "image/png"
+    assert loaded.value.headers["x-content-type-options"] == "nosniff"
 
 
 def test_a_picture_is_for_the_panels_own_pages(kiosk: Server) -> None:
-    found = kiosk.http.get("/widgets/packed/frame")
-    assert found.content == png(grey_pixels(0, 0))
-    later = kiosk.http.get("/widgets/packed/frame", params={"after": found.headers["x-frame"]})
-    assert int(later.headers["x-frame"]) > int(found.headers["x-frame"])
+    picture = kiosk.http.get("/widgets/packed/frame")
+    assert picture.content == png(grey_pixels(0, 0))
+    later = kiosk.http.get("/widgets/packed/frame", params={"after": picture.headers["x-frame"]})
+    assert int(later.headers["x-frame"]) > int(picture.headers["x-frame"])
     other = kiosk.http.get("/widgets/packed/frame", headers={"Sec-Fetch-Site": "cross-site"})
     assert other.status_code == 403
     assert kiosk.http.get("/widgets/note/frame").status_code == 404

@@ -49,7 +49,7 @@ def until_passed_on(bridge: Bridge, *names: str) -> None:
 
     def passed_on() -> bool:
         listed = run(bridge, "topics", "--json").stdout
-        return {*names} <= {one["name"] for one in json.loads(listed or "[]") if one["passed_on"]}
+        return {*names} <= {topic["name"] for topic in json.loads(listed or "[]") if topic["passed_on"]}
 
     until(passed_on, f"the bridge passes {', '.join(names)} on", every_s=0.2)
 
@@ -94,7 +94,7 @@ def test_topics_are_described_with_qos_and_nodes(cyclone_bridge: Bridge, io: Ros
     at = lines.index("/start [std_msgs/msg/Bool]")
     assert lines[at + 1] == "  subscriber: /cell_io, reliable, volatile, Fast DDS"
     plain = json.loads(output_of(cyclone_bridge, "topics", "--json"))
-    enabled = next(one for one in plain if one["name"] == "/operation_enabled")
+    enabled = next(topic for topic in plain if topic["name"] == "/operation_enabled")
     assert (enabled["types"], enabled["publishers"][0]["nodes"]) == ([BOOL], ["/cell_io"])
 
 
@@ -249,8 +249,12 @@ def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
     assert "# - /odd_joints (joints): joint[0].name: " in text
     assert all(f'topic = "{name}"' in text for name in EXTREMES)
     assert "parameters of /cell_io: the bridge reaches services on Cyclone DDS only" in text
-    widgets = {one["id"]: one for page in tomllib.loads(text)["page"] for one in page.get("widget", ())}
-    assert [one["name"] for one in widgets["arm_joint_states"]["joint"]] == ["j1", "j2"]
+    widgets = {
+        widget["id"]: widget
+        for page in tomllib.loads(text)["page"]
+        for widget in page.get("widget", ())
+    }
+    assert [joint["name"] for joint in widgets["arm_joint_states"]["joint"]] == ["j1", "j2"]
     assert widgets["arm_temperature"]["qos"] == {"reliability": "best_effort"}
     server = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_MODE="live")
     try:
@@ -362,7 +366,7 @@ def test_a_scaffold_of_a_robot_with_a_namespace_has_it(domain: int, tmp_path: Pa
         node.end()
         bridge.end()
     panel = check_panel(path).panel
-    assert [one.namespace for one in panel.robots] == ["/robot1"]
+    assert [robot.namespace for robot in panel.robots] == ["/robot1"]
     assert 'topic = "/speed"' in path.read_text()
 
 

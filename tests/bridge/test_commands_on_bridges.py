@@ -25,7 +25,7 @@ def run(*words: str) -> subprocess.CompletedProcess[str]:
 def forwarding(endpoint: str) -> dict[str, str]:
     """Of each topic."""
     listed = run("topics", "--json", "--connect", endpoint).stdout
-    return {one["name"]: one["forwarding"] for one in json.loads(listed or "[]")}
+    return {topic["name"]: topic["forwarding"] for topic in json.loads(listed or "[]")}
 
 
 def until_announced(bridge: Bridge, name: str) -> None:
@@ -132,7 +132,7 @@ def test_lost_topics_are_one_finding_of_all_commands(
 
     def unrouted() -> list[str]:
         """On a busy machine the doctor may not reach the bridge in time, and says that."""
-        found = json.loads(run("doctor", str(panel), *words).stdout)["findings"]
-        return [one["about"] for one in found if one["code"] == "topic_unrouted"]
+        findings = json.loads(run("doctor", str(panel), *words).stdout)["findings"]
+        return [finding["about"] for finding in findings if finding["code"] == "topic_unrouted"]
 
     assert until(unrouted, "the doctor has looked") == ["/enabled"]

@@ -400,8 +400,8 @@ def test_a_refused_parameter_comes_with_its_reason(robot: CycloneRobot, client: 
         ("serial", "mine"): "parameter 'serial' is read-only",
         ("nothing", True): "parameter 'nothing' was not declared",
     }
-    assert {given: set_one(client, *given) for given in refused} == {
-        given: (False, reason) for given, reason in refused.items()
+    assert {setting: set_one(client, *setting) for setting in refused} == {
+        setting: (False, reason) for setting, reason in refused.items()
     }
     assert robot.parameters() == before
 

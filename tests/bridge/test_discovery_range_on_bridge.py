@@ -24,9 +24,9 @@ LIMITED: Final = 'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"'
 
 def of_guide() -> str:
     """The value of CYCLONEDDS_URI in the documentation."""
-    found = re.search(r"export CYCLONEDDS_URI='(.*)'", GUIDE)
-    assert found
-    return found[1]
+    match = re.search(r"export CYCLONEDDS_URI='(.*)'", GUIDE)
+    assert match
+    return match[1]
 
 
 @pytest.fixture

@@ -51,17 +51,17 @@ def graph_at(endpoint: str) -> GraphSnapshot:
 def until_graph(
     endpoint: str, holds: Callable[[GraphSnapshot], bool], why: str, within_s: float = ENOUGH_S
 ) -> GraphSnapshot:
-    found: list[GraphSnapshot] = []
+    graphs: list[GraphSnapshot] = []
 
     def there() -> bool:
-        found.append(graph_at(endpoint))
-        return holds(found[-1])
+        graphs.append(graph_at(endpoint))
+        return holds(graphs[-1])
 
     try:
         until(there, why, within_s, every_s=0.1)
     except AssertionError as error:
-        raise AssertionError(f"{error}: {found[-1]}") from None
-    return found[-1]
+        raise AssertionError(f"{error}: {graphs[-1]}") from None
+    return graphs[-1]
 
 
 def test_topics_have_the_qos_and_the_node_of_each_endpoint(
@@ -76,10 +76,10 @@ def test_topics_have_the_qos_and_the_node_of_each_endpoint(
         lambda graph: names <= {t.name for r in graph.robots for t in r.topics if t.announced},
         "the bridge has found the topics",
     )
-    (found,) = graph.robots
-    (bridge,) = found.bridges
+    (robot_graph,) = graph.robots
+    (bridge,) = robot_graph.bridges
     assert (bridge.version, bridge.domain, bridge.namespace) == ("v1.10.2", own_bridge.domain, "")
-    enabled, picture, command = (found.topic(n) for n in ("/arm/enabled", "/picture", "/command"))
+    enabled, picture, command = (robot_graph.topic(n) for n in ("/arm/enabled", "/picture", "/command"))
     assert enabled is not None
     assert picture is not None
     assert command is not None
@@ -89,7 +89,7 @@ def test_topics_have_the_qos_and_the_node_of_each_endpoint(
     assert (enabled.type, enabled.latched, enabled.reliable) == (BOOL, True, True)
     assert (picture.latched, picture.reliable) == (False, False)
     assert (command.publishers, command.subscribers[0].qos.reliable) == ((), False)
-    services = {s.name: s for s in found.services}
+    services = {s.name: s for s in robot_graph.services}
     assert not services["/system_controller/get_parameters"].can_be_called  # on Fast DDS
 
 
@@ -101,15 +101,15 @@ def test_services_and_actions_have_their_types_and_nodes(
         lambda graph: any(s.nodes for r in graph.robots for s in (*r.services, *r.actions)),
         "the bridge has found the node",
     )
-    (found,) = graph.robots
-    reset, fibonacci = found.service("/reset"), found.action("/fibonacci")
+    (robot_graph,) = graph.robots
+    reset, fibonacci = robot_graph.service("/reset"), robot_graph.action("/fibonacci")
     assert reset is not None
     assert fibonacci is not None
     assert (reset.type, reset.nodes) == ("std_srvs/srv/Trigger", (f"/{NODE}",))
     assert (reset.dds, reset.can_be_called) == ("Cyclone DDS", True)
     assert fibonacci.type == "example_interfaces/action/Fibonacci"
-    assert found.topic("/fibonacci/_action/status") is None
-    node = found.node(f"/{NODE}")
+    assert robot_graph.topic("/fibonacci/_action/status") is None
+    node = robot_graph.node(f"/{NODE}")
     assert node
     assert "/reset" in node.services
     assert any(peer.key == "parameter_events" for peer in graph.peers)  # the client of this test
@@ -129,11 +129,11 @@ def test_a_bridge_with_a_namespace_is_a_robot_of_that_namespace(domain: int) -> 
     finally:
         node.end()
         bridge.end()
-    found = graph.robot("/robot1")
-    assert found
-    speed = found.topic("/speed")
+    robot_graph = graph.robot("/robot1")
+    assert robot_graph
+    speed = robot_graph.topic("/speed")
     assert speed
-    assert (speed.key, found.key("/speed")) == ("robot1/speed", "robot1/speed")
+    assert (speed.key, robot_graph.key("/speed")) == ("robot1/speed", "robot1/speed")
 
 
 def on_fast_dds(bridge: Bridge) -> tuple[RosNode, GraphSnapshot]:
@@ -161,11 +161,11 @@ def test_parameters_are_those_of_nodes_that_can_be_asked(
 ) -> None:
     ros, graph = on_fast_dds(cyclone_bridge)
     try:
-        (found,) = graph.robots
+        (robot_graph,) = graph.robots
 
         async def ask(name: str) -> tuple[NodeParameter, ...] | None:
             async with observing(config_to(cyclone_bridge.endpoint)) as observer:
-                services = NodeServices(found, INTERFACES, observer)
+                services = NodeServices(robot_graph, INTERFACES, observer)
                 return await services.parameters(Node(name=name, bridge=""))
 
         assert asyncio.run(ask("/on_fast_dds")) is None  # it would misread the request
@@ -173,7 +173,7 @@ def test_parameters_are_those_of_nodes_that_can_be_asked(
     finally:
         ros.end()
     assert declared is not None
-    parameters = {one.name: one for one in declared}
+    parameters = {parameter.name: parameter for parameter in declared}
     speed, serial = parameters["speed"], parameters["serial"]
     assert (speed.type, speed.value, speed.min, speed.max) == ("double", 0.5, 0.0, 2.0)
     assert speed.step == 0.1
@@ -184,7 +184,7 @@ def described(definitions: Definitions, name: str) -> list[dict[str, Any]]:
     """The plain description of a type, as REP 2016 has it, with what it refers to."""
     structure = definitions.structures[name]
     inner = referenced_structures(structure, definitions.structures.__getitem__)
-    return [_describe_structure(one) for one in (structure, *inner.values())]
+    return [_describe_structure(described) for described in (structure, *inner.values())]
 
 
 def test_a_node_describes_a_type_that_no_other_knows(
@@ -204,13 +204,13 @@ def test_a_node_describes_a_type_that_no_other_knows(
         ),
         "the bridge has found the topic",
     )
-    (found,) = graph.robots
-    gripper = found.topic("/gripper")
+    (robot_graph,) = graph.robots
+    gripper = robot_graph.topic("/gripper")
     assert gripper is not None
 
     async def ask() -> Definitions | None:
         async with observing(config_to(cyclone_bridge.endpoint)) as observer:
-            return await NodeServices(found, INTERFACES, observer).definitions(gripper)
+            return await NodeServices(robot_graph, INTERFACES, observer).definitions(gripper)
 
     definitions = asyncio.run(ask())
     assert definitions is not None
@@ -262,8 +262,8 @@ def test_a_listener_holds_a_route_only_where_it_is_to(
             own = OwnEndpoint("MS", topic.key, BOOL, Qos(transient_local=True))
             async for _, sample in observer.listen([own], hold=hold):
                 async with observing(config_to(own_bridge.endpoint)) as other:
-                    (found,) = (await other.observe()).robots
-                used = [r for r in found.routes if r.key == "heard" and r.direction == "pub"]
+                    (robot_graph,) = (await other.observe()).robots
+                used = [r for r in robot_graph.routes if r.key == "heard" and r.direction == "pub"]
                 return bytes(sample.payload), used[0].remote
         raise AssertionError("it ended")
 
@@ -296,7 +296,7 @@ def test_the_routes_tell_which_panels_use_them(
         return any(r.key == "operation" and r.remote and r.local_nodes for r in routes)
 
     graph = until_graph(bridge.endpoint, has_route, "the panel's routes")
-    (found,) = graph.robots
-    (route,) = [r for r in found.routes if r.key == "operation" and r.remote]
+    (robot_graph,) = graph.robots
+    (route,) = [r for r in robot_graph.routes if r.key == "operation" and r.remote]
     assert (route.kind, route.direction, route.local_nodes) == ("topic", "sub", ("/system_controller",))
     assert route.endpoint

@@ -48,10 +48,10 @@ def say(node: RosNode, text: str, level: int = 20, name: str = "arm") -> None:
 
 
 def lines(kiosk: Server, widget: str = "robot", **query: Any) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = kiosk.http.get(f"/widgets/{widget}/lines", params=query).json()[
+    logged: list[dict[str, Any]] = kiosk.http.get(f"/widgets/{widget}/lines", params=query).json()[
         "lines"
     ]
-    return found
+    return logged
 
 
 def rows(page: Page) -> Locator:

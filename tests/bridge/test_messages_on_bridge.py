@@ -78,8 +78,8 @@ def heard_after(robot: RosNode, topic: str, act: Callable[[], object]) -> Any:
     before = len(robot.heard(topic))
     act()
     until(lambda: has_heard(robot, topic, before + 1), f"heard on {topic}")
-    (one,) = robot.heard(topic)[before:]
-    return one
+    (message,) = robot.heard(topic)[before:]
+    return message
 
 
 def seconds(stamp: dict[str, int]) -> float:

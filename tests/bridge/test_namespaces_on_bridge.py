@@ -98,8 +98,8 @@ def line(text: str) -> dict[str, Any]:
 
 
 def lines(kiosk: Server, search: str) -> list[Any]:
-    found: list[Any] = kiosk.http.get("/widgets/log/lines", params={"search": search}).json()["lines"]
-    return found
+    logged: list[Any] = kiosk.http.get("/widgets/log/lines", params={"search": search}).json()["lines"]
+    return logged
 
 
 def shows(kiosk: Server, widget: str, text: str) -> bool:
@@ -107,7 +107,7 @@ def shows(kiosk: Server, widget: str, text: str) -> bool:
 
 
 def heard(node: RosNode, word: str) -> bool:
-    return any(word in one["msg"] for one in node.heard("/rosout"))
+    return any(word in line["msg"] for line in node.heard("/rosout"))
 
 
 @pytest.mark.parametrize(

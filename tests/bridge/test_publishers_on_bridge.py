@@ -55,8 +55,8 @@ def publishers(domain: int, tmp_path: Path) -> Iterator[Publishers]:
 def test_a_false_that_a_new_publisher_says_is_never_passed_over_where_that_one_was_seen(
     publishers: Publishers,
 ) -> None:
-    found = [publishers.trial("fast", kind) for kind in (ONCE, AT_ONCE) for _ in range(TRIALS)]
-    assert [one for one in found if one.permitted and (one.announced or one.received)] == []
+    trials = [publishers.trial("fast", kind) for kind in (ONCE, AT_ONCE) for _ in range(TRIALS)]
+    assert [trial for trial in trials if trial.permitted and (trial.announced or trial.received)] == []
 
 
 def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishers: Publishers) -> None:
@@ -71,10 +71,10 @@ def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishe
 def test_a_latched_false_always_closes(domain: int, tmp_path: Path) -> None:
     publishers = Publishers(domain + 3, tmp_path, LATCHED.durability)
     try:
-        found = [publishers.trial("fast", LATCHED) for _ in range(CLOSED_BY)]
+        trials = [publishers.trial("fast", LATCHED) for _ in range(CLOSED_BY)]
     finally:
         publishers.close()
-    assert [one.outcome for one in found] == ["heard"] * CLOSED_BY
+    assert [trial.outcome for trial in trials] == ["heard"] * CLOSED_BY
 
 
 def test_a_latched_value_that_the_bridge_finds_late_does_not_count_as_fresh(

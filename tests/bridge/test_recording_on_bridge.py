@@ -57,14 +57,14 @@ def files(folder: Path) -> list[Path]:
 
 
 def records(path: Path) -> dict[str, list[Record]]:
-    found: dict[str, list[Record]] = {}
+    by_topic: dict[str, list[Record]] = {}
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
         for schema, channel, message in reader.iter_messages():
             assert schema is not None
-            found.setdefault(channel.topic, []).append((schema, channel, message))
-    return found
+            by_topic.setdefault(channel.topic, []).append((schema, channel, message))
+    return by_topic
 
 
 def shows(kiosk: Server, widget: str, text: str) -> bool:
@@ -99,32 +99,32 @@ def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
     until(lambda: files(tmp_path), "the recording is finished")
     (path,) = files(tmp_path)
     assert path.name.endswith("Z-operation.mcap")
-    found = records(path)
-    assert set(found) == {"/robot_log", "/web_ui/presses"}
+    by_topic = records(path)
+    assert set(by_topic) == {"/robot_log", "/web_ui/presses"}
     decoded = []
-    for schema, channel, message in found["/robot_log"]:
+    for schema, channel, message in by_topic["/robot_log"]:
         assert (schema.name, schema.encoding, channel.message_encoding) == (LOG, "ros2msg", "cdr")
         assert b"\nMSG: builtin_interfaces/Time\nint32 sec\n" in schema.data
         assert 0 <= message.log_time - message.publish_time < 60e9  # received after the bridge had it
         decoded.append(codec.decode(schema.name, message.data))
     assert decoded[0]["stamp"] == {"sec": 7, "nanosec": 8}
-    assert [one["msg"] for one in decoded] == sorted((one["msg"] for one in decoded), reverse=True)
-    assert {one["msg"] for one in decoded} == {"before", "after"}
-    assert presses(found) == [
+    assert [line["msg"] for line in decoded] == sorted((line["msg"] for line in decoded), reverse=True)
+    assert {line["msg"] for line in decoded} == {"before", "after"}
+    assert presses(by_topic) == [
         ("p1", None, None),
         ("p1", "published" if pressed["outcome"] == "published" else "unknown", pressed["reason"]),
         ("p2", None, None),
         ("p2", "refused", refused["reason"]),
     ]
-    pressed_at = found["/web_ui/presses"][0][2].log_time
-    times = [message.log_time for _, _, message in found["/robot_log"]]
+    pressed_at = by_topic["/web_ui/presses"][0][2].log_time
+    times = [message.log_time for _, _, message in by_topic["/robot_log"]]
     assert min(times) >= pressed_at - 10.1e9
     assert min(times) < pressed_at < max(times)
 
 
-def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, str | None]]:
+def presses(by_topic: Mapping[str, list[Record]]) -> list[tuple[str, str | None, str | None]]:
     recorded = []
-    for schema, channel, message in found["/web_ui/presses"]:
+    for schema, channel, message in by_topic["/web_ui/presses"]:
         assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
         press = json.loads(message.data)
         assert set(press) == set(json.loads(schema.data)["properties"])
@@ -147,9 +147,9 @@ def test_a_hold_is_recorded_from_its_begin_to_its_end(
     until(lambda: files(tmp_path), "the recording is finished")
     (path,) = files(tmp_path)
     assert path.name.endswith("Z-jog.mcap")
-    found = presses(records(path))
-    assert [one[1] for one in found[:2]] == [None, "refused"]
-    assert found[-2:] == [
+    recorded = presses(records(path))
+    assert [press[1] for press in recorded[:2]] == [None, "refused"]
+    assert recorded[-2:] == [
         (socket.lease, None, None),
         (socket.lease, ended["outcome"], ended["reason"]),
     ]
@@ -172,7 +172,7 @@ def test_a_killed_server_leaves_a_recording_to_the_next_one(
     until(lambda: files(tmp_path), "it is recovered")
     (path,) = files(tmp_path)
     assert path.name.endswith("Z-operation.recovered.mcap")
-    assert [one[0] for one in presses(records(path))] == ["p1"] * 2
+    assert [press[0] for press in presses(records(path))] == ["p1"] * 2
 
 
 def presses_in(unfinished: Path) -> int:

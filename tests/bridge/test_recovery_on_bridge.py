@@ -57,8 +57,8 @@ def logged(folder: Path, press_id: str = "goal-1") -> list[tuple[str, str]]:
 
 
 def entries_of(folder: Path, press_id: str) -> list[Entry]:
-    found = rows(folder / "data", Filter(every=True), None, 1000)
-    return [row.entry for row in reversed(found) if row.entry.press == press_id]
+    newest_first = rows(folder / "data", Filter(every=True), None, 1000)
+    return [row.entry for row in reversed(newest_first) if row.entry.press == press_id]
 
 
 BROKEN_OFF = [("pressed", ""), ("closed", "accepted"), ("corrected", "unknown")]

@@ -86,12 +86,12 @@ def test_the_graph_has_the_topic_before_the_first_press(server: Server, node: Ro
 def test_two_publishers_of_one_type_have_a_topic_each(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
     permit(server, node)
-    one, two = len(node.heard("/operation1")), len(node.heard("/operation2"))
+    heard_on_1, two = len(node.heard("/operation1")), len(node.heard("/operation2"))
     assert server.press("operation1", "to one").json()["outcome"] == "published"
     assert server.press("operation2", "to two").json()["outcome"] == "published"
     until(lambda: len(node.heard("/operation2")) > two, "heard on /operation2")
-    until(lambda: len(node.heard("/operation1")) > one, "heard on /operation1")
-    assert node.heard_data("/operation1")[one:] == ["to one"]
+    until(lambda: len(node.heard("/operation1")) > heard_on_1, "heard on /operation1")
+    assert node.heard_data("/operation1")[heard_on_1:] == ["to one"]
     assert node.heard_data("/operation2")[two:] == ["to two"]
 
 
@@ -205,18 +205,18 @@ def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> 
 
 def on_rosout(node: RosNode, text: str) -> dict[str, object]:
     """The message there with this text, when it has come."""
-    found: list[dict[str, object]] = until(
+    lines: list[dict[str, object]] = until(
         lambda: [m for m in node.heard("/rosout") if text in str(m["msg"])], f"{text} on /rosout"
     )
-    return found[0]
+    return lines[0]
 
 
 def test_what_was_typed_and_what_uvicorn_says_is_not_on_rosout(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
     before = len(node.heard("/rosout"))
     head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-    with create_connection(("127.0.0.1", server.port)) as one:
-        one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())  # and drops it
+    with create_connection(("127.0.0.1", server.port)) as client:
+        client.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())  # and drops it
     with server.socket() as press_socket:
         press_socket.press(widget="operation", inputs={"message": "typed in" * 20}, id="bad")
         press_socket.press(widget="operation", inputs={"message": "typed in"}, id="good")

@@ -147,7 +147,7 @@ def test_a_second_publisher_locks_where_only_one_may_be_and_is_named(
         named = "/permit is published by /door, /robot."
         strict = "Locked: /permit has 2 publishers. Only one node may publish this permission."
         until(lambda: kiosk.widget("strict_go")["reason"] == f"{strict} {named}", "both are named")
-        assert {one[0] for one in permissions(kiosk)} == {False}
+        assert {permission[0] for permission in permissions(kiosk)} == {False}
         until(
             lambda: named in (kiosk.widget("loose_go")["reason"] or ""), "the flapping one names both"
         )
@@ -158,27 +158,29 @@ def test_a_second_publisher_locks_where_only_one_may_be_and_is_named(
 
 def permissions(kiosk: Server) -> set[Any]:
     """(strict, loose) permissions, looked at so often."""
-    found = set()
+    seen = set()
     for _ in range(LOOKS):
         widgets = kiosk.snapshot()["widgets"]
-        found.add((widgets["strict_go"]["enabled"], widgets["loose_go"]["enabled"]))
-    return found
+        seen.add((widgets["strict_go"]["enabled"], widgets["loose_go"]["enabled"]))
+    return seen
 
 
 def findings(bridge: Bridge, folder: Path) -> list[str]:
     """The nodes that `doctor` names as publishers of a permission."""
-    found = Setup(folder).findings(PERMIT, bridge.endpoint)
-    return [str(one.details["nodes"]) for one in found if one.code == "permission_publishers"]
+    reported = Setup(folder).findings(PERMIT, bridge.endpoint)
+    return [
+        str(finding.details["nodes"]) for finding in reported if finding.code == "permission_publishers"
+    ]
 
 
 def looks(kiosk: Server) -> set[Any]:
     """What the page shows, looked at so often."""
-    found = set()
+    seen = set()
     for _ in range(LOOKS):
         widgets = kiosk.snapshot()["widgets"]
-        found.add((widgets["go"]["enabled"], tuple(widgets["arm"]["joint_values"])))
+        seen.add((widgets["go"]["enabled"], tuple(widgets["arm"]["joint_values"])))
         time.sleep(0.01)
-    return found
+    return seen
 
 
 def gaps(kiosk: Server) -> int:

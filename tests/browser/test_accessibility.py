@@ -69,13 +69,13 @@ def violations(page: Page, themes: Sequence[str] = CHOICES["theme"]) -> list[Any
     only, so the rules about anything else are looked at once."""
     if not page.evaluate("'axe' in globalThis"):
         page.evaluate(AXE)
-    found: list[Any] = []
+    reported: list[Any] = []
     for theme in themes:
         page.evaluate(SHOW, theme)
         rules = ALL if theme == CHOICES["theme"][0] else OF_COLOURS
-        found += [(theme, *one) for one in page.evaluate(RUN, rules)]
+        reported += [(theme, *violation) for violation in page.evaluate(RUN, rules)]
     page.evaluate(SHOW, CHOICES["theme"][0])
-    return found
+    return reported
 
 
 # (selector, property, value) in each rule of a theme.
@@ -89,11 +89,13 @@ OF_THEMES: Final = """() => {
 
 def test_a_theme_changes_colours_only(shipped: Server, page: Page) -> None:
     page.goto(f"{shipped.url}/gallery")
-    found = page.evaluate(OF_THEMES)
-    assert len(found) > 50
-    assert [name for _, name, _ in found if name != "color-scheme" and not name.startswith("--")] == []
+    properties = page.evaluate(OF_THEMES)
+    assert len(properties) > 50
+    assert [
+        name for _, name, _ in properties if name != "color-scheme" and not name.startswith("--")
+    ] == []
     is_colour = "(values) => values.filter((one) => !CSS.supports('color', one))"
-    assert page.evaluate(is_colour, [v for _, name, v in found if name != "color-scheme"]) == []
+    assert page.evaluate(is_colour, [v for _, name, v in properties if name != "color-scheme"]) == []
     for theme in CHOICES["theme"]:
         page.context.add_cookies([{"name": COOKIE.format("theme"), "value": theme, "url": shipped.url}])
         page.goto(f"{shipped.url}/log")

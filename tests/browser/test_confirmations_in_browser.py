@@ -40,8 +40,10 @@ def test_a_press_is_confirmed_by_the_robot_in_every_browser(
     page.get_by_role("button", name="Start").click()
     dialog.get_by_role("button", name="Start").click()
     expect(dialog).to_be_hidden()
-    for one in (page, other):
-        expect(one.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
+    for browser_page in (page, other):
+        expect(browser_page.locator('[data-widget="go"] .result')).to_contain_text(
+            "Confirmed by /last_heard"
+        )
     expect(page.locator('[data-widget="go"] .receipt')).to_be_empty()
     other_context.close()
 

@@ -52,8 +52,8 @@ def reused_pages(chromium: Browser) -> Iterator[ReusedPages]:
         return made[address, scripts]
 
     yield reused
-    for one in made.values():
-        one.close()
+    for context in made.values():
+        context.close()
 
 
 @pytest.fixture

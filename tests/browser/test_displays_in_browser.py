@@ -146,8 +146,8 @@ def press(page: Page, name: str) -> None:
 
 def heard(robot: RosNode, topic: str, before: int) -> list[dict[str, Any]]:
     until(lambda: has_heard(robot, topic, before + 1), f"heard on {topic}")
-    found: list[dict[str, Any]] = robot.heard(topic)[before:]
-    return found
+    messages: list[dict[str, Any]] = robot.heard(topic)[before:]
+    return messages
 
 
 def is_ready(page: Page) -> None:
@@ -337,10 +337,10 @@ def test_inputs_are_big_enough_for_gloves(
     is_ready(page)
     page.get_by_label("Mode").click()
     touched = page.locator("input:not([type=hidden]):visible, select, option, .step, .switch")
-    boxes = [box for one in touched.all() if (box := one.bounding_box())]
+    boxes = [box for element in touched.all() if (box := element.bounding_box())]
     assert len(boxes) == 4 + 2 + 4 + 1
     assert all(box["width"] >= 44 and box["height"] >= 44 for box in boxes), boxes
-    row = [one.bounding_box() for one in page.locator('[data-widget="speed"] .entry > *').all()]
+    row = [element.bounding_box() for element in page.locator('[data-widget="speed"] .entry > *').all()]
     for left, right in pairwise(row):
         assert left is not None
         assert right is not None

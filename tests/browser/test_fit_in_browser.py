@@ -53,20 +53,22 @@ def sized(page: Page, panel: Panel, size: str) -> Screen:
     return screen
 
 
-@pytest.mark.parametrize("of", [0, 2], ids=["three groups", "one group"])
-def test_sizes_are_those_of_the_browser(demo: Server, panel: Panel, page: Page, of: int) -> None:
-    cell = panel.pages[of]
+@pytest.mark.parametrize("page_number", [0, 2], ids=["three groups", "one group"])
+def test_sizes_are_those_of_the_browser(
+    demo: Server, panel: Panel, page: Page, page_number: int
+) -> None:
+    cell = panel.pages[page_number]
     page.goto(f"{demo.url}/pages/{cell.id}")
     expect(page.locator(".group").first).to_be_visible()
     for size in SCREENS:
         screen = sized(page, panel, size)
         assert reason(panel, cell, screen) == ""
-        found: Any = page.evaluate(MEASURE)
-        assert found["outside"] == [], size
-        assert found["main"]["height"] == pytest.approx(page_height(panel, cell, screen), abs=1)
+        measured: Any = page.evaluate(MEASURE)
+        assert measured["outside"] == [], size
+        assert measured["main"]["height"] == pytest.approx(page_height(panel, cell, screen), abs=1)
         width = page_width(panel, screen)
-        assert found["main"]["width"] == pytest.approx(width, abs=1)
-        for group in found["groups"]:
+        assert measured["main"]["width"] == pytest.approx(width, abs=1)
+        for group in measured["groups"]:
             described = cell.parts[group["number"]]
             assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
             rows = page.evaluate(ROWS, group["number"])
@@ -87,7 +89,7 @@ def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
         assert len(boxes) >= 2
         assert all(box["height"] >= least * screen.mm - 0.5 for box in boxes), size
         start, reset = (
-            place(page.locator(f"[data-widget={of}] > button")) for of in ("start", "reset")
+            place(page.locator(f"[data-widget={widget}] > button")) for widget in ("start", "reset")
         )
         assert min(start["width"], reset["width"]) >= 20 * screen.mm - 0.5
         assert reset["x"] - start["x"] - start["width"] >= 5 * screen.mm - 0.5, size

@@ -122,7 +122,10 @@ def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
 ) -> None:
     page = touched(touchscreen, kiosk, size)
-    points = [middle(page.locator(one)) for one in ("[data-widget=load] > [type=submit]", ".menu-key")]
+    points = [
+        middle(page.locator(selector))
+        for selector in ("[data-widget=load] > [type=submit]", ".menu-key")
+    ]
     before = presses(kiosk)
     clean(page, 30)
     page.evaluate(COUNTS)
@@ -199,8 +202,8 @@ def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: S
 
 def test_waking_touch_on_a_dark_screen_presses_nothing(sleepy: Page, dimming: Server) -> None:
     before = presses(dimming)
-    for one in ("[data-widget=load] > [type=submit]", "#input-speed", ".hold"):
-        wakes(sleepy, partial(sleepy.touchscreen.tap, *middle(sleepy.locator(one))))
+    for selector in ("[data-widget=load] > [type=submit]", "#input-speed", ".hold"):
+        wakes(sleepy, partial(sleepy.touchscreen.tap, *middle(sleepy.locator(selector))))
         expect(sleepy.locator("#dark")).to_be_visible()
         expect(sleepy.locator(".sheet")).to_have_count(0)
     wakes(sleepy, partial(sleepy.keyboard.press, " "))
@@ -268,8 +271,8 @@ OWN: Final = {"scroll", "key", "inputSelect"}  # what a page on a machine keeps 
 
 
 def test_a_touched_screen_has_none_of_the_browsers_gestures(screen: Page) -> None:
-    found = screen.evaluate(GESTURES)
-    assert {name for name, kept in found.items() if kept} == OWN
+    gestures = screen.evaluate(GESTURES)
+    assert {name for name, kept in gestures.items() if kept} == OWN
     assert screen.locator(".hold").evaluate("(key) => getComputedStyle(key).touchAction") == "none"
 
 

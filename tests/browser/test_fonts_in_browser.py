@@ -59,8 +59,8 @@ def test_the_bar_fits_and_nothing_moves_when_somebody_asks(opens: Opens) -> None
             expect(whole).to_have_text(bar(page).text_content() or "")
             assert whole.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
             page.keyboard.press("Escape")
-            for one in page.locator("#control button:visible").all():
-                box = place(one)
+            for shown_button in page.locator("#control button:visible").all():
+                box = place(shown_button)
                 assert box["height"] >= 44
                 assert box["width"] * 0.22 >= 19.9
         left, right = place(button(first, "Give")), place(button(first, "Keep"))

@@ -74,9 +74,9 @@ def times(node: RosNode, before: int, began: float) -> Times:
     return Times(at[-2] - began, at[-1] - began)
 
 
-def soon(cause: str, found: Times) -> None:
-    assert found.last < SOON_S, cause
-    assert found.stop < SOON_S, cause
+def soon(cause: str, times: Times) -> None:
+    assert times.last < SOON_S, cause
+    assert times.stop < SOON_S, cause
 
 
 TOUCHES: Final = {
@@ -110,8 +110,8 @@ def test_lost_permission_ends_the_hold_until_a_new_press(finger: Finger, jogger:
     def allow_after() -> None:
         permit(finger.server, jogger, True)
 
-    found = measured(finger, jogger, forbid, "interlock_not_permitted", lift=False)
-    soon("permission lost", found)
+    times = measured(finger, jogger, forbid, "interlock_not_permitted", lift=False)
+    soon("permission lost", times)
     expect(finger.page.locator("#receipt-jog")).to_contain_text("does not permit operation")
     heard = len(jogger.heard(TOPIC))
     allow_after()

@@ -122,7 +122,7 @@ class Thumb(Finger):
 
 def heard(robot: RosNode, before: int = 0) -> list[Twist]:
     """(forward, turn) of what was heard."""
-    return [(one["linear"]["x"], one["angular"]["z"]) for one in robot.heard(TOPIC)[before:]]
+    return [(twist["linear"]["x"], twist["angular"]["z"]) for twist in robot.heard(TOPIC)[before:]]
 
 
 def stopped(robot: RosNode) -> bool:
@@ -223,8 +223,8 @@ def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) ->
     stamped.move(2, 2)
 
     def full() -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = robot.heard("/stamped")[before:]
-        return [one for one in found if one["twist"]["linear"]["x"] == 1.0]
+        messages: list[dict[str, Any]] = robot.heard("/stamped")[before:]
+        return [message for message in messages if message["twist"]["linear"]["x"] == 1.0]
 
     until(full, "a square goes to the full value of both")
     message = full()[0]

@@ -201,7 +201,7 @@ def test_typing_by_hand_is_not_taken_for_a_bar_code(desk: Page) -> None:
 def test_a_reader_presses_nothing_that_has_the_focus(desk: Page, kiosk: Server, apart_s: float) -> None:
     """Neither its Enter nor, of a fast one, a space in its code: a pressed key keeps the focus."""
     posts: list[str] = []
-    desk.on("websocket", lambda one: one.on("framesent", lambda sent: posts.append(str(sent))))
+    desk.on("websocket", lambda socket: socket.on("framesent", lambda sent: posts.append(str(sent))))
     key = desk.locator("[data-widget=send] > [type=submit]")
     key.focus()
     Keys(desk, apart_s).type("12 34\n" if apart_s == READER_S else "1234\n")

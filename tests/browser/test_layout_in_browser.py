@@ -123,8 +123,8 @@ def box(page: Page, selector: str) -> FloatRect:
 
 
 def right(page: Page, selector: str) -> float:
-    found = box(page, selector)
-    return float(found["x"] + found["width"])
+    rect = box(page, selector)
+    return float(rect["x"] + rect["width"])
 
 
 def test_the_header_shows_the_robots_name_whole_and_all_that_can_be_touched(shown: Page) -> None:

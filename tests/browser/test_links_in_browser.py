@@ -44,8 +44,8 @@ def opened(page: Page, server: Server) -> Page:
     return page
 
 
-def said(page: Page, link: str, what: str) -> Locator:
-    return page.locator(f'[data-link="{link}"] [data-text="{what}"]')
+def said(page: Page, link: str, text: str) -> Locator:
+    return page.locator(f'[data-link="{link}"] [data-text="{text}"]')
 
 
 def row(page: Page, link: str) -> Locator:
@@ -132,8 +132,8 @@ def test_a_frozen_server_is_lost_since_its_last_heartbeat(
         expect(said(page, "server", "reason")).to_have_text("No connection to the panel server.")
         for link in ("bridge", "node"):
             expect(said(page, link, "text")).to_have_text("unknown")
-            for what in ("since", "locks", "reason"):
-                expect(said(page, link, what)).to_have_text("")
+            for text in ("since", "locks", "reason"):
+                expect(said(page, link, text)).to_have_text("")
         until(lambda: time.strftime("%H:%M:%S") != last_beat, "the next beat's second is another")
         mine.process.send(signal.SIGCONT)
         expect(said(page, "server", "text")).to_have_text("ok")

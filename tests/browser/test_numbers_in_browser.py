@@ -295,16 +295,16 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
         texts = [text for text, _ in generated(20_000, seed=len(rows))]
         rows += [(text, whole, False) for text in texts for whole in (False, True)]
         pairs = zip(texts, [", ", "; ", ","] * len(texts), texts[1:], strict=False)
-        rows += [(f"{one}{between}{other}", False, True) for one, between, other in pairs]
+        rows += [(f"{before}{between}{other}", False, True) for before, between, other in pairs]
         read = page.evaluate(READ, [path, rows])
         for (text, whole, is_list), numbers in zip(rows, read, strict=True):
             if is_list:
                 own: Any = [as_sent(number) for number in read_numbers(text, language)]
-                found: Any = [exact(number) for number in numbers]
+                by_server: Any = [exact(number) for number in numbers]
             else:
                 own = as_sent(read_number(text, language, whole=whole))
-                found = exact(numbers)
-            assert own == found, (text, language, whole)
+                by_server = exact(numbers)
+            assert own == by_server, (text, language, whole)
 
 
 def test_scripts_and_server_judge_limits_and_steps_the_same(opens: Opens) -> None:
@@ -327,7 +327,7 @@ def test_scripts_and_server_judge_limits_and_steps_the_same(opens: Opens) -> Non
     sent = [
         (
             decimal_text(value),
-            *(decimal_text(one or 0) for one in (limits.low, limits.high, limits.step)),
+            *(decimal_text(limit or 0) for limit in (limits.low, limits.high, limits.step)),
             whole,
         )
         for value, limits, whole in rows

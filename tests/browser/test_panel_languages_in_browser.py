@@ -26,9 +26,9 @@ def test_a_browser_changes_its_language_and_no_other_ones(
     chromium: Browser, page: Page, kiosk: Server
 ) -> None:
     other = chromium.new_page()
-    for one in (page, other):
-        one.goto(kiosk.url)
-        expect(one.locator('[data-widget="speed"] .value')).to_have_text("−1,234.5 mm/s")
+    for browser_page in (page, other):
+        browser_page.goto(kiosk.url)
+        expect(browser_page.locator('[data-widget="speed"] .value')).to_have_text("−1,234.5 mm/s")
     choose(page, "Deutsch")
     expect(page.locator("html")).to_have_attribute("lang", "de")
     expect(page.locator('[data-widget="speed"] .value')).to_have_text("−1.234,5 mm/s")

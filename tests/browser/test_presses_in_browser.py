@@ -351,8 +351,8 @@ def forms_come_soon(page: Page, but: float = 0.0) -> None:
     is: those of all pages but the one that was rendered at this time."""
 
     def is_sent(route: Route) -> None:
-        def since(found: re.Match[str]) -> str:
-            return found[0] if float(found[1]) == but else f"_since={float(found[1]) + 60}"
+        def since(match: re.Match[str]) -> str:
+            return match[0] if float(match[1]) == but else f"_since={float(match[1]) + 60}"
 
         data = route.request.post_data or ""
         route.continue_(post_data=re.sub(r"\b_since=([\d.]+)", since, data))
@@ -362,8 +362,8 @@ def forms_come_soon(page: Page, but: float = 0.0) -> None:
 
 def rendered_at(page: Page) -> float:
     """When the server rendered the page; 0 for one that loaded itself."""
-    found = page.locator("input[name=_since]").evaluate_all("(all) => all.map((one) => one.value)")
-    return float(found[0]) if found else 0.0
+    values = page.locator("input[name=_since]").evaluate_all("(all) => all.map((one) => one.value)")
+    return float(values[0]) if values else 0.0
 
 
 def is_read(page: Page) -> bool:

@@ -95,7 +95,7 @@ def asked(page: Page) -> Iterator[list[Request]]:
 
 def below(requests: list[Request]) -> bool:
     """Whether all URLs are below the root path, and were answered."""
-    paths = [urlsplit(one.url).path for one in requests if not one.url.startswith("data:")]
+    paths = [urlsplit(request.url).path for request in requests if not request.url.startswith("data:")]
     assert [path for path in paths if not path.startswith(f"{ROOT}/")] == []
     return bool(paths)
 
@@ -117,7 +117,7 @@ def test_pages_presses_events_holds_and_pictures_work_below_a_path(
     page.mouse.up()
     expect(jog.get_by_role("button")).to_have_attribute("aria-pressed", "false")
     assert below(asked)
-    kinds = {one.resource_type for one in asked}
+    kinds = {request.resource_type for request in asked}
     assert {"document", "stylesheet", "script", "eventsource"} <= kinds
 
 

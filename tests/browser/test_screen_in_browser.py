@@ -159,7 +159,7 @@ def test_the_frame_stays_where_it_is_when_the_page_scrolls(several: Server, page
 
 
 def shown_groups(page: Page) -> list[str]:
-    return [str(one.get_attribute("aria-label")) for one in page.locator(".group:visible").all()]
+    return [str(group.get_attribute("aria-label")) for group in page.locator(".group:visible").all()]
 
 
 @pytest.mark.parametrize(
@@ -313,7 +313,7 @@ def test_keys_that_lock_at_once_are_measured_together(tmp_path: Path, page: Page
 def style_recalculations(session: CDPSession) -> float:
     """How often the browser has computed the page's styles."""
     metrics = session.send("Performance.getMetrics")["metrics"]
-    return next(float(one["value"]) for one in metrics if one["name"] == "RecalcStyleCount")
+    return next(float(metric["value"]) for metric in metrics if metric["name"] == "RecalcStyleCount")
 
 
 def test_the_menu_leads_to_the_log_and_changes_the_look(
@@ -327,8 +327,8 @@ def test_the_menu_leads_to_the_log_and_changes_the_look(
             expect(menu).to_be_hidden()
             button(shown, "Menu").click()
             expect(menu).to_be_visible()
-            for one in menu.locator("a:visible, button:visible").all():
-                box = place(one)
+            for item in menu.locator("a:visible, button:visible").all():
+                box = place(item)
                 assert box["height"] >= 44
                 assert box["x"] + box["width"] <= width
             shown.keyboard.press("Escape")

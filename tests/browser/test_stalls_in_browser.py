@@ -43,7 +43,7 @@ def stopped(chromium: Browser) -> Iterator[None]:
     """The processes that run pages stand still: what comes waits in the browser and in the kernel."""
     session = chromium.new_browser_cdp_session()
     processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
-    pages = [one["id"] for one in processes if one["type"] == "renderer"]
+    pages = [process["id"] for process in processes if process["type"] == "renderer"]
     assert pages
     for process in pages:
         send_signal(process, signal.SIGSTOP)

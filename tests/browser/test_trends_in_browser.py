@@ -104,8 +104,8 @@ def test_times_have_their_offset_where_the_clock_was_changed(cell: Server, page:
 
 
 def highest(server: Server) -> float:
-    found = server.http.get("/widgets/course/trend", params={"span_s": 60}).json()
-    return float(max(value for one in found["pens"][0] if one for value in one[1:]))
+    trend = server.http.get("/widgets/course/trend", params={"span_s": 60}).json()
+    return float(max(value for point in trend["pens"][0] if point for value in point[1:]))
 
 
 def time_passes(server: Server, page: Page, seconds: float) -> None:
@@ -113,8 +113,8 @@ def time_passes(server: Server, page: Page, seconds: float) -> None:
 
     def now() -> float:
         page.evaluate("0")
-        found = server.http.get("/widgets/course/trend", params={"span_s": 10, "points": 10}).json()
-        return float(found["now"])
+        trend = server.http.get("/widgets/course/trend", params={"span_s": 10, "points": 10}).json()
+        return float(trend["now"])
 
     end = now() + seconds
     until(lambda: now() >= end, "time passes", every_s=0.1)
@@ -135,8 +135,8 @@ def opened(page: Page, cell: Server) -> None:
     expect(page.locator('[data-do="forward"]')).to_be_disabled()
 
 
-def key(page: Page, what: str) -> Any:
-    return page.locator(f'[data-do="{what}"]')
+def key(page: Page, action: str) -> Any:
+    return page.locator(f'[data-do="{action}"]')
 
 
 def test_the_axis_and_the_values_have_the_decimal_sign_of_the_language(

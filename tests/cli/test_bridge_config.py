@@ -50,8 +50,8 @@ def written(panel: Path, *options: str) -> zenoh.Config:
 
 
 def plugin(config: zenoh.Config) -> dict[str, object]:
-    found: dict[str, object] = json.loads(config.get_json("plugins/ros2dds"))
-    return found
+    plugin_config: dict[str, object] = json.loads(config.get_json("plugins/ros2dds"))
+    return plugin_config
 
 
 def test_it_lets_through_what_the_panel_uses_and_nothing_else(panel: Path) -> None:

@@ -47,19 +47,19 @@ def test_a_panel_file_is_all_that_it_needs(tmp_path: Path) -> None:
 
 
 def test_the_server_gets_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    given: dict[str, Any] = {}
-    monkeypatch.setattr(uvicorn, "run", lambda app, **options: given.update(options, app=app))
+    passed: dict[str, Any] = {}
+    monkeypatch.setattr(uvicorn, "run", lambda app, **options: passed.update(options, app=app))
     monkeypatch.setattr(os, "environ", {})
     port = free_port()
     assert main(["run", "--port", str(port)]) == 0
-    assert (given["app"], given["host"], given["port"]) == ("app.main:app", "127.0.0.1", port)
-    assert OPTIONS.items() <= given.items()
+    assert (passed["app"], passed["host"], passed["port"]) == ("app.main:app", "127.0.0.1", port)
+    assert OPTIONS.items() <= passed.items()
 
 
 def test_an_option_is_a_variable() -> None:
     words = "cell.toml --zenoh z.json5 --mode live --data d --name a --name b --proxy 192.0.2.1"
-    given = run.make_parser("x").parse_args([*words.split(), "--log-level", "debug"])
-    assert environment(given) == {
+    parsed = run.make_parser("x").parse_args([*words.split(), "--log-level", "debug"])
+    assert environment(parsed) == {
         "KIOSK_PANEL": "cell.toml",
         "KIOSK_ZENOH": "z.json5",
         "KIOSK_MODE": "live",

@@ -144,7 +144,7 @@ def test_the_permission_of_a_row_is_by_principal_act_and_server(bench: Bench) ->
     assert bench.counters == {"parts": 0}
     assert bench.changes == 0
     assert bench.run(ActRequest("reset", BOB), "a3").outcome == "accepted"
-    assert [one.outcome for one in bench.log.entries] == ["refused", "refused", "accepted"]
+    assert [entry.outcome for entry in bench.log.entries] == ["refused", "refused", "accepted"]
 
 
 def test_what_apply_refuses_is_answered_and_logged_with_its_sentence(bench: Bench) -> None:

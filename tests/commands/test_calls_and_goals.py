@@ -211,10 +211,10 @@ def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
     run(test)
 
 
-@pytest.mark.parametrize("what", ["call", "send_goal"])
-def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
+@pytest.mark.parametrize("command", ["call", "send_goal"])
+def test_a_bridge_that_goes_away_ends_the_waiting_at_once(command: str) -> None:
     async def test(bench: Bench) -> None:
-        waiting = getattr(bench, what)()
+        waiting = getattr(bench, command)()
         await queried(bench, 1)
         bench.lose_the_bridge()
         answer = await waiting
@@ -616,8 +616,10 @@ def test_feedback_and_results_of_any_length_are_cut() -> None:
         types = INTERFACES.action_types(COUNT)
         await accepted(bench)
         long = {"sequence": list(range(300_000))}
-        one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
-        bench.actions.on_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
+        feedback = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
+        bench.actions.on_feedback(
+            "/count", sample_of(INTERFACES.encode(types.feedback_message, feedback))
+        )
         bench.line.answer(types.get_result_response, status=4, result=long)
         assert str(bench.shown.text).startswith("In progress. so far [0, 1, 2, ")
         assert len(str(bench.shown.text)) < 2 * MAX_VALUE_CHARS

@@ -199,7 +199,7 @@ def test_one_effect_confirms_one_of_two_commands(said: list[str], outcomes: list
         await asyncio.sleep(0)
         for number, text in enumerate(said):
             desk.says(text, 100.1 + number)
-        return [await one for one in both]
+        return [await press for press in both]
 
     assert [receipt.outcome for receipt in asyncio.run(pressed())] == outcomes
 

@@ -81,7 +81,9 @@ class Bench:
     def logged(self) -> list[tuple[str, str, str, str]]:
         """Action, who, outcome and reason of each entry."""
         assert all(entry.kind == "control" and entry.robot == "Robot 1" for entry in self.log.entries)
-        return [(one.action, one.browser, one.outcome, one.reason) for one in self.log.entries]
+        return [
+            (entry.action, entry.browser, entry.outcome, entry.reason) for entry in self.log.entries
+        ]
 
 
 @pytest.fixture

@@ -218,8 +218,8 @@ def test_each_message_has_the_time_of_its_own_sending() -> None:
     bench.holds.end(holding, RELEASED)
     after = time.time_ns()
     sent = [INTERFACES.decode(stamped, payload) for payload in bench.way.payloads]
-    assert [one.point.x for one in sent] == [0.5] * 4 + [0.0]
-    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in sent]
+    assert [message.point.x for message in sent] == [0.5] * 4 + [0.0]
+    stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in sent]
     assert stamps == sorted(set(stamps))
     assert before <= stamps[0]
     assert stamps[-1] <= after
@@ -455,9 +455,9 @@ def test_each_message_has_its_deadline_and_the_count(rate_hz: float, deadline_ms
     sent = [
         INTERFACES.decode("sensor_msgs/msg/RegionOfInterest", payload) for payload in bench.way.payloads
     ]
-    assert [one.width for one in sent] == list(range(1, len(sent) + 1))
-    assert {(one.x_offset, one.height) for one in sent} == {(1, deadline_ms), (0, 0)}
-    assert [one.height for one in sent].count(0) == 2
+    assert [message.width for message in sent] == list(range(1, len(sent) + 1))
+    assert {(message.x_offset, message.height) for message in sent} == {(1, deadline_ms), (0, 0)}
+    assert [message.height for message in sent].count(0) == 2
 
 
 def test_small_counter_wraps_around() -> None:

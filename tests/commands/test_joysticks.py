@@ -146,17 +146,19 @@ def test_no_two_holds_send_on_its_topic() -> None:
 
 @given(UNIT, UNIT, st.floats(0, 0.9), st.sampled_from(["circle", "square"]))
 def test_sent_value_is_within_the_limits(x: float, y: float, dead: float, shape: str) -> None:
-    found = shaped(stick(dead_zone=dead, shape=shape), (x, y))
-    assert all(abs(sent) <= abs(given) + 1e-12 for sent, given in zip(found, (x, y), strict=True))
-    assert all(sent * given >= 0 for sent, given in zip(found, (x, y), strict=True))
+    shaped_position = shaped(stick(dead_zone=dead, shape=shape), (x, y))
+    assert all(
+        abs(sent) <= abs(axis) + 1e-12 for sent, axis in zip(shaped_position, (x, y), strict=True)
+    )
+    assert all(sent * axis >= 0 for sent, axis in zip(shaped_position, (x, y), strict=True))
     if shape == "circle":
-        assert math.hypot(*found) <= 1 + 1e-9
+        assert math.hypot(*shaped_position) <= 1 + 1e-9
         if math.hypot(x, y) <= dead:
-            assert found == (0.0, 0.0)
+            assert shaped_position == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("shape", "given", "sent"),
+    ("shape", "position", "sent"),
     [
         ("square", (1.0, 1.0), (1.0, 1.0)),
         ("square", (0.2, -0.6), (0.0, -0.5)),
@@ -166,20 +168,20 @@ def test_sent_value_is_within_the_limits(x: float, y: float, dead: float, shape:
     ],
 )
 def test_the_dead_zone_is_zero_and_begins_with_zero(
-    shape: str, given: tuple[float, float], sent: tuple[float, float]
+    shape: str, position: tuple[float, float], sent: tuple[float, float]
 ) -> None:
-    assert shaped(stick(dead_zone=0.2, shape=shape), given) == pytest.approx(sent)
+    assert shaped(stick(dead_zone=0.2, shape=shape), position) == pytest.approx(sent)
 
 
 def test_a_ramp_limits_how_fast_it_gets_and_never_how_it_stops() -> None:
-    of = stick(ramp_s=0.5, rate_hz=20)  # a tenth with each message
-    assert moved(of, (0.0, 0.0), (1.0, -1.0)) == pytest.approx((0.1, -0.1))
-    assert moved(of, (0.8, -0.8), (0.2, 0.0)) == (0.2, 0.0)
-    assert moved(of, (0.8, 0.0), (-1.0, 0.0)) == pytest.approx((-0.1, 0.0))
+    joystick = stick(ramp_s=0.5, rate_hz=20)  # a tenth with each message
+    assert moved(joystick, (0.0, 0.0), (1.0, -1.0)) == pytest.approx((0.1, -0.1))
+    assert moved(joystick, (0.8, -0.8), (0.2, 0.0)) == (0.2, 0.0)
+    assert moved(joystick, (0.8, 0.0), (-1.0, 0.0)) == pytest.approx((-0.1, 0.0))
 
 
 @given(UNIT, UNIT, st.floats(0.001, 1))
 def test_a_ramp_never_passes_what_is_wanted(before: float, wanted: float, step: float) -> None:
-    found = ramped(before, wanted, step)
-    assert abs(found) <= max(abs(wanted), 0.0) + 1e-12
-    assert found * wanted >= 0
+    next_value = ramped(before, wanted, step)
+    assert abs(next_value) <= max(abs(wanted), 0.0) + 1e-12
+    assert next_value * wanted >= 0

@@ -84,7 +84,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "given", "value"),
+    ("kind", "entered", "value"),
     [
         ("double[]", "1, 2.5,-300", (1.0, 2.5, -300.0)),
         ("double[]", [1, 2.5], (1.0, 2.5)),
@@ -97,18 +97,20 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
         ("string[]", ["a,b", ""], ("a,b", "")),
     ],
 )
-def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
-    of = widget(type=kind)
-    found = check_value(
-        of, ParameterState("live"), of.parse_text(given, ENGLISH) if isinstance(given, str) else given
+def test_a_list_is_typed_value_by_value(kind: str, entered: Any, value: tuple[Any, ...]) -> None:
+    gains = widget(type=kind)
+    checked = check_value(
+        gains,
+        ParameterState("live"),
+        gains.parse_text(entered, ENGLISH) if isinstance(entered, str) else entered,
     )
-    assert found == value
-    assert isinstance(found, tuple)
-    assert [type(one) for one in found] == [type(one) for one in value]
+    assert checked == value
+    assert isinstance(checked, tuple)
+    assert [type(element) for element in checked] == [type(element) for element in value]
 
 
 @pytest.mark.parametrize(
-    ("more", "given", "label", "code", "about"),
+    ("more", "entered", "label", "code", "about"),
     [
         ({}, "1, x", f"{VALUE} 2", "input_not_a_number", {"limits": "0 to 5", "given": '"x"'}),
         ({}, "1, 7", f"{VALUE} 2", "input_outside_limits", {"given": "7", "limits": "0 to 5"}),
@@ -140,16 +142,16 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
     ],
 )
 def test_each_value_of_a_list_is_checked(
-    more: dict[str, Any], given: Any, label: str, code: str, about: dict[str, Any]
+    more: dict[str, Any], entered: Any, label: str, code: str, about: dict[str, Any]
 ) -> None:
     limits = Range(0.0, 5.0) if more.get("type") is None else Range()
     with pytest.raises(InputError) as refused:
-        check_value(widget(**more), ParameterState("live", range=limits), given)
+        check_value(widget(**more), ParameterState("live", range=limits), entered)
     assert coded(refused.value.text, "label", *about) == (code, label, *about.values())
 
 
 @pytest.mark.parametrize(
-    ("more", "given", "value"),
+    ("more", "entered", "value"),
     [
         ({"type": "integer"}, "2", 2),
         ({"type": "integer"}, 2, 2),
@@ -158,15 +160,15 @@ def test_each_value_of_a_list_is_checked(
         ({"type": "string", "options": [{"value": "a", "label": "A"}]}, "a", "a"),
     ],
 )
-def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, value: Any) -> None:
-    found = check_value(widget(**{"options": OPTIONS, **more}), ParameterState("live"), given)
-    assert (found, type(found)) == (value, type(value))
+def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, entered: Any, value: Any) -> None:
+    checked = check_value(widget(**{"options": OPTIONS, **more}), ParameterState("live"), entered)
+    assert (checked, type(checked)) == (value, type(value))
 
 
-@pytest.mark.parametrize("given", ["", "3", 3, True, "Slow", [1]])
-def test_unknown_option_is_refused(given: Any) -> None:
+@pytest.mark.parametrize("entered", ["", "3", 3, True, "Slow", [1]])
+def test_unknown_option_is_refused(entered: Any) -> None:
     with pytest.raises(InputError) as refused:
-        check_value(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
+        check_value(widget(type="integer", options=OPTIONS), ParameterState("live"), entered)
     assert coded(refused.value.text, "label", "options") == (
         "input_not_an_option",
         "Gains",
@@ -175,9 +177,9 @@ def test_unknown_option_is_refused(given: Any) -> None:
 
 
 def test_an_option_that_the_node_does_not_take_is_refused() -> None:
-    of = widget(type="integer", options=OPTIONS)
+    gains = widget(type="integer", options=OPTIONS)
     with pytest.raises(InputError) as refused:
-        check_value(of, ParameterState("live", range=Range(0, 1)), "2")
+        check_value(gains, ParameterState("live", range=Range(0, 1)), "2")
     assert coded(refused.value.text, "given", "limits") == ("input_outside_limits", "Fast", "0 to 1")
 
 
@@ -200,8 +202,8 @@ def test_a_list_and_an_option_show_as_they_are_entered(
     panel = panel_of({**GAINS, **more})
     there = robot_there(panel)
     there.parameters["gains"] = ParameterState("live", value)
-    (of,) = panel.parameters()
-    shown = english(parameter(of, there))
+    (gains,) = panel.parameters()
+    shown = english(parameter(gains, there))
     assert shown["text"] == text if text is not None else shown["text"].endswith("…")
     assert (shown["entry"], shown["limits"]) == (entry, limits)
 
@@ -221,10 +223,10 @@ def test_a_list_shows_its_beginning_however_long_its_texts_are(
     panel = panel_of({**GAINS, "type": "string[]"})
     there = robot_there(panel)
     there.parameters["gains"] = ParameterState("live", value)
-    (of,) = panel.parameters()
+    (gains,) = panel.parameters()
     began = time.process_time()
     for _ in range(50):  # with every change of anything on the page
-        shown = parameter(of, there)
+        shown = parameter(gains, there)
     assert time.process_time() - began < 1  # it took 5 s, of the whole server
     assert shown["text"] == "a" * 199 + "…"
     assert shown["entry"] == (", ".join(value) if entered else "")
@@ -256,7 +258,7 @@ def test_a_list_shows_its_beginning_however_long_its_texts_are(
     ],
 )
 def test_what_is_wrong_in_the_panel_file_is_reported(more: dict[str, Any], fault: str) -> None:
-    assert any(one.startswith(f"page[0].widget[0]{fault}") for one in faults({**GAINS, **more}))
+    assert any(message.startswith(f"page[0].widget[0]{fault}") for message in faults({**GAINS, **more}))
 
 
 # On the real bridge.
@@ -302,7 +304,7 @@ def press(kiosk: Server, name: str, value: Any) -> httpx.Response:
 
 def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) -> None:
     shown = kiosk.snapshot()["widgets"]
-    assert {name: one["text"] for name, one in shown.items()} == {
+    assert {name: shown_parameter["text"] for name, shown_parameter in shown.items()} == {
         "gains": "1, 2.5 N",
         "axes": "used, free",
         "frames": 'base, "tool, left"',
@@ -317,8 +319,8 @@ def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) 
         "slots": ("7", [7]),
         "mode": ("2", 2),
     }
-    for name, (given, value) in values.items():
-        receipt = press(kiosk, name, given)
+    for name, (entered, value) in values.items():
+        receipt = press(kiosk, name, entered)
         assert (receipt.status_code, receipt.json()["outcome"]) == (200, "succeeded"), receipt.text
         assert robot.parameters()[name] == value
     until(lambda: kiosk.widget("mode")["text"] == "Fast", "it shows")

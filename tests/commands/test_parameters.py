@@ -48,9 +48,9 @@ def widget(**more: Any) -> Parameter:
     return Parameter.model_validate({**SPEED, **more})
 
 
-def value(kind: int, given: Any) -> dict[str, Any]:
+def value(kind: int, number: Any) -> dict[str, Any]:
     types = {DOUBLE: "double", INTEGER: "integer", STRING: "string"}
-    return {**encode_value(widget(type="double"), 0.0), "type": kind, f"{types[kind]}_value": given}
+    return {**encode_value(widget(type="double"), 0.0), "type": kind, f"{types[kind]}_value": number}
 
 
 def descriptor(name: str, kind: int, **more: Any) -> dict[str, Any]:
@@ -120,11 +120,11 @@ class Bench:
         for _ in range(5):
             await asyncio.sleep(0)
 
-    async def tell(self, first: int, given: float, **more: Any) -> None:
+    async def tell(self, first: int, number: float, **more: Any) -> None:
         """What the node describes and holds, asked for by query number `first` and the next."""
         described = [descriptor("speed", DOUBLE, **more)]
         await self.answer(first, DESCRIBE, descriptors=described)
-        await self.answer(first + 1, GET, values=[value(DOUBLE, given)])
+        await self.answer(first + 1, GET, values=[value(DOUBLE, number)])
 
     def event(self, node: str = "/arm", *, skipped: int = 0, **parts: Any) -> None:
         lists = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
@@ -132,22 +132,22 @@ class Bench:
         payload = INTERFACES.encode(EVENT_TYPE, fields)
         self.parameters.on_event("parameter_events", Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
 
-    async def until(self, what: Callable[[], bool]) -> None:
+    async def until(self, condition: Callable[[], bool]) -> None:
         async with asyncio.timeout(5):
-            while not what():
+            while not condition():
                 await asyncio.sleep(0.001)
 
     @property
     def shown(self) -> dict[str, Any]:
-        (one,) = self.panel.parameters()
-        return parameter(one, self.robot)
+        (speed,) = self.panel.parameters()
+        return parameter(speed, self.robot)
 
     def known(self, name: str = "speed") -> ParameterState:
         return self.robot.parameters.get(name, UNKNOWN)
 
     def reason(self, name: str = "speed") -> TextLike:
-        one = next(w for w in self.panel.parameters() if w.id == name)
-        return judged(one, (), self.robot, NOW).reason or ""
+        parameter_widget = next(w for w in self.panel.parameters() if w.id == name)
+        return judged(parameter_widget, (), self.robot, NOW).reason or ""
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -161,8 +161,8 @@ def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> 
     asyncio.run(whole())
 
 
-def change(given: float) -> list[dict[str, Any]]:
-    return [{"name": "speed", "value": value(DOUBLE, given)}]
+def change(number: float) -> list[dict[str, Any]]:
+    return [{"name": "speed", "value": value(DOUBLE, number)}]
 
 
 @pytest.fixture(autouse=True)
@@ -240,18 +240,18 @@ def test_an_event_while_the_node_is_asked_goes_over_its_answer() -> None:
     run(test)
 
 
-@pytest.mark.parametrize("what", ["skipped", "new", "deleted", "too large"])
-def test_what_an_event_may_hide_is_asked_for(what: str) -> None:
+@pytest.mark.parametrize("event", ["skipped", "new", "deleted", "too large"])
+def test_what_an_event_may_hide_is_asked_for(event: str) -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
-        if what == "skipped":
+        if event == "skipped":
             bench.event("/other", skipped=1)
-        elif what == "too large":  # to be read at once
+        elif event == "too large":  # to be read at once
             texts = {**value(DOUBLE, 0.0), "type": 9, "string_array_value": [""] * 10_000}
             bench.event("/arm", changed_parameters=[*change(0.7), {"name": "list", "value": texts}])
         else:
-            parts: dict[str, Any] = {f"{what}_parameters": change(0.7)}
+            parts: dict[str, Any] = {f"{event}_parameters": change(0.7)}
             bench.event("/arm", **parts)
         await bench.tell(3, 0.8, read_only=True)
         assert (bench.known().value, bench.known().read_only) == (0.8, True)
@@ -299,11 +299,11 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
     monkeypatch.setattr(client, "ANSWER_S", 0.01)
 
     async def test(bench: Bench) -> None:
-        (one,) = bench.panel.parameters()
-        assert bench.parameters.read_again(one) == say("parameter_node_unavailable", node="/arm")
+        (speed,) = bench.panel.parameters()
+        assert bench.parameters.read_again(speed) == say("parameter_node_unavailable", node="/arm")
         bench.offer()
         await bench.queried(1)
-        assert bench.parameters.read_again(one) == ""  # it is being asked
+        assert bench.parameters.read_again(speed) == ""  # it is being asked
         await bench.until(lambda: bench.known().state == "silent")
         assert bench.shown["askable"] is False
         assert coded(bench.shown["note"], "node") == ("parameter_waiting_for_node", "/arm")
@@ -318,8 +318,8 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
             bench.parameters.on_graph_change()
             await asyncio.sleep(0.03)
         assert len(bench.line.queries) == 1
-        assert bench.parameters.read_again(one) == ""
-        assert bench.parameters.read_again(one) == ""
+        assert bench.parameters.read_again(speed) == ""
+        assert bench.parameters.read_again(speed) == ""
         await bench.queried(2)
         await asyncio.sleep(0.03)
         bench.line.queries[1][2].set_result(None)  # after its time
@@ -342,16 +342,16 @@ def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_i
     """A program that read again and again had the node asked hundreds of times a second."""
 
     async def test(bench: Bench) -> None:
-        (one,) = bench.panel.parameters()
+        (speed,) = bench.panel.parameters()
         monkeypatch.setattr(sync, "AGAIN_S", 60.0)
         bench.offer()
         await bench.tell(1, 0.5)
         for _ in range(20):
-            assert bench.parameters.read_again(one) == ""
+            assert bench.parameters.read_again(speed) == ""
             await asyncio.sleep(0.001)
         assert len(bench.line.queries) == 2
         monkeypatch.setattr(sync, "AGAIN_S", 0.0)
-        assert bench.parameters.read_again(one) == ""
+        assert bench.parameters.read_again(speed) == ""
         await bench.tell(3, 0.6)
         assert bench.known().value == 0.6
 
@@ -441,8 +441,8 @@ def test_what_a_node_says_locks_or_not(
         await bench.answer(1, DESCRIBE, descriptors=[described])
         await bench.answer(2, GET, values=[held])
         assert bench.known().state == state
-        code, found = coded(bench.reason(), "found")
-        assert (code.removeprefix("parameter_"), found)[: len(reason)] == reason
+        code, found_type = coded(bench.reason(), "found")
+        assert (code.removeprefix("parameter_"), found_type)[: len(reason)] == reason
         assert bool(reason) == bool(bench.reason())
 
     run(test)
@@ -463,11 +463,11 @@ def test_parameter_is_read_back_after_setting() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
-        (one,) = bench.panel.parameters()
+        (speed,) = bench.panel.parameters()
         corrected: list[tuple[str, Outcome]] = []
         setting = asyncio.create_task(
             bench.parameters.set(
-                one, 0.7, PressHandle("p1", lambda answer: corrected.append(("p1", answer)))
+                speed, 0.7, PressHandle("p1", lambda answer: corrected.append(("p1", answer)))
             )
         )
         await bench.queried(3)
@@ -488,8 +488,10 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
-        (one,) = bench.panel.parameters()
-        setting = asyncio.create_task(bench.parameters.set(one, 0.7, PressHandle("p1", lambda _: None)))
+        (speed,) = bench.panel.parameters()
+        setting = asyncio.create_task(
+            bench.parameters.set(speed, 0.7, PressHandle("p1", lambda _: None))
+        )
         await bench.answer(3, SET, results=[])
         assert (await setting).outcome == "unknown"
 
@@ -497,7 +499,7 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "kind", "value"),
+    ("entered", "kind", "value"),
     [
         (1, "double", 1.0),
         (0.30000000000000004, "double", 0.30000000000000004),
@@ -507,13 +509,15 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
         (True, "bool", True),
     ],
 )
-def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
-    found = check_value(widget(type=kind), ParameterState("live", range=Range(None, None, None)), given)
-    assert (found, type(found)) == (value, type(value))
+def test_a_value_is_typed(entered: Any, kind: str, value: Any) -> None:
+    checked = check_value(
+        widget(type=kind), ParameterState("live", range=Range(None, None, None)), entered
+    )
+    assert (checked, type(checked)) == (value, type(value))
 
 
 @pytest.mark.parametrize(
-    ("given", "kind"),
+    ("entered", "kind"),
     [
         (math.nan, "double"),
         (math.inf, "double"),
@@ -531,9 +535,9 @@ def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
         (["x"], "string"),
     ],
 )
-def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
+def test_a_value_of_another_type_is_refused(entered: Any, kind: str) -> None:
     with pytest.raises(InputError, match="Speed"):
-        check_value(widget(type=kind), ParameterState("live"), given)
+        check_value(widget(type=kind), ParameterState("live"), entered)
 
 
 @pytest.mark.parametrize(
@@ -553,12 +557,12 @@ def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
 def test_a_panel_narrows_what_the_node_describes(
     own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
 ) -> None:
-    of, known = widget(**own), ParameterState("live", range=theirs)
-    assert english(limits_text(of, allowed_range(of, known))) == limits
-    assert [check_value(of, known, one) for one in good] == good
-    for one in bad:
+    speed, known = widget(**own), ParameterState("live", range=theirs)
+    assert english(limits_text(speed, allowed_range(speed, known))) == limits
+    assert [check_value(speed, known, number) for number in good] == good
+    for number in bad:
         with pytest.raises(InputError) as refused:
-            check_value(of, known, one)
+            check_value(speed, known, number)
         assert coded(refused.value.text, "label") == ("input_outside_limits", "Speed")
 
 
@@ -574,12 +578,12 @@ def test_no_value_that_both_allow_locks() -> None:
 
 
 def test_integers_are_exact_to_the_last_step() -> None:
-    of = widget(type="integer")
+    count = widget(type="integer")
     known = ParameterState("live", range=Range(-(2**63), 2**63 - 1, 2))
-    assert check_value(of, known, str(2**53 + 2)) == 2**53 + 2
-    assert check_value(of, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
+    assert check_value(count, known, str(2**53 + 2)) == 2**53 + 2
+    assert check_value(count, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
     with pytest.raises(InputError):
-        check_value(of, known, str(2**53 + 1))
+        check_value(count, known, str(2**53 + 1))
 
 
 @pytest.mark.parametrize(
@@ -622,8 +626,8 @@ def test_a_value_shows_and_its_input_starts_from_it(
     panel = panel_of({**SPEED, "type": kind, "unit": unit})
     robot = robot_there(panel)
     robot.parameters["speed"] = ParameterState("live", value)
-    (of,) = panel.parameters()
-    shown = parameter(of, robot)
+    (speed,) = panel.parameters()
+    shown = parameter(speed, robot)
     assert english((shown["text"], shown["entry"])) == (text, entry)
     assert coded(shown["note"]) == (
         "parameter_read_without_events",

@@ -63,10 +63,10 @@ def free(server: Server, **more: Any) -> httpx.Response:
 
 def used_up(server: Server) -> httpx.Response:
     """The answer to the first press that is one too many."""
-    found: httpx.Response = until(
-        lambda: (one := free(server)).status_code == 429 and one, "too many", every_s=0
+    response: httpx.Response = until(
+        lambda: (response := free(server)).status_code == 429 and response, "too many", every_s=0
     )
-    return found
+    return response
 
 
 def test_a_flood_reaches_the_robot_at_the_rate_of_a_client(
@@ -158,7 +158,7 @@ def test_the_begin_of_a_hold_is_a_press(strict: Server) -> None:
                 assert socket.closed() == 4000 + said["status"]
             return said
 
-    said = until(lambda: (one := begun()).get("status") == 429 and one, "too many", within_s=40)
+    said = until(lambda: (message := begun()).get("status") == 429 and message, "too many", within_s=40)
     assert (said["state"], TOO_OFTEN in said["reason"]) == ("refused", True)
     assert "hold of jog" not in strict.process.text
 
@@ -176,7 +176,9 @@ def test_cancels_of_the_same_goal_again_and_again_are_refused(strict: Server) ->
     def cancel(**form: Any) -> httpx.Response:
         return strict.http.post("/widgets/count/cancel", **form)
 
-    answer = until(lambda: (one := cancel()).status_code == 429 and one, "too many", every_s=0)
+    answer = until(
+        lambda: (response := cancel()).status_code == 429 and response, "too many", every_s=0
+    )
     assert answer.headers["retry-after"] == "1"
     assert "too many cancel requests" in answer.json()["reason"]
     location = until(

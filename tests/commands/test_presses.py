@@ -330,12 +330,12 @@ def test_an_input_with_a_default_may_be_left_out() -> None:
     assert bench.way.texts == ["hi 0.25 2 false 5", "hi -1.0 1 false 5"]
 
 
-@pytest.mark.parametrize("one", [MESSAGE, REACH, MODE, ON, COUNT])
-def test_an_input_without_a_default_in_the_file_may_not_be_left_out(one: Table) -> None:
-    plain = {key: value for key, value in one.items() if key != "default"}
-    bench = Bench(panel_of(plain, {**FREE, "message": {"data": f"a {{{one['id']}}}"}}))
+@pytest.mark.parametrize("table", [MESSAGE, REACH, MODE, ON, COUNT])
+def test_an_input_without_a_default_in_the_file_may_not_be_left_out(table: Table) -> None:
+    plain = {key: value for key, value in table.items() if key != "default"}
+    bench = Bench(panel_of(plain, {**FREE, "message": {"data": f"a {{{table['id']}}}"}}))
     cause, reason = refused(bench, bench.press(inputs={}))
-    assert (cause, reason) == ("input", f'the input "{one["id"]}" is missing')
+    assert (cause, reason) == ("input", f'the input "{table["id"]}" is missing')
 
 
 def test_a_message_may_need_no_input() -> None:
@@ -498,10 +498,10 @@ def test_a_number_arrives_as_a_number() -> None:
     assert INTERFACES.decode("geometry_msgs/msg/Point", payload).x == -0.5
 
 
-@pytest.mark.parametrize("given", [1.5, 0.3, math.nan, "0.5", True])
-def test_a_number_out_of_its_limits_is_refused_with_them(given: Any) -> None:
+@pytest.mark.parametrize("entered", [1.5, 0.3, math.nan, "0.5", True])
+def test_a_number_out_of_its_limits_is_refused_with_them(entered: Any) -> None:
     bench = Bench(panel_of(SPEED, MOVE))
-    cause, reason = refused(bench, bench.press(inputs={"speed": given}))
+    cause, reason = refused(bench, bench.press(inputs={"speed": entered}))
     assert cause == "input"
     code, *about = coded(reason, "label", "limits")
     assert code in ("input_outside_limits", "input_not_a_number")

@@ -48,7 +48,7 @@ async def pressed(
     return entry
 
 
-def found(folder: Path, robot: str = "", since: int = 0) -> list[OpenPress]:
+def open_presses_in(folder: Path, robot: str = "", since: int = 0) -> list[OpenPress]:
     return open_presses(folder, robot, ["count"], since)
 
 
@@ -67,14 +67,16 @@ def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
         await log.stop()
 
     asyncio.run(test())
-    outcomes = [(one.press.press, one.outcome, one.accepted) for one in found(tmp_path)]
+    outcomes = [
+        (press.press.press, press.outcome, press.accepted) for press in open_presses_in(tmp_path)
+    ]
     assert outcomes == [
         ("silent", "timed_out", False),
         ("goes on", "unknown", True),
         ("cut off", "", False),
     ]
-    assert [one.press.press for one in found(tmp_path, "arm")] == ["of-another"]
-    assert found(tmp_path, since=round((time.time() + 1) * 1000)) == []
+    assert [press.press.press for press in open_presses_in(tmp_path, "arm")] == ["of-another"]
+    assert open_presses_in(tmp_path, since=round((time.time() + 1) * 1000)) == []
 
 
 class Rig:
@@ -240,7 +242,7 @@ def test_what_the_robot_does_not_know_opens_and_is_logged(
         assert rig.lock == ""
         await rig.log.stop()
         assert rig.outcomes() == ["", *before, "unknown", "unknown"]
-        assert len(found(tmp_path)) == 1
+        assert len(open_presses_in(tmp_path)) == 1
         again = Rig(await opened(tmp_path), tmp_path)
         await again.resuming.start()
         assert "count" not in again.bench.robot.command_status
@@ -314,7 +316,7 @@ def test_a_press_id_that_was_used_twice_is_of_two_goals(
         again = await pressed(rig.log, "g1", "accepted")
         await rig.started(questions=2)
         assert {queried_goal(rig, 0), queried_goal(rig, 1)} == {
-            goal_id(one.hash).bytes for one in (entry, again)
+            goal_id(logged.hash).bytes for logged in (entry, again)
         }
 
     run(tmp_path, test, "accepted")

@@ -194,7 +194,7 @@ def test_a_press_is_looked_up_by_an_index_in_older_files_too(tmp_path: Path) -> 
         db.execute("DROP INDEX entry_press")
     db.close()
     store = Store(tmp_path, "boot2")
-    assert [one.seq for one in store.entries_of_press(pressed(7))] == [8]
+    assert [entry.seq for entry in store.entries_of_press(pressed(7))] == [8]
     assert store.entries_of_press(pressed(1000)) == []
     store.close()
     assert "entry_press" in plan(tmp_path)

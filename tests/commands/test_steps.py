@@ -144,11 +144,11 @@ def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_report
     assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("40", "60")
 
 
-@pytest.mark.parametrize("given", [40, 41, 60, "50", None, True])
-def test_a_press_that_is_no_step_from_the_reported_value_sends_nothing(given: Any) -> None:
+@pytest.mark.parametrize("entered", [40, 41, 60, "50", None, True])
+def test_a_press_that_is_no_step_from_the_reported_value_sends_nothing(entered: Any) -> None:
     desk = Desk()
     desk.reports(40.0)
-    receipt = desk.press(given)
+    receipt = desk.press(entered)
     assert receipt.outcome == "refused"
     assert coded(receipt.reason, "label", "value") == ("step_value_changed", "Speed", "40")
     assert desk.sent() == []

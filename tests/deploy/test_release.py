@@ -130,10 +130,12 @@ def test_the_workflow_may_do_no_more_than_it_must() -> None:
         "publish": {"contents": "write"},
     }
     used = [step["uses"] for job in jobs.values() for step in job["steps"] if "uses" in step]
-    assert [one for one in used if not re.fullmatch(r"actions/[a-z-]+@(v\d+|[0-9a-f]{40})", one)] == []
+    assert [
+        action for action in used if not re.fullmatch(r"actions/[a-z-]+@(v\d+|[0-9a-f]{40})", action)
+    ] == []
     # What has the right to publish runs nothing of the checkout.
-    assert not [one for one in jobs["publish"]["steps"] if "checkout" in one.get("uses", "")]
+    assert not [step for step in jobs["publish"]["steps"] if "checkout" in step.get("uses", "")]
     runs = [step.get("run", "") for step in jobs["files"]["steps"]]
-    assert any(re.match(r"make release TAG=", one) for one in runs)
+    assert any(re.match(r"make release TAG=", command) for command in runs)
     # A name is a variable of the shell, and not a part of the script.
-    assert not [one for one in runs if re.search(r"\$\{\{ *github\.(ref|head|event)", one)]
+    assert not [command for command in runs if re.search(r"\$\{\{ *github\.(ref|head|event)", command)]

@@ -121,7 +121,7 @@ def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: Path) -> None:
     commands = of_pages(SERVICE)
     assert commands[:2] == [VENV, DEPENDENCIES]
-    assert [one for one in commands if "pip install" in one][1:] == [commands[2]]
+    assert [command for command in commands if "pip install" in command][1:] == [commands[2]]
     requirements = machine.run(f"{RELEASE}/bin/pip check")
     assert requirements.returncode == 0, requirements.stdout
     version = machine.run(f"{RELEASE}/bin/operator-panel --version")
@@ -222,22 +222,24 @@ def instructions(name: str) -> list[str]:
 
 
 def test_the_image_has_what_the_service_page_installs(wheel: Path) -> None:
-    installs = [one for one in of_pages(SERVICE) if "pip install" in one or " -m venv " in one]
+    installs = [
+        command for command in of_pages(SERVICE) if "pip install" in command or " -m venv " in command
+    ]
     made = re.sub(r" --no-cache-dir|/build/", "", CONTAINERFILE)
-    assert [one for one in installs if one not in made] == []
+    assert [command for command in installs if command not in made] == []
     (copied,) = re.findall(r"^COPY (deploy/.*) /build/$", CONTAINERFILE, re.MULTILINE)
     lock, built = copied.split()
     assert (ROOT / lock).is_file()
     assert Path(built).match(f"dist/{built.split('/')[1]}")
     assert wheel.match(built.split("/")[1])
     ignored = (ROOT / ".dockerignore").read_text().splitlines()
-    assert [one for one in ignored if one[:1] != "#"] == ["*", f"!{lock}", f"!{built}"]
+    assert [pattern for pattern in ignored if pattern[:1] != "#"] == ["*", f"!{lock}", f"!{built}"]
 
 
 def test_the_image_names_no_host_and_runs_as_a_user_of_its_own() -> None:
     images = re.findall(r"^FROM (\S+)", CONTAINERFILE, re.MULTILINE)
-    images += [one["image"] for one in COMPOSE["services"].values()]
-    assert [one for one in images if "." in one.split("/")[0] and "/" in one] == []
+    images += [service["image"] for service in COMPOSE["services"].values()]
+    assert [image for image in images if "." in image.split("/")[0] and "/" in image] == []
     assert instructions("USER") == ["10001"]
     assert "useradd --system --uid 10001" in CONTAINERFILE
 
@@ -282,18 +284,22 @@ def test_the_image_starts_read_only_and_its_health_check_sees_it(container: Proc
 def test_the_composition_gives_both_what_they_need_and_no_more() -> None:
     services = COMPOSE["services"]
     assert set(services) == {"panel", "bridge"}
-    for one in services.values():
-        assert (one["read_only"], one["cap_drop"], one["network_mode"]) == (True, ["ALL"], "host")
-        assert one["security_opt"] == ["no-new-privileges:true"]
-        assert "ports" not in one  # the host's network has none to publish
-        assert one["restart"] == "unless-stopped"
+    for service in services.values():
+        assert (service["read_only"], service["cap_drop"], service["network_mode"]) == (
+            True,
+            ["ALL"],
+            "host",
+        )
+        assert service["security_opt"] == ["no-new-privileges:true"]
+        assert "ports" not in service  # the host's network has none to publish
+        assert service["restart"] == "unless-stopped"
     panel, bridge = services["panel"], services["bridge"]
     folder = ROOT / "deploy" / panel["build"]["context"]
     assert (folder / panel["build"]["dockerfile"]).resolve() == ROOT / "deploy/Containerfile"
-    mounted = {one["target"]: one for one in panel["volumes"] if isinstance(one, dict)}
+    mounted = {volume["target"]: volume for volume in panel["volumes"] if isinstance(volume, dict)}
     assert panel["command"] == ["run", "/etc/operator-panel/panel.toml"]
     assert mounted["/etc/operator-panel"]["read_only"]
-    (data,) = (one for one in panel["volumes"] if isinstance(one, str))
+    (data,) = (volume for volume in panel["volumes"] if isinstance(volume, str))
     assert data == f"{next(iter(COMPOSE['volumes']))}:{instructions('VOLUME')[0]}"
     (config,) = bridge["volumes"]
     assert (ROOT / "deploy" / config["source"]).resolve() == ROOT / "deploy/bridge.json5"

@@ -73,10 +73,10 @@ FORMS: Final = tuple(
 
 def secrets_in(files: dict[str, str]) -> list[tuple[str, str]]:
     """(file, what is around it) of each secret."""
-    found = []
+    leaks = []
     for name, text in files.items():
         lower = f"{name}\n{text}".lower()
         for secret in (SECRET, NUMBER):
             if (at := lower.find(secret)) >= 0:
-                found.append((name, lower[max(0, at - 60) : at + 60]))
-    return found
+                leaks.append((name, lower[max(0, at - 60) : at + 60]))
+    return leaks

@@ -21,20 +21,22 @@ def interlock(topic: str, **more: Any) -> str:
     return f'[[interlock]]\nid = "{topic[1:]}"\ntopic = "{topic}"\n' + keys(more)
 
 
-def readout(topic: str, of: str = STRING, **more: Any) -> str:
-    return widget("readout", topic, topic=topic, type=of, field=more.pop("field", "data"), **more)
+def readout(topic: str, type_name: str = STRING, **more: Any) -> str:
+    return widget(
+        "readout", topic, topic=topic, type=type_name, field=more.pop("field", "data"), **more
+    )
 
 
-def button(topic: str, of: str = STRING) -> str:
-    return widget("publish", topic, topic=topic, type=of, message={})
+def button(topic: str, type_name: str = STRING) -> str:
+    return widget("publish", topic, topic=topic, type=type_name, message={})
 
 
-def call(service: str, of: str) -> str:
-    return widget("call", service, service=service, type=of)
+def call(service: str, type_name: str) -> str:
+    return widget("call", service, service=service, type=type_name)
 
 
-def action(name: str, of: str = "example_interfaces/action/Fibonacci") -> str:
-    return widget("action", name, action=name, type=of)
+def action(name: str, type_name: str = "example_interfaces/action/Fibonacci") -> str:
+    return widget("action", name, action=name, type=type_name)
 
 
 def parameter(node: str) -> str:
@@ -46,13 +48,13 @@ def widget(kind: str, name: str, **more: Any) -> str:
     return "[[page.widget]]\n" + keys(about | more)
 
 
-def keys(given: dict[str, Any]) -> str:
-    return "".join(f"{key} = {_toml(value)}\n" for key, value in given.items())
+def keys(table: dict[str, Any]) -> str:
+    return "".join(f"{key} = {_toml(value)}\n" for key, value in table.items())
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
     if isinstance(value, bool):
         return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else str(value)
@@ -91,8 +93,8 @@ class Setup:
 
     def findings(self, text: str, endpoint: str, listen_s: float = LONGEST_S) -> list[Finding]:
         """The errors and warnings, and notes but for those about clocks that nothing is known of."""
-        found = self.diagnose(text, endpoint, listen_s).report.findings
-        return [one for one in found if one.code != "clock_unknown"]
+        findings = self.diagnose(text, endpoint, listen_s).report.findings
+        return [finding for finding in findings if finding.code != "clock_unknown"]
 
 
 def named(findings: list[Finding]) -> list[tuple[str, str]]:

@@ -221,15 +221,15 @@ def test_what_is_broken_is_named_and_nothing_else(
     elif expected[0][0] in {"clock_differs", "simulated_time"}:
         listen_s = ENOUGH_S
         monkeypatch.setattr("app.diagnose.robot.receive", receive_all)
-    found = setup.findings(text, shared.endpoint, listen_s)
-    assert named(found) == expected
-    assert all(one.sentence and one.do for one in found)
+    findings = setup.findings(text, shared.endpoint, listen_s)
+    assert named(findings) == expected
+    assert all(finding.sentence and finding.do for finding in findings)
 
 
 def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setup: Setup) -> None:
-    found = setup.diagnose(WELL, shared.endpoint, listen_s=ENOUGH_S)
-    assert found.report.findings == []
-    facts = "\n".join(found.report.facts)
+    diagnosis = setup.diagnose(WELL, shared.endpoint, listen_s=ENOUGH_S)
+    assert diagnosis.report.findings == []
+    facts = "\n".join(diagnosis.report.facts)
     assert f"domain {shared.domain}" in facts
     assert "Zenoh 1.10" in facts
     assert "clock of the bridge's machine is within 1 s" in facts
@@ -250,15 +250,15 @@ def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
     monkeypatch.setattr("app.diagnose.received.ENOUGH", 1000)  # it waits for the end of the publisher
     with ThreadPoolExecutor() as pool:
         published = pool.submit(publish_and_go, robot, "/hasty", BOOL, {"data": True}, heard.is_set)
-        found = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
+        findings = setup.findings(panel_of(interlock("/hasty")), shared.endpoint, listen_s=ENOUGH_S)
         published.result()
-    assert named(found) == [("permission_ends", "/hasty")]
+    assert named(findings) == [("permission_ends", "/hasty")]
 
 
 def test_a_permission_that_says_no_is_a_note(shared: Bridge, robot: RosNode, setup: Setup) -> None:
-    found = setup.diagnose(panel_of(interlock("/refused")), shared.endpoint)
-    assert found.report.is_well
-    assert "permission_refused" in found.report.codes()
+    diagnosis = setup.diagnose(panel_of(interlock("/refused")), shared.endpoint)
+    assert diagnosis.report.is_well
+    assert "permission_refused" in diagnosis.report.codes()
 
 
 def test_a_definition_that_is_another_one_is_named(
@@ -278,12 +278,14 @@ def test_of_several_robots_each_is_looked_at(shared: Bridge, robot: RosNode, set
         f' {{ id = "right", name = "Right", namespace = "/right", connect = ["{lost}"] }}'
     )
     text = panel_of(readout("/wrods"), more=f"robot = [{entries}]\n")
-    found = setup.diagnose(text, shared.endpoint, listen_s=0.2)
+    diagnosis = setup.diagnose(text, shared.endpoint, listen_s=0.2)
     said = [
-        (finding.robot, finding.code) for finding in found.report.findings if finding.severity != "note"
+        (finding.robot, finding.code)
+        for finding in diagnosis.report.findings
+        if finding.severity != "note"
     ]
     assert said == [("left", "topic_no_publisher"), ("right", "no_router")]
-    assert set(found.graphs) == {"left"}
+    assert set(diagnosis.graphs) == {"left"}
 
 
 def test_a_topic_without_a_subscriber(setup: Setup) -> None:
@@ -309,22 +311,22 @@ def test_a_router_without_a_bridge(short_setup: Setup, peer: tuple[str, zenoh.Se
 
 def test_a_bridge_with_another_namespace(domain: int, setup: Setup) -> None:
     with started(Bridge(domain + 4, "/robot1")) as bridge:
-        (found,) = setup.findings(WELL, bridge.endpoint)
-        assert (found.code, found.details["theirs"]) == ("bridge_namespace", "/robot1")
+        (finding,) = setup.findings(WELL, bridge.endpoint)
+        assert (finding.code, finding.details["theirs"]) == ("bridge_namespace", "/robot1")
 
 
 def test_a_bridge_in_a_domain_without_nodes(domain: int, setup: Setup) -> None:
     """The tests' bridges are limited to their machine."""
     with started(Bridge(domain + 4)) as bridge:
-        (found,) = setup.findings(WELL, bridge.endpoint)
-        assert (found.code, found.details["domain"]) == ("bridge_localhost", str(domain + 4))
+        (finding,) = setup.findings(WELL, bridge.endpoint)
+        assert (finding.code, finding.details["domain"]) == ("bridge_localhost", str(domain + 4))
 
 
 def test_a_bridge_that_drops_in_silence(domain: int, setup: Setup) -> None:
     option = "plugins/ros2dds/reliable_routes_blocking=false"
     with started(Bridge(domain + 4, options=[option])) as bridge:
-        found = setup.findings(WELL, bridge.endpoint)
-        assert [one.code for one in found] == ["bridge_drops", "bridge_localhost"]
+        findings = setup.findings(WELL, bridge.endpoint)
+        assert [finding.code for finding in findings] == ["bridge_drops", "bridge_localhost"]
 
 
 def test_a_frozen_bridge(domain: int, short_setup: Setup) -> None:
@@ -345,19 +347,19 @@ def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
     thaw = threading.Timer(frozen_s, shared.thaw)
 
     async def received(*arguments: Any) -> ReceivedSamples:
-        found = await receive(*arguments)
+        received_samples = await receive(*arguments)
         shared.freeze()
         thaw.start()
-        return found
+        return received_samples
 
     monkeypatch.setattr("app.diagnose.robot.receive", received)
     text = panel_of(call("/system_controller/list_parameters", LIST_PARAMETERS))
     try:
-        found = setup.findings(text, shared.endpoint, listen_s=0.2)
+        findings = setup.findings(text, shared.endpoint, listen_s=0.2)
     finally:
         thaw.cancel()
         shared.thaw()
-    assert [one.code for one in found] == [expected]
+    assert [finding.code for finding in findings] == [expected]
 
 
 def test_two_bridges_for_one_robot(shared: Bridge, robot: RosNode, setup: Setup) -> None:
@@ -383,8 +385,10 @@ def test_a_bridge_that_holds_a_topic_back(
     with started(mine), closing(Client(mine.endpoint)) as client:
         until(lambda: announced(client, "/permission"), "announced")
         text = panel_of(interlock("/permission"), readout("/words"), button("/heard"))
-        found = setup.findings(text, mine.endpoint)
-        others = [one for one in found if one.code != "permission_publishers"]  # a bridge is another
+        findings = setup.findings(text, mine.endpoint)
+        others = [
+            finding for finding in findings if finding.code != "permission_publishers"
+        ]  # a bridge is another
         assert named(others) == [
             ("bridge_denies", "/words"),
             ("bridge_denies", "/heard"),
@@ -404,8 +408,8 @@ def test_a_bridge_of_another_version(setup: Setup, peer: tuple[str, zenoh.Sessio
     (first, *_) = setup.findings(panel_of(), endpoint, listen_s=0.1)
     assert (first.code, first.details["theirs"]) == ("bridge_version", "1.4.0")
     token.undeclare()
-    for one in served:
-        one.undeclare()
+    for queryable in served:
+        queryable.undeclare()
 
 
 def test_a_bridge_that_is_there_and_does_not_respond(

@@ -186,7 +186,7 @@ def test_a_finding_is_its_code_and_its_names() -> None:
     report.find("no_router", "tls/robot:7447#password=swordfish")
     report.find("topic_qos", "/a, /b and 7 more", detail="swordfish")
     shown = harmless_report(Diagnosis(report=report), "1.0")["findings"]
-    assert [one["about"] for one in shown] == [
+    assert [finding["about"] for finding in shown] == [
         "/speed",
         f"page[0].widget[2].{LEFT_OUT} (line 7)",
         "tls/robot:7447",

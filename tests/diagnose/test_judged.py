@@ -62,9 +62,9 @@ def robot(folder: Path, text: str) -> PanelRobot:
     return PanelRobot(load_panel(path))
 
 
-def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> SurveyedTopic:
-    one = TopicEndpoint(type=of, qos=qos, bridge="b1")
-    return SurveyedTopic(name=name, key=name[1:], publishers=(one,))
+def topic(name: str, type_name: str = STRING, qos: EndpointQos = QOS) -> SurveyedTopic:
+    publisher = TopicEndpoint(type=type_name, qos=qos, bridge="b1")
+    return SurveyedTopic(name=name, key=name[1:], publishers=(publisher,))
 
 
 def judged(robot: PanelRobot, **graph: Any) -> Report:
@@ -245,9 +245,9 @@ def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> Non
 
 def observed(*samples: tuple[float, float | None]) -> ReceivedSamples:
     """Of /words: (when it came, by the sender's clock)."""
-    found = ReceivedSamples(began=0.0, ended=3.0)
-    found.samples["words"] = [Sample(SENT, 0, at, at, "b1", sent=sent) for at, sent in samples]
-    return found
+    received = ReceivedSamples(began=0.0, ended=3.0)
+    received.samples["words"] = [Sample(SENT, 0, at, at, "b1", sent=sent) for at, sent in samples]
+    return received
 
 
 @pytest.mark.parametrize(
@@ -346,9 +346,9 @@ def test_the_publishers_of_a_permission_are_named_if_there_are_several(
     graph = GraphSnapshot(robots=(RobotGraph(bridges=(BRIDGE,), topics=known),))
     report = Report()
     check_permissions(report, PanelNames.for_robot(here, graph), ReceivedSamples(), INTERFACES)
-    found = [
+    nodes_named = [
         finding.details["nodes"]
         for finding in report.findings
         if finding.code == "permission_publishers"
     ]
-    assert found == ([] if nodes is None else [nodes])
+    assert nodes_named == ([] if nodes is None else [nodes])

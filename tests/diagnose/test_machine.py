@@ -58,8 +58,8 @@ def connect(root: Path, said: bytes, name: str = "card0-HDMI-A-1", status: str =
 
 def codes(setup: Setup, text: str = "") -> list[str]:
     """Without the one about the router that is not there."""
-    found = setup.diagnose(text or panel_of(), NO_ROUTER).report.codes()
-    return [code for code in found if code != "no_router"]
+    reported = setup.diagnose(text or panel_of(), NO_ROUTER).report.codes()
+    return [code for code in reported if code != "no_router"]
 
 
 def test_a_free_port_a_writable_folder_fonts_and_no_screen_are_well(setup: Setup) -> None:
@@ -75,9 +75,9 @@ def test_a_port_of_another_program_is_named(setup: Setup) -> None:
 def test_an_address_that_is_not_this_machines() -> None:
     report = Report()
     check_port(report, "192.0.2.99", free_port())
-    (found,) = report.findings
-    assert found.code == "address_unusable"
-    assert "can't assign" in found.sentence or "cannot assign" in found.sentence
+    (finding,) = report.findings
+    assert finding.code == "address_unusable"
+    assert "can't assign" in finding.sentence or "cannot assign" in finding.sentence
 
 
 @pytest.fixture
@@ -89,10 +89,10 @@ def server() -> Iterator[Server]:
 
 def test_a_server_of_ours_is_not_taken_for_another_program(setup: Setup, server: Server) -> None:
     setup.port, setup.data = server.port, server.data
-    found = setup.diagnose(panel_of(), NO_ROUTER).report
-    assert found.codes()[:2] == ["server_running", "server_not_ready"]
-    assert "bridge" in found.findings[1].sentence
-    assert "data_in_use" not in found.codes()
+    report = setup.diagnose(panel_of(), NO_ROUTER).report
+    assert report.codes()[:2] == ["server_running", "server_not_ready"]
+    assert "bridge" in report.findings[1].sentence
+    assert "data_in_use" not in report.codes()
 
 
 def test_a_data_folder_that_another_server_has(setup: Setup, server: Server) -> None:
@@ -109,8 +109,8 @@ def test_a_folder_that_cannot_be_written(setup: Setup, place: str) -> None:
 
 def test_a_full_disk(setup: Setup) -> None:
     setup.machine["free_bytes"] = lambda folder: 20 * MB
-    found = setup.diagnose(panel_of(), NO_ROUTER).report.findings
-    (full,) = [one for one in found if one.code == "data_full"]
+    findings = setup.diagnose(panel_of(), NO_ROUTER).report.findings
+    (full,) = [finding for finding in findings if finding.code == "data_full"]
     assert full.details == {"free_mb": 20, "needed_mb": 562}  # the log's 512 and others
 
 
@@ -177,9 +177,9 @@ def test_a_screen_is_measured(
 
 def test_the_key_that_comes_out_too_small_is_reported_in_mm(setup: Setup) -> None:
     connect(setup.screens, edid(1280, 800, 150, 94))
-    found = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
-    assert "a button of 20 mm is 11 mm wide" in found.sentence
-    assert "mm_per_px = 0.117" in found.do
+    finding = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
+    assert "a button of 20 mm is 11 mm wide" in finding.sentence
+    assert "mm_per_px = 0.117" in finding.do
 
 
 def test_a_page_that_does_not_fit_the_screen(setup: Setup) -> None:
@@ -237,10 +237,10 @@ def test_the_command_ends_with_1_where_something_is_wrong(
 @pytest.mark.usefixtures("another_program")
 def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(command(setup, "--json")) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert found["well"] is False
-    assert set(found) == {"version", "panel", "well", "findings", "facts", "more"}
-    first, second = found["findings"]
+    diagnosis = json.loads(capsys.readouterr().out)
+    assert diagnosis["well"] is False
+    assert set(diagnosis) == {"version", "panel", "well", "findings", "facts", "more"}
+    first, second = diagnosis["findings"]
     at = f"127.0.0.1 port {setup.port}"
     assert second["code"] == "demo_mode"
     assert first == {

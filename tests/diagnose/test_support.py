@@ -166,12 +166,12 @@ def test_no_secret_of_a_broken_file_is_in_it(
     for panel in (f"{form}\n", f'title = "Cell"\n{form}\n', f'[[page]]\nid = "a"\n{form} = 1\n'):
         settings.panel.write_text(panel_of(button("/say")) + panel)
         settings.zenoh.write_text(f"{{ mode: 'peer', connect: {{ endpoints: [{form}] }}, {form} }}")
-        found = Diagnosis(report=Report())
-        found.report.find("zenoh_config", str(settings.zenoh), detail=form)
-        found.report.find("panel_fault", f"{form} (line 3)", detail=form)
-        found.report.find("panel_fault", f"page[0].{form}", detail=form)
+        diagnosis = Diagnosis(report=Report())
+        diagnosis.report.find("zenoh_config", str(settings.zenoh), detail=form)
+        diagnosis.report.find("panel_fault", f"{form} (line 3)", detail=form)
+        diagnosis.report.find("panel_fault", f"page[0].{form}", detail=form)
         sources = Sources(environment={"KIOSK_PANEL": form, "X": form}, journal=bytes)
-        made = parts(settings, options, found, sources)
+        made = parts(settings, options, diagnosis, sources)
         assert secrets_in({part.name: part.text for part in made}) == []
 
 

@@ -19,16 +19,20 @@ RECORDING: Final = "cell1-2026-05-04.mcap"
 def runs() -> list[tuple[Row, Shown]]:
     """Each command that is run here, once; those with the same beside them follow one another, and come
     after what runs beside them."""
-    once = {one.command: one for one in reversed(shown())}
-    found = [(row, one) for one in once.values() if (row := row_of(one.command)) and row.kind == "run"]
+    once = {command.command: command for command in reversed(shown())}
+    rows_run = [
+        (row, command)
+        for command in once.values()
+        if (row := row_of(command.command)) and row.kind == "run"
+    ]
     order = rows()
 
     def place(pair: tuple[Row, Shown]) -> tuple[str, bool, int]:
-        row, one = pair
+        row, command = pair
         needed = row.text("beside")
-        return needed or runs_beside(one.command), bool(needed), order.index(row)
+        return needed or runs_beside(command.command), bool(needed), order.index(row)
 
-    return sorted(found, key=place)
+    return sorted(rows_run, key=place)
 
 
 def runs_beside(command: str) -> str:
@@ -72,12 +76,14 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
 
 
 def test_each_command_is_run_by_a_test_or_it_is_said_why_not() -> None:
-    missing = [f"{one.place}: {one.command}" for one in shown() if row_of(one.command) is None]
+    missing = [
+        f"{command.place}: {command.command}" for command in shown() if row_of(command.command) is None
+    ]
     assert missing == [], f"say in {TABLE.relative_to(ROOT)} how these commands are tested"
 
 
 def test_each_row_is_of_a_command_that_a_page_shows() -> None:
-    used = {row_of(one.command) for one in shown()}
+    used = {row_of(command.command) for command in shown()}
     assert [row.command for row in rows() if row not in used] == [], f"remove them from {TABLE.name}"
 
 
@@ -92,20 +98,20 @@ def test_what_is_not_run_here_has_its_reason_or_its_test(row: Row) -> None:
         assert f"\ndef {name}(" in (ROOT / file).read_text()
 
 
-@pytest.mark.parametrize(("row", "one"), runs(), ids=lambda value: getattr(value, "place", ""))
-def test_it_does_what_its_page_says(machine: Machine, row: Row, one: Shown) -> None:
-    if name := runs_beside(one.command):
+@pytest.mark.parametrize(("row", "command"), runs(), ids=lambda value: getattr(value, "place", ""))
+def test_it_does_what_its_page_says(machine: Machine, row: Row, command: Shown) -> None:
+    if name := runs_beside(command.command):
         machine.beside(name)
         assert machine.running is not None
         assert machine.running.count(row.text("until"))
         return
     machine.beside(row.text("beside"))
     if wanted := row.text("until"):
-        machine.shell.interrupt(machine.shell.start(one.command, wanted))
+        machine.shell.interrupt(machine.shell.start(command.command, wanted))
         return
 
     def output() -> str:
-        done = machine.shell.run(one.command)
+        done = machine.shell.run(command.command)
         assert done.returncode == row.values.get("status", 0), done.stdout
         return done.stdout
 

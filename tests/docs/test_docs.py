@@ -85,11 +85,11 @@ def completed(example: str) -> str:
         text += BATTERY
     named_in_demo = {"/battery": BATTERY, **DEMO}
     text += "".join(named_in_demo[name] for name in tables.get("demo", {}))
-    widgets = {one["id"] for each in tables["page"] for one in each.get("widget", [])}
+    widgets = {widget["id"] for each in tables["page"] for widget in each.get("widget", [])}
     named = set(re.findall(r'"\{(\w+)\}"', text)) - widgets
     text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))
     locks = set(re.findall(r'^interlock = "(\w+)"', text, re.MULTILINE))
-    there = {one["id"] for one in tables.get("interlock", [])}
+    there = {interlock["id"] for interlock in tables.get("interlock", [])}
     return text + "".join(INTERLOCKS[name] for name in sorted(locks - there))
 
 
@@ -165,7 +165,7 @@ def test_the_events_have_the_names_that_the_reference_has(kiosk: Server) -> None
 
 def test_the_messages_of_a_hold_are_json() -> None:
     said = re.findall(r"^\| (?:server|client) \| `(.+)` \|$", PAGES["reference/http.md"], re.MULTILINE)
-    assert [json.loads(one).get("do") or json.loads(one).get("state") for one in said] == [
+    assert [json.loads(message).get("do") or json.loads(message).get("state") for message in said] == [
         *(None, "begin", "held", "beat", "held", "end", "ended")
     ]
 
@@ -186,11 +186,11 @@ def test_each_reason_for_the_end_of_a_hold_is_described() -> None:
 
 def test_every_place_in_the_code_is_there() -> None:
     """Paths in backticks that begin with a folder of the project."""
-    found = set(
+    places = set(
         re.findall(r"`((?:app|bench|deploy|docs|static|templates|tests)/[\w./-]*)`", str(PAGES))
     )
-    assert {"app/settings.py", "docs/panel.schema.json"} <= found
-    assert sorted(path for path in found if not (ROOT / path).exists()) == []
+    assert {"app/settings.py", "docs/panel.schema.json"} <= places
+    assert sorted(path for path in places if not (ROOT / path).exists()) == []
 
 
 LINK: Final = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)")
@@ -238,7 +238,9 @@ def test_every_target_of_make_is_one() -> None:
     makefile = (ROOT / "Makefile").read_text()
     named = set(re.findall(r"\bmake ([a-z][a-z-]*)", "\n".join(blocks_of_sh())))
     assert "bench" in named
-    assert [one for one in sorted(named) if not re.search(rf"^{one}:", makefile, re.MULTILINE)] == []
+    assert [
+        target for target in sorted(named) if not re.search(rf"^{target}:", makefile, re.MULTILINE)
+    ] == []
 
 
 def blocks_of_sh() -> Iterator[str]:

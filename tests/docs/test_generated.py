@@ -114,14 +114,14 @@ def found_by_schema(mistake: dict[str, str]) -> bool:
     ],
 )
 def test_mistakes_of_one_key_are_found_by_the_schema(words: str) -> None:
-    (mistake,) = (one for one in MISTAKES if one["words"] == words)
+    (mistake,) = (mistake for mistake in MISTAKES if mistake["words"] == words)
     needs_another_key = "best-effort" in words
     assert found_by_schema(mistake) is not needs_another_key
 
 
 def test_a_third_of_all_mistakes_is_found_while_one_types() -> None:
-    found = [mistake for mistake in MISTAKES if found_by_schema(mistake)]
-    assert len(found) > len(MISTAKES) / 3  # the others need the types, or another key
+    found_mistakes = [mistake for mistake in MISTAKES if found_by_schema(mistake)]
+    assert len(found_mistakes) > len(MISTAKES) / 3  # the others need the types, or another key
 
 
 def test_every_table_but_those_of_messages_is_closed() -> None:
@@ -155,7 +155,9 @@ def test_the_japanese_advice_is_for_the_same_sentences_and_names_keys_as_they_ar
     english = {group: list(codes) for group, codes in locks.ADVICE.items() if group != locks.OTHERS}
     assert {group: list(codes) for group, codes in advice.items()} == english
     keys = set(
-        re.findall("「(.+?)」", "".join(one for codes in advice.values() for one in codes.values()))
+        re.findall(
+            "「(.+?)」", "".join(sentence for codes in advice.values() for sentence in codes.values())
+        )
     )
     assert keys
     assert keys <= set(sentences("ja").values())
@@ -179,8 +181,14 @@ def test_each_setting_is_described() -> None:
 def test_each_dependency_has_its_reason() -> None:
     described = tomllib.loads((ROOT / "pyproject.toml").read_text())
     wanted = [*described["project"]["dependencies"]]
-    wanted += [one for group in described["dependency-groups"].values() for one in group]
-    names = {match[0] for one in wanted if isinstance(one, str) and (match := re.match(r"[\w-]+", one))}
+    wanted += [
+        requirement for group in described["dependency-groups"].values() for requirement in group
+    ]
+    names = {
+        match[0]
+        for requirement in wanted
+        if isinstance(requirement, str) and (match := re.match(r"[\w-]+", requirement))
+    }
     rows = (ROOT / "docs/architecture.md").read_text().split("## Dependencies")[1]
     assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []
 
@@ -225,7 +233,9 @@ def test_the_page_of_locks_in_another_language_is_whole(tmp_path: Path) -> None:
         assert page.startswith("---\norphan: true\n---\n# 操作不可と拒否の理由\n")
         assert "| *{topic}* を待っています。 | `interlock_waiting` | 対処 |" in page
         assert page.count("\n## ") == len(advice)
-        links = {code: one for code, one in advice["link"].items() if code != "link_unreachable"}
+        links = {
+            code: sentence for code, sentence in advice["link"].items() if code != "link_unreachable"
+        }
         fewer = {**advice, "link": {**links, "on_fire": ""}}
         with pytest.raises(ValueError, match=r"locks.ja.toml: \[link\] .*: link_unreachable, on_fire"):
             locks.translated_page("ja", toml(fewer))

@@ -60,8 +60,8 @@ def test_the_example_of_each_how_to_fits_the_guides_panel(folder: Path, name: st
 
 
 def test_all_examples_together_are_a_panel(folder: Path) -> None:
-    found = kinds(folder, *GUIDE, *(block for name in HOW_TOS for block in examples(name)))
-    assert found >= ALL_KINDS
+    used = kinds(folder, *GUIDE, *(block for name in HOW_TOS for block in examples(name)))
+    assert used >= ALL_KINDS
 
 
 @pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.toml")), ids=lambda path: path.name)

@@ -15,8 +15,8 @@ TEXT: Final = (ROOT / "README.md").read_text()
 
 def links(name: str) -> set[str]:
     """The files that a page at the top links to."""
-    found = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (ROOT / name).read_text())
-    return set(found)
+    targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (ROOT / name).read_text())
+    return set(targets)
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
@@ -24,7 +24,7 @@ def test_each_link_leads_to_a_page_of_the_documentation_or_to_a_file(name: str) 
     pages = re.findall(r"^[a-z][\w/-]*$", (ROOT / "docs/index.md").read_text(), re.MULTILINE)
     known = {f"docs/{page}.md" for page in pages}  # `make docs` looks whether they are there
     assert len(links(name)) >= 3
-    assert [one for one in links(name) - known if not (ROOT / one).is_file()] == []
+    assert [link for link in links(name) - known if not (ROOT / link).is_file()] == []
 
 
 def test_its_panel_is_good_as_it_is(tmp_path: Path) -> None:
@@ -43,7 +43,7 @@ def test_each_make_target_that_it_names_is_one() -> None:
     makefile = (ROOT / "Makefile").read_text()
     targets = set(re.findall(r"\bmake ([a-z]+)", TEXT))
     assert {"run", "test"} <= targets
-    assert [one for one in targets if not re.search(rf"^{one}:", makefile, re.MULTILINE)] == []
+    assert [target for target in targets if not re.search(rf"^{target}:", makefile, re.MULTILINE)] == []
 
 
 def test_each_dependency_has_its_reason() -> None:
@@ -51,8 +51,8 @@ def test_each_dependency_has_its_reason() -> None:
         described = tomllib.load(file)
     groups = described["dependency-groups"]
     wanted = [*described["project"]["dependencies"], *groups["dev"]]
-    wanted += [one for one in groups["test"] if isinstance(one, str)]
+    wanted += [requirement for requirement in groups["test"] if isinstance(requirement, str)]
     rows = TEXT.split("## Dependencies")[1]
-    names = {re.split(r"[^\w-]", one, maxsplit=1)[0] for one in wanted}
+    names = {re.split(r"[^\w-]", requirement, maxsplit=1)[0] for requirement in wanted}
     assert "" not in names
     assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []

@@ -48,7 +48,9 @@ def checked(folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_each_command_is_one_that_these_tests_know() -> None:
-    assert [one for one in COMMANDS if one not in RUN and not one.startswith(PLAYED)] == []
+    assert [
+        command for command in COMMANDS if command not in RUN and not command.startswith(PLAYED)
+    ] == []
     assert set(COMMANDS) >= RUN
     made = subprocess.run(
         ["make", "--dry-run", "run"], cwd=ROOT, capture_output=True, text=True, check=True
@@ -82,7 +84,7 @@ def test_the_demo_robot_hears_the_buttons(panel: Path, servers: Callable[[Server
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel)))
     until(mine.ready, "ready")
     assert "SIMULATED" in mine.http.get("/").text
-    (curl,) = (shlex.split(one) for one in COMMANDS if one.startswith("curl "))
+    (curl,) = (shlex.split(command) for command in COMMANDS if command.startswith("curl "))
     assert curl[:2] == ["curl", "-s"]
     path = curl[2].removeprefix("http://127.0.0.1:8000")
     kind, _, value = curl[4].partition(": ")

@@ -12,9 +12,9 @@ REQUEST = b"GET /events HTTP/1.1\r\nHost: 127.0.0.1\r\nAccept-Encoding: identity
 
 def asking(server: Server) -> socket.socket:
     """A connection that has requested the events and has not read yet."""
-    one = socket.create_connection(("127.0.0.1", server.port), 10)
-    one.sendall(REQUEST)
-    return one
+    client = socket.create_connection(("127.0.0.1", server.port), 10)
+    client.sendall(REQUEST)
+    return client
 
 
 class Browsers:
@@ -24,36 +24,36 @@ class Browsers:
         self._texts: dict[socket.socket, bytes] = {}
         self._selector = selectors.DefaultSelector()
         for _ in range(count):
-            one = asking(server)
-            one.setblocking(False)
-            self._texts[one] = b""
-            self._selector.register(one, selectors.EVENT_READ)
+            client = asking(server)
+            client.setblocking(False)
+            self._texts[client] = b""
+            self._selector.register(client, selectors.EVENT_READ)
 
-    def showing(self, what: bytes) -> int:
+    def showing(self, expected: bytes) -> int:
         """How many have received this text since `forget`."""
         for key, _ in self._selector.select(0):
-            one = key.fileobj
-            assert isinstance(one, socket.socket)
-            self._texts[one] += one.recv(65_536)
-        return sum(what in text for text in self._texts.values())
+            client = key.fileobj
+            assert isinstance(client, socket.socket)
+            self._texts[client] += client.recv(65_536)
+        return sum(expected in text for text in self._texts.values())
 
     def forget(self) -> None:
         self._texts = dict.fromkeys(self._texts, b"")
 
     def close(self) -> None:
         self._selector.close()
-        for one in self._texts:
-            one.close()
+        for client in self._texts:
+            client.close()
 
 
-def unread(one: socket.socket, idle_s: float = 1.0) -> bytes:
+def unread(client: socket.socket, idle_s: float = 1.0) -> bytes:
     """Everything that was buffered in the connection, read for 5 s."""
-    one.settimeout(idle_s)
+    client.settimeout(idle_s)
     got = b""
     end = time.monotonic() + 5
     while time.monotonic() < end:
         with suppress(TimeoutError):  # a server that stood still for a moment
-            got += one.recv(65_536)
+            got += client.recv(65_536)
     return got
 
 
@@ -62,8 +62,8 @@ def storm(server: Server, for_s: float) -> int:
     end = time.monotonic() + for_s
     times = 0
     while time.monotonic() < end:
-        with asking(server) as one:
+        with asking(server) as client:
             if times % 2:
-                one.recv(1)
+                client.recv(1)
         times += 1
     return times

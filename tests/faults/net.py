@@ -94,9 +94,9 @@ class Cable:
 
     @staticmethod
     def _begun(stack: ExitStack) -> Namespace:
-        one = Namespace()
-        stack.callback(one.end)
-        return one
+        namespace = Namespace()
+        stack.callback(namespace.end)
+        return namespace
 
     def _plug(self, side: Namespace, name: str, ip: str) -> None:
         there = ["peer", "name", "eth0", "netns", str(side.pid)]

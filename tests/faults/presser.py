@@ -124,5 +124,7 @@ def accounted(
     assert not refused_ones, f"refused, but received: {refused_ones[:5]}"
     latest = max((at - by_text[text].at for at, text in came), default=0.0)
     assert latest <= late_s, f"received {latest:.2f} s after its press"
-    refused, unknown = (sum(p.outcome == one for p in presses) for one in ("refused", "unknown"))
+    refused, unknown = (
+        sum(p.outcome == outcome for p in presses) for outcome in ("refused", "unknown")
+    )
     return Account(len(presses), len(came), refused, unknown, latest)

@@ -222,8 +222,10 @@ def main(times: int = 20) -> None:
         for kind in KINDS:
             with closing(Publishers(domains.first(), Path(folder), kind.durability)) as rig:
                 for vendor, rmw in rmws:
-                    found = [rig.trial(vendor, kind).outcome for _ in range(times)]
-                    counts = [str(found.count(one)) for one in ("heard", "locked", "unnoticed")]
+                    outcomes = [rig.trial(vendor, kind).outcome for _ in range(times)]
+                    counts = [
+                        str(outcomes.count(outcome)) for outcome in ("heard", "locked", "unnoticed")
+                    ]
                     print(f"| {kind.name} | {rmw} | {times} | {' | '.join(counts)} |", flush=True)
 
 

@@ -111,8 +111,8 @@ def kiosk(endpoint: str, folder: Path, port: int = 0, panel: str = PANEL, **envi
     path = folder / "faults.toml"
     path.write_text(panel)
     zenoh = str(zenoh_file(folder, endpoint))
-    given = {"KIOSK_PANEL": str(path), "KIOSK_ZENOH": zenoh, "PYTHONFAULTHANDLER": "1"}
-    return Server(ROOT, port, EXACT_LIVENESS="1", **given, **environment)
+    settings = {"KIOSK_PANEL": str(path), "KIOSK_ZENOH": zenoh, "PYTHONFAULTHANDLER": "1"}
+    return Server(ROOT, port, EXACT_LIVENESS="1", **settings, **environment)
 
 
 class Rig:

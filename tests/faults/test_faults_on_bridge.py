@@ -244,7 +244,7 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
         return permitted(kiosk)
 
     def announced() -> bool:
-        return any(one.startswith("MP/operation_enabled/") for one in client.tokens())
+        return any(token.startswith("MP/operation_enabled/") for token in client.tokens())
 
     until(says_so, "permitted", every_s=0.2)
     with closing(Client(own_bridge.endpoint)) as client:

@@ -79,11 +79,13 @@ class Watch:
         """Seconds from `since` to the first later lock with a reason in which the regular expression
         `because` is found."""
 
-        def found() -> InterlockState | None:
+        def lock_state() -> InterlockState | None:
             locks = (s for s in self.states[interlock] if s.at >= since and not s.enabled)
             return next((s for s in locks if re.search(because, s.reason or "")), None)
 
-        lock: InterlockState = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
+        lock: InterlockState = until(
+            lock_state, f"{interlock} locked, is {self.now(interlock)}", within_s
+        )
         return lock.at - since
 
     def opened(self, interlock: str, within_s: float = ENOUGH_S) -> None:
@@ -170,13 +172,13 @@ def until_released(
     """Waits until memory is within a margin of the value before, and threads and open files are not
     more; a thread, which the first new session of a link starts for all those after it, may be."""
 
-    def found() -> Resources | None:
+    def released() -> Resources | None:
         now = resources(pid)
         fits = now.threads <= before.threads + 1 and now.files <= before.files
         return now if fits and now.rss_mb <= before.rss_mb + margin_mb else None
 
     try:
-        found_at_last: Resources = until(found, "", within_s, every_s=0.1)
+        found_at_last: Resources = until(released, "", within_s, every_s=0.1)
     except AssertionError:
         raise AssertionError(f"was {before}, is {resources(pid)} after {within_s} s") from None
     return found_at_last

@@ -25,14 +25,14 @@ def opened(interface: str) -> socket.socket:
 
 
 def main(first: str, second: str) -> None:
-    one, other = opened(first), opened(second)
-    across = {one: other, other: one}
+    near, other = opened(first), opened(second)
+    across = {near: other, other: near}
     delay_s, loss = 0.0, 0.0
     order = count()
     under_way: list[tuple[float, int, socket.socket, bytes]] = []
     while True:
         wait = max(0.0, under_way[0][0] - time.monotonic()) if under_way else None
-        readable, _, _ = select.select([sys.stdin, one, other], [], [], wait)
+        readable, _, _ = select.select([sys.stdin, near, other], [], [], wait)
         for end in readable:
             if not isinstance(end, socket.socket):
                 line = sys.stdin.readline()

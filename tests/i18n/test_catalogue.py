@@ -123,9 +123,9 @@ def test_a_text_comes_back_from_json() -> None:
 
 
 def test_a_value_is_rendered_with_all_that_is_in_it() -> None:
-    given = {"reason": say("ready"), "several": [say("ready"), 1, None], "text": "as it is"}
+    values = {"reason": say("ready"), "several": [say("ready"), 1, None], "text": "as it is"}
     ready = render(say("ready"))
-    assert localized(given, ENGLISH) == {
+    assert localized(values, ENGLISH) == {
         "reason": ready,
         "several": [ready, 1, None],
         "text": "as it is",
@@ -182,8 +182,8 @@ def test_a_fault_of_a_translation_is_named(tmp_path: Path, changed: dict[str, st
 def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     path = tmp_path / "de.po"
     path.write_bytes(b'msgid "ready"\nmsgstr "Gr\xfcn"\n')
-    (found,) = faults({ENGLISH: files()[ENGLISH], "de": path})
-    assert found.startswith("de.po: ")
+    (fault,) = faults({ENGLISH: files()[ENGLISH], "de": path})
+    assert fault.startswith("de.po: ")
 
 
 def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: Path) -> None:
@@ -216,7 +216,7 @@ def test_english_japanese_and_german_are_shipped() -> None:
 
 def test_sentences_and_names_follow_one_another_as_the_language_has_it() -> None:
     stopped = joined([say("log_began"), say("log_entries_lost", first=1, last=2)])
-    assert [render(stopped, one) for one in ("ja", "de")] == [
+    assert [render(stopped, language) for language in ("ja", "de")] == [
         "パネルサーバーが起動しました。No. 1～2 の記録がディスクから失われました。",
         "Der Panel-Server wurde gestartet. "
         "Die Einträge 1 bis 2 sind auf dem Datenträger verloren gegangen.",

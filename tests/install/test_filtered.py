@@ -18,10 +18,10 @@ from tests.support.system_calls import forbid_resources
 CHECK = [sys.executable, "-m", "app.cli", "check"]
 
 
-def run(command: list[str], given: bytes = b"") -> bytes:
+def run(command: list[str], text: bytes = b"") -> bytes:
     done = subprocess.run(
         command,
-        input=given,
+        input=text,
         capture_output=True,
         cwd=ROOT,
         env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},

@@ -62,14 +62,14 @@ def of_files(plan: list[InstallStep]) -> list[InstallStep]:
 
 
 def tree(root: Path) -> dict[str, str]:
-    found = {}
+    contents = {}
     for path in sorted(root.rglob("*")):
         name = str(path.relative_to(root))
         if path.is_symlink():
-            found[name] = f"-> {path.readlink()}"
+            contents[name] = f"-> {path.readlink()}"
         elif path.is_file():
-            found[name] = path.read_text()
-    return found
+            contents[name] = path.read_text()
+    return contents
 
 
 def test_the_plan_says_each_step_before_anything_is_changed(host: Host, tmp_path: Path) -> None:
@@ -220,13 +220,15 @@ def test_a_file_of_the_users_is_never_the_shipped_one(host: Host, tmp_path: Path
     mine = tmp_path / "mine"
     mine.write_bytes(b"")
     wheel = make_wheel(tmp_path)
-    given = Options(wheel=wheel, panel=mine) if option == "panel" else Options(wheel=wheel, zenoh=mine)
-    apply(of_files(steps(given, host)), host, str)
+    options = (
+        Options(wheel=wheel, panel=mine) if option == "panel" else Options(wheel=wheel, zenoh=mine)
+    )
+    apply(of_files(steps(options, host)), host, str)
     name = {"panel": PANEL, "zenoh": "/etc/operator-panel/zenoh.json5"}[option]
     assert path_on(host, name).read_text() == ""
     mine.write_bytes(b'title = "caf\xe9"\n')
     with pytest.raises(SettingsError, match="mine can't be read: it is not UTF-8 text"):
-        steps(given, host)
+        steps(options, host)
 
 
 def test_a_file_in_another_encoding_is_replaced(host: Host, tmp_path: Path) -> None:

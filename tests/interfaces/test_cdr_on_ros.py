@@ -66,16 +66,16 @@ def ros() -> Iterator[RosCodec]:
 @cache
 def hashes_of_ros() -> Mapping[str, str]:
     """What the packages' type descriptions say, services and actions too."""
-    found: dict[str, str] = {}
+    hashes: dict[str, str] = {}
     for file in SHARE.glob("*/*/*.json"):
-        for one in json.loads(file.read_text()).get("type_hashes", ()):
-            found[one["type_name"]] = one["hash_string"]
-    return found
+        for type_hash in json.loads(file.read_text()).get("type_hashes", ()):
+            hashes[type_hash["type_name"]] = type_hash["hash_string"]
+    return hashes
 
 
-def same(one: Any, other: Any) -> bool:
+def same(value: Any, other: Any) -> bool:
     """Equal, not-a-number to itself too."""
-    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
+    return json.dumps(value, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 def plain(fields: Any) -> Any:
@@ -124,7 +124,7 @@ def test_ros_reads_and_writes_what_the_codec_does(ros: RosCodec, package: str) -
             assert len(ours) <= len(theirs) <= len(ours) + 3, type_name
             # Between the values ROS leaves whatever was in its memory.
             pairs = zip(ours, theirs, strict=False)
-            assert all(one in (0, other) for one, other in pairs), type_name
+            assert all(result in (0, other) for result, other in pairs), type_name
             assert same(to_plain(OF_ROBOT.decode(type_name, theirs)), plain(fields)), type_name
 
 

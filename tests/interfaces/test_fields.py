@@ -45,34 +45,34 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Interfaces:
 
 def at_path(fields: Any, steps: list[tuple[str, Any]]) -> Any:
     """The value that these steps lead to; UNKNOWN where it is not there, or not the only one."""
-    found, around = fields, fields
-    for how, what in steps:
+    value_at_place, around = fields, fields
+    for how, part in steps:
         if how == "name":
-            around, found = found, found[what]
+            around, value_at_place = value_at_place, value_at_place[part]
         elif how == "index":
-            found = found[what] if what < len(found) else UNKNOWN
+            value_at_place = value_at_place[part] if part < len(value_at_place) else UNKNOWN
         else:
-            key, value = what
-            keys = [one[key] for one in found] if how == "key" else around[key]
-            places = [place for place, one in enumerate(keys) if one == value]
-            fits = len(places) == 1 and len(keys) == len(found)
-            found = found[places[0]] if fits else UNKNOWN
-        if found is UNKNOWN:
+            key, value = part
+            keys = [element[key] for element in value_at_place] if how == "key" else around[key]
+            places = [place for place, candidate in enumerate(keys) if candidate == value]
+            fits = len(places) == 1 and len(keys) == len(value_at_place)
+            value_at_place = value_at_place[places[0]] if fits else UNKNOWN
+        if value_at_place is UNKNOWN:
             break
-    return found
+    return value_at_place
 
 
 def written(steps: list[tuple[str, Any]]) -> str:
     """The same steps as a path."""
     text = ""
-    for how, what in steps:
+    for how, part in steps:
         match how:
             case "name":
-                text += f".{what}" if text else what
+                text += f".{part}" if text else part
             case "index":
-                text += f"[{what}]"
+                text += f"[{part}]"
             case _:
-                key, value = what
+                key, value = part
                 quoted = json.dumps(value) if isinstance(value, bool | int) else quote(value)
                 text += f"[{key}={quoted}]"
     return text
@@ -91,18 +91,18 @@ class Walker:
 
     def steps(self, type_name: str, fields: Any) -> list[tuple[str, Any]]:
         made: list[tuple[str, Any]] = []
-        structure, found = self._structures[type_name], fields
+        structure, value = self._structures[type_name], fields
         while structure.fields:
-            one = self._chance.choice(structure.fields)
-            made.append(("name", one.name))
-            kind, around, found = one.type, found, found[one.name]
+            field = self._chance.choice(structure.fields)
+            made.append(("name", field.name))
+            kind, around, value = field.type, value, value[field.name]
             if kind.container != "one" and self._chance.random() < 0.8:
-                step = self._element(kind, structure, around, found)
+                step = self._element(kind, structure, around, value)
                 made.append(step)
-                found = at_path(around, [("name", one.name), step])
+                value = at_path(around, [("name", field.name), step])
                 kind = kind.element
             if (
-                found is UNKNOWN
+                value is UNKNOWN
                 or not kind.is_nested
                 or kind.container != "one"
                 or self._chance.random() < 0.1
@@ -111,18 +111,18 @@ class Walker:
             structure = self._structures[kind.name]
         return made
 
-    def _element(self, kind: Type, around: Structure, there: Any, found: Any) -> tuple[str, Any]:
+    def _element(self, kind: Type, around: Structure, there: Any, value: Any) -> tuple[str, Any]:
         inner = self._structures[kind.name].fields if kind.is_nested else ()
-        own = [one.name for one in inner if _is_key(one.type)]
+        own = [field.name for field in inner if _is_key(field.type)]
         lists = [
             field.name
             for field in around.fields
             if field.type.container != "one" and _is_key(field.type.element)
         ]
-        lists = [name for name in lists if name not in {one.name for one in inner}]
+        lists = [name for name in lists if name not in {field.name for field in inner}]
         if own and self._chance.random() < 0.5:
             key = self._chance.choice(own)
-            values = [one[key] for one in found] or [self._any(inner, key)]
+            values = [element[key] for element in value] or [self._any(inner, key)]
             return "key", (key, self._chance.choice(values))
         if lists and self._chance.random() < 0.5:
             key = self._chance.choice(lists)
@@ -146,8 +146,8 @@ def plain(value: Any) -> str:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _plain(one) for name, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, list) else to_plain(value)
+        return {name: _plain(item) for name, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list) else to_plain(value)
 
 
 def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
@@ -157,9 +157,9 @@ def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
         fields = Samples(cell.structures, seed).fields("cell_msgs/msg/Store")
         ways = [walker.steps("cell_msgs/msg/Store", fields) for _ in range(seed % 7 + 1)]
         reader = cell.field_reader("cell_msgs/msg/Store", map(written, ways))
-        found = reader.read(cell.encode("cell_msgs/msg/Store", fields))
+        read = reader.read(cell.encode("cell_msgs/msg/Store", fields))
         for way in ways:
-            wanted, value = at_path(fields, way), found.get(written(way))
+            wanted, value = at_path(fields, way), read.get(written(way))
             if wanted is UNKNOWN:
                 assert value is None, (seed, written(way))
             else:
@@ -174,9 +174,9 @@ def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> 
     for seed, name in enumerate(JAZZY.structures):
         fields = Samples(JAZZY.structures, seed).fields(name)
         reader = JAZZY.field_reader(name, fields)
-        found = reader.read(JAZZY.encode(name, fields))
-        for one, value in fields.items():
-            assert plain(found.get(one)) == plain(value), (name, one)
+        read = reader.read(JAZZY.encode(name, fields))
+        for field, value in fields.items():
+            assert plain(read.get(field)) == plain(value), (name, field)
 
 
 def test_nothing_is_wanted_of_a_message_that_is_judged_all_the_same(cell: Interfaces) -> None:

@@ -92,7 +92,9 @@ def test_every_type_can_be_named_by_a_panel(distro: str) -> None:
 )
 def test_each_distribution_has_its_own_messages(type_name: str, field: str, distros: list[str]) -> None:
     has = {d: load_interfaces(d).structures.get(type_name) for d in DISTROS}
-    assert [d for d, one in has.items() if one and field in [f.name for f in one.fields]] == distros
+    assert [
+        d for d, structure in has.items() if structure and field in [f.name for f in structure.fields]
+    ] == distros
 
 
 @pytest.mark.parametrize(
@@ -310,14 +312,14 @@ def test_a_field_that_is_not_there_is_refused_with_those_that_are(
 
 
 def test_an_unknown_type_is_refused_with_the_nearest() -> None:
-    for given, near in (
+    for type_name, near in (
         ("std_msgs/msg/Strng", "std_msgs/msg/String?"),
         ("std_msg/msg/String", "std_msgs/msg/String or "),
         ("std_msgs/msg/Twist", "geometry_msgs/msg/Twist?"),
         ("geometry_msgs/msg/PoseStamp", "geometry_msgs/msg/PoseStamped or geometry_msgs/msg/Po"),
     ):
         with pytest.raises(InterfaceError) as caught:
-            INTERFACES.require(given)
+            INTERFACES.require(type_name)
         assert f"ROS 2 jazzy; did you mean {near}" in str(caught.value)
 
 

@@ -170,7 +170,7 @@ def test_packages_may_need_each_other_in_any_order(make: Make) -> None:
     both = Interfaces("jazzy", [folder / "a", folder / "c", folder / "b"])
     fields = {"b": {"c": [{"c": "ä🤖"}, {"c": ""}]}}
     decoded = both.decode("a/msg/A", both.encode("a/msg/A", fields))
-    assert [one.c for one in decoded.b.c] == ["ä🤖", ""]
+    assert [element.c for element in decoded.b.c] == ["ä🤖", ""]
 
 
 def test_what_the_robot_has_goes_before_what_is_built_in(make: Make) -> None:

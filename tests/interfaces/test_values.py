@@ -102,7 +102,7 @@ def test_a_long_list_is_written_by_its_head_only() -> None:
 def to_plain_fields(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: to_plain_fields(inner) for name, inner in value.items()}
-    return [to_plain_fields(one) for one in value] if isinstance(value, list) else to_plain(value)
+    return [to_plain_fields(item) for item in value] if isinstance(value, list) else to_plain(value)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_long_value_makes_no_long_error() -> None:
 
 
 @pytest.mark.parametrize(
-    "given",
+    "data",
     [
         b"\0\1\xff",
         bytearray(b"\0\1\xff"),
@@ -176,11 +176,11 @@ def test_a_long_value_makes_no_long_error() -> None:
         numpy.array([0, 9, 1, 9, 255], numpy.uint8)[::2],
         [numpy.uint8(0), numpy.int64(1), 255],
     ],
-    ids=lambda given: type(given).__name__,
+    ids=lambda data: type(data).__name__,
 )
-def test_a_list_of_bytes_may_be_given_in_many_ways(given: Any) -> None:
-    payload = JAZZY.encode(ARRAY, {**LAYOUT, "data": given})
-    assert payload.endswith(bytes(list(given)))
+def test_a_list_of_bytes_may_be_given_in_many_ways(data: Any) -> None:
+    payload = JAZZY.encode(ARRAY, {**LAYOUT, "data": data})
+    assert payload.endswith(bytes(list(data)))
 
 
 @pytest.mark.parametrize(
@@ -295,15 +295,15 @@ def test_constants_are_no_fields() -> None:
 def test_a_value_is_found_at_its_path(
     cell: Interfaces, good: dict[str, Any], path: str, value: Any
 ) -> None:
-    found = cell.field_reader(EVERYTHING, [path]).read(cell.encode(EVERYTHING, good)).get(path)
-    assert found == value
-    assert type(found) is type(value)
+    value_read = cell.field_reader(EVERYTHING, [path]).read(cell.encode(EVERYTHING, good)).get(path)
+    assert value_read == value
+    assert type(value_read) is type(value)
 
 
 def test_a_list_that_is_too_short_has_no_value_there(cell: Interfaces, good: dict[str, Any]) -> None:
     payload = cell.encode(EVERYTHING, {**good, "words": ["a"]})
-    found = cell.field_reader(EVERYTHING, ["words[0]", "words[1]"]).read(payload)
-    assert (found.get("words[0]"), found.get("words[1]")) == ("a", None)
+    values = cell.field_reader(EVERYTHING, ["words[0]", "words[1]"]).read(payload)
+    assert (values.get("words[0]"), values.get("words[1]")) == ("a", None)
 
 
 @pytest.mark.parametrize(
@@ -380,7 +380,7 @@ def test_all_that_is_built_in_comes_back_as_it_went(
 
 
 @pytest.mark.parametrize(
-    ("given", "text"),
+    ("value", "text"),
     [
         (True, "true"),
         (None, "null"),
@@ -403,5 +403,5 @@ def test_all_that_is_built_in_comes_back_as_it_went(
         (10**400, "100000000000000000...0000000000000000000"),
     ],
 )
-def test_a_value_is_shown_as_files_and_requests_have_it(given: Any, text: str) -> None:
-    assert format_value(given) == text
+def test_a_value_is_shown_as_files_and_requests_have_it(value: Any, text: str) -> None:
+    assert format_value(value) == text

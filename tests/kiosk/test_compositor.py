@@ -178,8 +178,8 @@ def test_what_wakes_a_dark_screen_does_not_reach_the_panel(
 
     def typed() -> list[str]:
         screen.type("b")
-        found: list[str] = screen.evaluate("window.typed")
-        return found
+        characters: list[str] = screen.evaluate("window.typed")
+        return characters
 
     assert set(until(typed, "keys arrive again", every_s=0.2)) == {"b"}
 

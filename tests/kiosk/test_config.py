@@ -22,8 +22,8 @@ def test_the_shipped_file_is_good_with_and_without_its_comments(tmp_path: Path) 
     ]
     path = tmp_path / "kiosk.toml"
     path.write_text("\n".join(lines))
-    found = read_config(path)
-    assert (found.rotate, found.off_between) == (90, ("22:00", "05:00"))
+    config = read_config(path)
+    assert (config.rotate, config.off_between) == (90, ("22:00", "05:00"))
     assert set(tomllib.loads(path.read_text())) == set(KioskConfig.__dataclass_fields__) - {
         "compositor"
     }
@@ -32,8 +32,8 @@ def test_the_shipped_file_is_good_with_and_without_its_comments(tmp_path: Path) 
 def test_what_is_given_goes_before_the_file(tmp_path: Path) -> None:
     path = tmp_path / "kiosk.toml"
     path.write_text("rotate = 90\noff_after_s = 60\n")
-    found = read_config(path, rotate=180, browser=None)
-    assert (found.rotate, found.off_after_s, found.browser) == (180, 60, "")
+    config = read_config(path, rotate=180, browser=None)
+    assert (config.rotate, config.off_after_s, config.browser) == (180, 60, "")
 
 
 @pytest.mark.parametrize(

@@ -61,22 +61,22 @@ def test_another_page_is_left_at_once() -> None:
 
 
 def test_a_page_of_the_server_that_is_none_of_the_panel_is_left_soon() -> None:
-    found = actions(PageStatus(on_panel=True), True, FOREIGN_AFTER_S)
-    assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.OPEN_PANEL)
+    decided = actions(PageStatus(on_panel=True), True, FOREIGN_AFTER_S)
+    assert (set(decided[:-1]), decided[-1]) == ({Action.NONE}, Action.OPEN_PANEL)
 
 
 def test_a_page_that_draws_nothing_is_restarted() -> None:
     undrawn = PageStatus(on_panel=True, ours=True, age_s=0.2, drawn=False)
-    found = actions(undrawn, None, UNDRAWN_AFTER_S)
-    assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.RESTART)
+    decided = actions(undrawn, None, UNDRAWN_AFTER_S)
+    assert (set(decided[:-1]), decided[-1]) == ({Action.NONE}, Action.RESTART)
 
 
 def test_one_look_that_draws_starts_the_time_anew() -> None:
     judge = Judge()
     undrawn = PageStatus(on_panel=True, ours=True, age_s=0.2, drawn=False)
     looks = [undrawn] * 4 + [LIVE] + [undrawn] * 4
-    found = {judge.judge(look, None, float(at)).action for at, look in enumerate(looks)}
-    assert found == {Action.NONE}
+    decided = {judge.judge(look, None, float(at)).action for at, look in enumerate(looks)}
+    assert decided == {Action.NONE}
 
 
 def test_a_locked_page_stays_while_the_server_is_gone() -> None:
@@ -84,11 +84,11 @@ def test_a_locked_page_stays_while_the_server_is_gone() -> None:
 
 
 def test_a_silent_page_is_opened_again_then_the_browser_is_restarted_ever_more_rarely() -> None:
-    found = actions(SILENT, True, 3600)
-    acted = [at for at, action in enumerate(found) if action is not Action.NONE]
+    decided = actions(SILENT, True, 3600)
+    acted = [at for at, action in enumerate(decided) if action is not Action.NONE]
     assert acted[0] == SILENT_AFTER_S
-    assert found[acted[0]] is Action.OPEN_PANEL
-    assert found[acted[1]] is Action.RESTART
+    assert decided[acted[0]] is Action.OPEN_PANEL
+    assert decided[acted[1]] is Action.RESTART
     pauses = [after - before for before, after in pairwise(acted)]
     assert pauses == sorted(pauses)
     assert pauses[-1] >= LONGEST_PAUSE_S

@@ -52,8 +52,8 @@ def screens(tmp_path: Path) -> Iterator[Callable[..., KioskScreen]]:
         return made[-1]
 
     yield make
-    for one in made:
-        one.end()
+    for kiosk_screen in made:
+        kiosk_screen.end()
 
 
 @pytest.fixture(scope="module")

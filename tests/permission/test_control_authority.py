@@ -82,7 +82,7 @@ def requested(held: Room) -> Room:
 
 def test_every_client_may_press_where_control_is_not_required() -> None:
     room = Room(ControlRules(required=False))
-    assert all(room.may(one) for one in (ANN, CELL, ANONYMOUS))
+    assert all(room.may(client) for client in (ANN, CELL, ANONYMOUS))
     assert not room.control.view()["required"]
     assert room.control.until == math.inf
 
@@ -406,11 +406,11 @@ def test_what_was_given_up_is_taken_by_a_button_only(room: Room) -> None:
 
 def test_every_role_is_in_the_view(room: Room) -> None:
     everybody = (ANN, BOB, CY, CELL, ANONYMOUS)
-    assert {room.role(one) for one in everybody} == {"free"}
+    assert {room.role(client) for client in everybody} == {"free"}
     room.control.take(ANN)
-    assert [room.role(one) for one in everybody] == ["holding", "held", "held", "over", "held"]
+    assert [room.role(client) for client in everybody] == ["holding", "held", "held", "over", "held"]
     room.control.ask(BOB)
-    assert [room.role(one) for one in everybody] == ["asked", "asking", "held", "over", "held"]
+    assert [room.role(client) for client in everybody] == ["asked", "asking", "held", "over", "held"]
 
 
 def test_the_log_says_every_change_with_who_it_was(requested: Room) -> None:
@@ -634,18 +634,18 @@ class Everybody(RuleBasedStateMachine):
     @invariant()
     def at_most_one_may_press(self) -> None:
         holder = self.room.control.holder
-        assert [one for one in EVERYBODY if self.room.may(one)] == ([holder] if holder else [])
+        assert [client for client in EVERYBODY if self.room.may(client)] == ([holder] if holder else [])
         assert holder is None or holder.client.id
 
     @invariant()
     def no_absent_client_holds_or_asks(self) -> None:
-        for one in (self.room.control.holder, self.room.control.requester):
-            assert one is None or self.alive_until[one] > self.room.now
+        for party in (self.room.control.holder, self.room.control.requester):
+            assert party is None or self.alive_until[party] > self.room.now
 
     @invariant()
     def no_client_gets_it_by_accident(self) -> None:
-        for one in (self.room.control.holder, self.room.control.requester):
-            assert one is None or one.client.id in self.wanted
+        for party in (self.room.control.holder, self.room.control.requester):
+            assert party is None or party.client.id in self.wanted
 
     @invariant()
     def no_client_asks_for_what_is_free_or_own(self) -> None:
@@ -663,8 +663,8 @@ class Everybody(RuleBasedStateMachine):
         view, control = self.room.control.view(), self.room.control
         assert view["holder"] == (control.holder.client.id if control.holder else "")
         assert view["asker"] == (control.requester.client.id if control.requester else "")
-        roles = [self.room.role(one) for one in EVERYBODY]
-        assert sum(one in ("holding", "asked") for one in roles) == (control.holder is not None)
+        roles = [self.room.role(client) for client in EVERYBODY]
+        assert sum(role in ("holding", "asked") for role in roles) == (control.holder is not None)
 
 
 TestEverybody = Everybody.TestCase

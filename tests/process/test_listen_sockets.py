@@ -12,16 +12,16 @@ from app.process.listen_sockets import SEND_BUFFER_BYTES, USER_TIMEOUT_MS
 
 def accepted(listening: socket.socket) -> int:
     """The send buffer of a connection to it."""
-    with socket.create_connection(listening.getsockname()), listening.accept()[0] as one:
-        return one.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+    with socket.create_connection(listening.getsockname()), listening.accept()[0] as accepted_socket:
+        return accepted_socket.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
 
 
 def test_a_listening_socket_is_found_and_no_other() -> None:
     before = listen_sockets.listener_names()
-    with socket.create_server(("127.0.0.1", 0)) as one:
-        (found,) = listen_sockets.listener_names() - before
-        with socket.create_connection(one.getsockname()):
-            assert listen_sockets.listener_names() == before | {found}
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        (name,) = listen_sockets.listener_names() - before
+        with socket.create_connection(listening.getsockname()):
+            assert listen_sockets.listener_names() == before | {name}
     assert listen_sockets.listener_names() == before
 
 

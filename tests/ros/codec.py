@@ -54,17 +54,17 @@ def message_of(message_class: Any, fields: dict[str, Any]) -> Any:
     return message
 
 
-def value_of(slot: Any, given: Any) -> Any:
+def value_of(slot: Any, value: Any) -> Any:
     if isinstance(slot, AbstractNestedType):
         inner = slot.value_type
         if isinstance(slot, Array) and isinstance(inner, BasicType) and inner.typename in DTYPES:
-            return numpy.array(given, DTYPES[inner.typename])
-        return [value_of(inner, item) for item in given]
+            return numpy.array(value, DTYPES[inner.typename])
+        return [value_of(inner, item) for item in value]
     if isinstance(slot, NamespacedType):
-        return message_of(class_of("/".join(slot.namespaced_name())), given)
+        return message_of(class_of("/".join(slot.namespaced_name())), value)
     if isinstance(slot, BasicType) and slot.typename == "octet":
-        return bytes([given])
-    return given
+        return bytes([value])
+    return value
 
 
 def encode(type: str, fields: dict[str, Any]) -> str:
@@ -87,15 +87,15 @@ def hashes(types: list[str]) -> dict[str, str]:
     """The type hash of each message, as rcl's graph has it for a publisher."""
     rclpy.init()
     node = rclpy.create_node("codec")
-    found = {}
+    type_hashes = {}
     for number, type_name in enumerate(types):
         publisher = node.create_publisher(class_of(type_name), f"/t{number}", 1)
         (info,) = node.get_publishers_info_by_topic(f"/t{number}")
-        found[type_name] = str(info.topic_type_hash)
+        type_hashes[type_name] = str(info.topic_type_hash)
         node.destroy_publisher(publisher)
     node.destroy_node()
     rclpy.shutdown()
-    return found
+    return type_hashes
 
 
 COMMANDS = SimpleNamespace(encode=encode, decode=decode, describe=describe, hashes=hashes)

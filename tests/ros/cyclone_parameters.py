@@ -65,8 +65,8 @@ class Declared:
         if d.read_only:
             return f"parameter '{d.name}' is read-only"
         if type_ != d.type:
-            given = NAMES[type_] if type_ < len(NAMES) else "array"
-            return f"parameter '{d.name}' is of type {NAMES[d.type]}, not {given}"
+            other_type = NAMES[type_] if type_ < len(NAMES) else "array"
+            return f"parameter '{d.name}' is of type {NAMES[d.type]}, not {other_type}"
         each = value if isinstance(value, list) else [value]
         return next(filter(None, map(self._off_limits, each)), "")
 
@@ -176,8 +176,8 @@ class Parameters:
         answer(GetParameterTypes_Response([p.descriptor.type for p in self._named(request.names)]))
 
     def _describe(self, request: DescribeParameters_Request, answer: Answer) -> None:
-        found = [replace(p.descriptor) for p in self._named(request.names)]
-        answer(DescribeParameters_Response(found))
+        descriptors = [replace(p.descriptor) for p in self._named(request.names)]
+        answer(DescribeParameters_Response(descriptors))
 
     def _list(self, request: ListParameters_Request, answer: Answer) -> None:
         """None of the names has a prefix, so the client that asks for one gets nothing."""

@@ -415,9 +415,9 @@ def described(types: list[dict[str, Any]]) -> TypeDescription:
     """A description from plain values, the type itself first."""
     first, *others = [
         IndividualTypeDescription(
-            one["type_name"],
-            [Field(each["name"], FieldType(**each["type"]), "") for each in one["fields"]],
+            type_description["type_name"],
+            [Field(each["name"], FieldType(**each["type"]), "") for each in type_description["fields"]],
         )
-        for one in types
+        for type_description in types
     ]
     return TypeDescription(first, others)

@@ -85,17 +85,17 @@ def run(processes, values):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ends.append("interrupted"))
     while not ends:
-        for one in processes:
-            process = running.get(one.name)
+        for planned in processes:
+            process = running.get(planned.name)
             if process is None:
-                running[one.name] = subprocess.Popen([text(word, values) for word in one.cmd])
+                running[planned.name] = subprocess.Popen([text(word, values) for word in planned.cmd])
             elif process.poll() is not None:
-                print(f"{one.name}: ended with {process.returncode}", file=sys.stderr)
-                if one.on_exit is not None:
-                    ends.append(one.on_exit.event.reason)
-                elif one.respawn:
-                    time.sleep(one.delay)
-                    del running[one.name]
+                print(f"{planned.name}: ended with {process.returncode}", file=sys.stderr)
+                if planned.on_exit is not None:
+                    ends.append(planned.on_exit.event.reason)
+                elif planned.respawn:
+                    time.sleep(planned.delay)
+                    del running[planned.name]
         time.sleep(0.05)
     for process in running.values():
         if process.poll() is None:
@@ -110,21 +110,25 @@ def main():
         module = sys.modules[name] = ModuleType(name)
         vars(module).update(content if isinstance(content, dict) else {c.__name__: c for c in content})
     actions = run_path(str(FILE))["generate_launch_description"]()
-    declared = {one.name: one for one in actions if isinstance(one, DeclareLaunchArgument)}
-    missing = [n for n, one in declared.items() if one.default is None and n not in GIVEN]
+    declared = {
+        argument.name: argument for argument in actions if isinstance(argument, DeclareLaunchArgument)
+    }
+    missing = [n for n, argument in declared.items() if argument.default is None and n not in GIVEN]
     if missing or set(GIVEN) - set(declared):
         sys.exit(f"the arguments are {', '.join(declared)}; missing: {', '.join(missing)}")
-    values = {n: GIVEN[n] if n in GIVEN else text(one.default, {}) for n, one in declared.items()}
+    values = {
+        n: GIVEN[n] if n in GIVEN else text(argument.default, {}) for n, argument in declared.items()
+    }
     run(list(processes_of(actions, values)), values)
 
 
 def processes_of(actions, values):
     """What the actions start, if their conditions hold."""
-    for one in actions:
-        if isinstance(one, OpaqueFunction) and one.condition.holds(values):
-            yield from one.function(values)
-        elif isinstance(one, ExecuteProcess):
-            yield one
+    for action in actions:
+        if isinstance(action, OpaqueFunction) and action.condition.holds(values):
+            yield from action.function(values)
+        elif isinstance(action, ExecuteProcess):
+            yield action
 
 
 main()

@@ -55,15 +55,15 @@ def made(inner: Any, value: Any, type_name: str) -> Any:
     if isinstance(value, list) and value and isinstance(value[0], dict):
         package, _, name = type_name.removeprefix("sequence<").partition("/")
         element = type_named(f"{package}/msg/{re.split('[,>]', name)[0]}")
-        return [filled(element(), one) for one in value]
+        return [filled(element(), item) for item in value]
     return value
 
 
-def qos_of(given: dict[str, Any]) -> QoSProfile:
+def qos_of(settings: dict[str, Any]) -> QoSProfile:
     return QoSProfile(
-        depth=given.get("depth", 10),
-        durability=DurabilityPolicy[given.get("durability", "volatile").upper()],
-        reliability=ReliabilityPolicy[given.get("reliability", "reliable").upper()],
+        depth=settings.get("depth", 10),
+        durability=DurabilityPolicy[settings.get("durability", "volatile").upper()],
+        reliability=ReliabilityPolicy[settings.get("reliability", "reliable").upper()],
     )
 
 

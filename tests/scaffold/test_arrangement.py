@@ -89,16 +89,16 @@ ARMS: dict[str, Any] = {
 
 def test_a_control_depends_on_the_permission_of_its_own_namespace() -> None:
     text = text_of(controls=True, **ARMS)
-    found = widgets(text)
-    assert {name: found[name]["interlock"] for name in ("left_home", "right_home")} == {
+    by_id = widgets(text)
+    assert {name: by_id[name]["interlock"] for name in ("left_home", "right_home")} == {
         "left_home": "left_enabled",
         "right_home": "right_enabled",
     }
-    assert {found[name]["label"] for name in ("left_home", "right_home")} == {"Left home", "Right home"}
+    assert {by_id[name]["label"] for name in ("left_home", "right_home")} == {"Left home", "Right home"}
     labels = {load["id"]: load["label"] for load in tomllib.loads(text)["interlock"]}
     assert labels == {"left_enabled": "left enabled", "right_enabled": "right enabled"}
     # Neither arm's permission says anything of the light and the table.
-    assert not {"light", "table_turn"} & found.keys()
+    assert not {"light", "table_turn"} & by_id.keys()
     assert '# topic = "/light"' in text
 
 
@@ -114,8 +114,10 @@ def test_a_permission_around_the_namespace_counts_where_it_has_none_itself() -> 
         ],
         services=[server("/right/home", TRIGGER)],
     )
-    found = {name: one["interlock"] for name, one in widgets(text).items() if "interlock" in one}
-    assert found == {
+    by_id = {
+        name: widget["interlock"] for name, widget in widgets(text).items() if "interlock" in widget
+    }
+    assert by_id == {
         "left_arm_go": "left_enabled",
         "right_home": "cell_enabled",
         "light": "cell_enabled",
@@ -135,15 +137,15 @@ def test_a_permission_of_the_control_s_own_node_comes_first() -> None:
 
 def test_an_enumeration_is_a_lamp_with_its_constants(cell_msgs: Path) -> None:
     topics = [published(f"/{name.lower()}", f"cell_msgs/msg/{name}") for name in MESSAGES]
-    found = widgets(of_cell_msgs(cell_msgs, *topics))
-    modes = found["drivemode_drive_mode"]["states"]
+    by_id = widgets(of_cell_msgs(cell_msgs, *topics))
+    modes = by_id["drivemode_drive_mode"]["states"]
     assert [(mode["value"], mode["text"], mode["shape"]) for mode in modes] == [
         ("MODE_IDLE", "Idle", "circle"),
         ("MODE_AUTO", "Auto", "circle"),
         ("MODE_FAULT", "Fault", "cross"),
     ]
-    assert [one["value"] for one in found["hazard_type"]["states"]] == ["BUMP", "CLIFF", "STALL"]
-    assert found["limits_joints"]["kind"] != "indicator"  # its constants are limits
+    assert [state["value"] for state in by_id["hazard_type"]["states"]] == ["BUMP", "CLIFF", "STALL"]
+    assert by_id["limits_joints"]["kind"] != "indicator"  # its constants are limits
 
 
 def test_numbers_without_a_known_scale_are_no_gauges_and_colours_have_no_widget(
@@ -151,7 +153,7 @@ def test_numbers_without_a_known_scale_are_no_gauges_and_colours_have_no_widget(
 ) -> None:
     topics = [published(f"/{name.lower()}", f"cell_msgs/msg/{name}") for name in ("LedColor", "Wheels")]
     text = of_cell_msgs(cell_msgs, *topics, published("/lamp", "std_msgs/msg/ColorRGBA"))
-    kinds = {name: one["kind"] for name, one in widgets(text).items()}
+    kinds = {name: widget["kind"] for name, widget in widgets(text).items()}
     assert (kinds["wheels_ticks_left"], kinds["wheels_ticks_right"]) == ("readout", "readout")
     assert not any("led" in name or "lamp" in name for name in kinds)
     assert "# - /ledcolor (cell_msgs/msg/LedColor): no widget shows a colour" in text
@@ -161,13 +163,13 @@ def test_numbers_without_a_known_scale_are_no_gauges_and_colours_have_no_widget(
 def test_pages_are_by_namespace_then_node_and_none_has_too_many() -> None:
     topics = [published(f"/arm/{part}/t{n}", BOOL) for part in ("base", "hand") for n in range(12)]
     topics += [published(f"/t{n:02}", BOOL, f"/node_{n % 2}") for n in range(75)]
-    found = pages(text_of(topics=topics))
-    assert set(found) == {
+    by_title = pages(text_of(topics=topics))
+    assert set(by_title) == {
         *("Arm base", "Arm hand"),
         *(f"Node {node}{n}" for node in (0, 1) for n in ("", " 2", " 3")),
     }
-    assert max(map(len, found.values())) <= MOST_WIDGETS
-    assert sum(map(len, found.values())) == len(topics)
+    assert max(map(len, by_title.values())) <= MOST_WIDGETS
+    assert sum(map(len, by_title.values())) == len(topics)
 
 
 def test_small_namespaces_share_the_page_of_the_one_around_them() -> None:
@@ -175,25 +177,25 @@ def test_small_namespaces_share_the_page_of_the_one_around_them() -> None:
     topics += [
         published(f"/left/joint_{n}/{part}", BOOL) for n in range(1, 7) for part in ("hot", "jam", "on")
     ]
-    found = pages(text_of(topics=topics, services=[server("/left/home", TRIGGER)]))
-    assert {title: len(ids) for title, ids in found.items()} == {"Left": 16, "Left joint 6": 3}
-    assert "left_enabled" in found["Left"]
+    by_title = pages(text_of(topics=topics, services=[server("/left/home", TRIGGER)]))
+    assert {title: len(ids) for title, ids in by_title.items()} == {"Left": 16, "Left joint 6": 3}
+    assert "left_enabled" in by_title["Left"]
 
 
 def test_many_small_nodes_share_pages() -> None:
     topics = [published(f"/t{n:02}_{m}", BOOL, f"/node_{n:02}") for n in range(20) for m in range(3)]
     text = text_of(topics=topics)
     assert NO_ROOM not in text
-    found = pages(text)
-    assert (len(found), sum(map(len, found.values()))) == (MOST_PAGES, 60)
-    assert {title for title in found if title.startswith("Robot")} == {"Robot", "Robot 2", "Robot 3"}
+    by_title = pages(text)
+    assert (len(by_title), sum(map(len, by_title.values()))) == (MOST_PAGES, 60)
+    assert {title for title in by_title if title.startswith("Robot")} == {"Robot", "Robot 2", "Robot 3"}
 
 
 def test_widget_without_room_is_named() -> None:
     topics = [published(f"/t{n:03}", BOOL) for n in range(MOST_PAGES * MOST_WIDGETS + 2)]
     text = text_of(topics=topics)
-    found = pages(text)
-    assert (len(found), max(map(len, found.values()))) == (MOST_PAGES, MOST_WIDGETS)
+    by_title = pages(text)
+    assert (len(by_title), max(map(len, by_title.values()))) == (MOST_PAGES, MOST_WIDGETS)
     assert text.count(NO_ROOM) == 2
 
 

@@ -57,15 +57,15 @@ def scalars(kind: str) -> some.SearchStrategy[Any]:
 def message(draw: Callable[..., Any], type_name: str, depth: int = 0) -> SimpleNamespace:
     """A message as it is decoded."""
 
-    def one(kind: Type) -> Any:
+    def element(kind: Type) -> Any:
         if not kind.is_nested:
             return draw(scalars(kind.name))
         return message(draw, kind.name, depth + 1) if depth < DEEPEST else None
 
     def value(kind: Type) -> Any:
         if kind.container == "one":
-            return one(kind)
-        return [one(kind) for _ in range(draw(some.integers(0, 3)))]
+            return element(kind)
+        return [element(kind) for _ in range(draw(some.integers(0, 3)))]
 
     fields = INTERFACES.structures[type_name].fields
     return SimpleNamespace(**{attribute_name(field.name): value(field.type) for field in fields})
@@ -113,17 +113,17 @@ def parameters(draw: Callable[..., Any]) -> NodeParameter:
 
 @some.composite
 def robots(draw: Callable[..., Any]) -> Known:
-    found = draw(some.lists(topics(), max_size=8, unique_by=lambda topic: topic.name))
+    drawn = draw(some.lists(topics(), max_size=8, unique_by=lambda topic: topic.name))
     samples: Mapping[str, Any] = {
-        topic.name: message(draw, topic.type) for topic in found if draw(some.booleans())
+        topic.name: message(draw, topic.type) for topic in drawn if draw(some.booleans())
     }
     return Known(
-        topics=found,
+        topics=drawn,
         services=draw(some.lists(servers(SERVICES), max_size=4)),
         actions=draw(some.lists(servers(ACTIONS), max_size=2)),
         parameters=draw(some.lists(parameters(), max_size=4)),
         samples=samples,
-        periods={topic.name: draw(some.floats(1e-9, 60)) for topic in found},
+        periods={topic.name: draw(some.floats(1e-9, 60)) for topic in drawn},
         unreadable=draw(some.lists(names, max_size=1)),
     )
 

@@ -132,9 +132,9 @@ def test_no_control_is_live_until_it_is_asked_for() -> None:
 
 def test_each_live_control_has_the_interlock() -> None:
     live = {
-        name: one
-        for name, one in widgets(text_of(controls=True, **CELL)).items()
-        if one["kind"] in ("publish", "joystick", "call", "action", "parameter")
+        name: widget
+        for name, widget in widgets(text_of(controls=True, **CELL)).items()
+        if widget["kind"] in ("publish", "joystick", "call", "action", "parameter")
     }
     assert set(live) == {
         "start",
@@ -146,7 +146,7 @@ def test_each_live_control_has_the_interlock() -> None:
         "count",
         "plc_speed",
     }
-    assert {one["interlock"] for one in live.values()} == {"operation_enabled"}
+    assert {widget["interlock"] for widget in live.values()} == {"operation_enabled"}
 
 
 def test_without_a_candidate_no_control_is_live() -> None:
@@ -157,16 +157,19 @@ def test_without_a_candidate_no_control_is_live() -> None:
 
 
 def test_interlock_candidates_are_bools_that_permit() -> None:
-    found = tomllib.loads(text_of(**CELL))["interlock"]
-    assert [(one["topic"], one.get("require_publisher"), one.get("max_age_s")) for one in found] == [
+    interlocks = tomllib.loads(text_of(**CELL))["interlock"]
+    assert [
+        (interlock["topic"], interlock.get("require_publisher"), interlock.get("max_age_s"))
+        for interlock in interlocks
+    ] == [
         ("/operation_enabled", True, None),  # latched: it is published once
         ("/arm/guard_closed", None, 2.0),
     ]
 
 
 def test_an_interlock_has_one_publisher_where_the_robot_has_one() -> None:
-    found = tomllib.loads(text_of(**CELL))["interlock"]
-    assert {one["publishers"] for one in found} == {"one"}
+    interlocks = tomllib.loads(text_of(**CELL))["interlock"]
+    assert {interlock["publishers"] for interlock in interlocks} == {"one"}
     twice = replace(
         published("/guard_closed", BOOL),
         publishers=(
@@ -190,23 +193,23 @@ def test_a_bool_of_a_fault_is_a_red_lamp() -> None:
 
 
 def test_what_is_shown_of_the_usual_types() -> None:
-    found = widgets(text_of(**CELL))
-    assert found["arm_joint_states"]["joint"] == [
+    by_id = widgets(text_of(**CELL))
+    assert by_id["arm_joint_states"]["joint"] == [
         {"name": "j1", "label": "J1", "min": -180, "max": 180},
         {"name": "j2", "label": "J2", "min": -360, "max": 360},  # it was seen beyond half a turn
     ]
-    gauge = found["arm_temperature"]
+    gauge = by_id["arm_temperature"]
     assert (gauge["unit"], gauge["min"], gauge["max"]) == ("°C", 0, 100)
     assert gauge["qos"] == {"reliability": "best_effort"}  # else it would never be received
-    assert (found["speed"]["min"], found["speed"]["max"]) == (0, 5)  # 3.2 was seen
-    assert found["odom_pose_pose_position_x"]["unit"] == "m"
-    assert {found[name]["kind"] for name in ("camera_image_raw", "rosout", "diagnostics")} == {
+    assert (by_id["speed"]["min"], by_id["speed"]["max"]) == (0, 5)  # 3.2 was seen
+    assert by_id["odom_pose_pose_position_x"]["unit"] == "m"
+    assert {by_id[name]["kind"] for name in ("camera_image_raw", "rosout", "diagnostics")} == {
         "camera",
         "log",
         "table",
     }
-    assert "parameter_events" not in found
-    assert any(one["kind"] == "trend" for one in found.values())
+    assert "parameter_events" not in by_id
+    assert any(widget["kind"] == "trend" for widget in by_id.values())
 
 
 def test_pages_are_namespaces_and_nodes() -> None:
@@ -270,7 +273,7 @@ def test_a_value_looks_old_where_its_topic_is_published_regularly(tmp_path: Path
     seldom = published("/seldom", "std_msgs/msg/String")
     periods = {"/slow_speed": 1.3, "/fast": 0.02, "/kept": 1.0}
     text = text_of(topics=[slow, fast, kept, seldom], periods=periods)
-    ages = {name: one.get("max_age_s") for name, one in widgets(text).items()}
+    ages = {name: widget.get("max_age_s") for name, widget in widgets(text).items()}
     assert ages == {"slow_speed": 7, "fast": 2, "kept": None, "seldom": None, "cell_io_trend": 7}
     path = tmp_path / "cell.toml"
     path.write_text(text)
@@ -301,8 +304,8 @@ def test_two_types_on_one_topic_are_a_remark() -> None:
 
 def test_a_type_of_another_definition_is_a_remark() -> None:
     for hash_, known in ((INTERFACES.type_hash(BOOL), True), ("RIHS01_0", False)):
-        one = TopicEndpoint(type=BOOL, qos=EndpointQos(), bridge="a", type_hash=hash_)
-        text = text_of(topics=[SurveyedTopic(name="/x", key="x", publishers=(one,))])
+        publisher = TopicEndpoint(type=BOOL, qos=EndpointQos(), bridge="a", type_hash=hash_)
+        text = text_of(topics=[SurveyedTopic(name="/x", key="x", publishers=(publisher,))])
         assert ("x" in widgets(text)) is known
         assert ("# - /x: the robot's std_msgs/msg/Bool has another definition" in text) is not known
 

@@ -67,8 +67,8 @@ def pressed(kiosk: Server, widget: str, **inputs: Any) -> dict[str, Any]:
         if not (takes_control(kiosk) and permitted(kiosk, widget)):
             return None
         path = f"{kiosk.base}/widgets/{widget}"
-        found: dict[str, Any] = kiosk.http.post(path, json={"inputs": inputs}).json()
-        return None if found["outcome"] == "refused" else found
+        answer: dict[str, Any] = kiosk.http.post(path, json={"inputs": inputs}).json()
+        return None if answer["outcome"] == "refused" else answer
 
     made: dict[str, Any] = until(receipt, f"{widget} is not refused", every_s=0.2)
     return made
@@ -108,8 +108,8 @@ def test_the_robots_of_a_panel_differ(everything: Path, servers: Servers) -> Non
     robots = [kiosk.robot(entry.id) for entry in panel.robots]
     for robot in robots:
         is_alive(panel, robot)
-    one, other = (robot.widget("battery")["text"] for robot in robots)
-    assert one != other
+    level, other = (robot.widget("battery")["text"] for robot in robots)
+    assert level != other
 
 
 def test_a_goal_of_any_action_is_canceled(everything: Path, servers: Servers) -> None:

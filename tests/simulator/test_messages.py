@@ -70,8 +70,8 @@ def test_a_picture_is_a_png_that_moves() -> None:
 
 def test_a_quaternion_is_of_length_1() -> None:
     for t in TIMES:
-        one = made("geometry_msgs/msg/Quaternion", t)
-        assert sum(value**2 for value in one.values()) == pytest.approx(1)
+        quaternion = made("geometry_msgs/msg/Quaternion", t)
+        assert sum(value**2 for value in quaternion.values()) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(

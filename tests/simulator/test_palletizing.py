@@ -120,12 +120,12 @@ def test_an_hour_keeps_the_rules_of_the_cell(cell: PalletizingCell) -> None:
 
 def test_the_same_seed_and_clock_give_the_same_hour() -> None:
     def hour(seed: int) -> list[tuple[object, ...]]:
-        cell, found = PalletizingCell(seed), []
+        cell, snapshots = PalletizingCell(seed), []
         for at, _ in enumerate(run(cell, HOUR_S)):
             if at % 100 == 0:
                 visit(cell)
-                found.append(snapshot(cell))
-        return found
+                snapshots.append(snapshot(cell))
+        return snapshots
 
     assert hour(3) == hour(3) != hour(4)
 

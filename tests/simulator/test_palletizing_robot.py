@@ -41,11 +41,11 @@ def widget(number: int, kind: str, **keys: str) -> str:
 
 def widgets() -> Iterator[str]:
     """A widget for each name of the story."""
-    shown = (one for one in PALLETIZING.publishes.items() if one[0] != "/rosout")
+    shown = (topic for topic in PALLETIZING.publishes.items() if topic[0] != "/rosout")
     for number, (topic, kind) in enumerate(shown):
         field = FIELDS.get(kind, "data")
         keys = {"topic": topic, "type": kind, "field": field}
-        yield widget(number, "readout", **{key: f'"{one}"' for key, one in keys.items()})
+        yield widget(number, "readout", **{key: f'"{value}"' for key, value in keys.items()})
     yield widget(100, "log")
     for number, (topic, kind) in enumerate(PALLETIZING.subscribes.items(), 200):
         yield widget(number, "publish", topic=f'"{topic}"', type=f'"{kind}"', message="{}")

@@ -111,11 +111,11 @@ BOOL_LOCK: Final = '[[interlock]]\nid = "{0}"\ntopic = "/{0}"\n'
 
 def runs(timed: Iterable[tuple[float, Any]]) -> list[tuple[float, Any]]:
     """When a value begins, and which."""
-    found: list[tuple[float, Any]] = []
+    changes: list[tuple[float, Any]] = []
     for at, value in timed:
-        if not found or found[-1][1] != value:
-            found.append((at, value))
-    return found
+        if not changes or changes[-1][1] != value:
+            changes.append((at, value))
+    return changes
 
 
 def test_an_interlock_permits_20_s_and_forbids_8_s(loaded: Loaded) -> None:
@@ -413,8 +413,8 @@ def test_an_action_says_its_progress_and_ends_with_a_result(loaded: Loaded) -> N
 def test_goals_are_canceled_one_or_all(loaded: Loaded) -> None:
     robot = Stepped(loaded(ACTION)).run(1)
     action = robot.robot.actions["/go"]
-    for one in (b"a" * 16, b"b" * 16, b"c" * 16):
-        assert action.begin(one, SimpleNamespace())
+    for goal in (b"a" * 16, b"b" * 16, b"c" * 16):
+        assert action.begin(goal, SimpleNamespace())
     assert action.cancel(b"a" * 16) == (0, [b"a" * 16])
     assert action.cancel(b"a" * 16) == (3, [])
     assert action.cancel(b"x" * 16) == (2, [])
@@ -442,8 +442,8 @@ PARAMETERS: Final = "[[page]]\nid = 'one'\ntitle = 'One'\n" + "".join(
 
 def set_to(robot: Stepped, name: str, kind: int, field: str, value: Any) -> str:
     """The reason why a parameter is not set, or ""."""
-    given = {"name": name, "value": {**EMPTY_VALUE, "type": kind, field: value}}
-    (result,) = robot.call("/arm/set_parameters", parameters=[given]).results
+    parameter = {"name": name, "value": {**EMPTY_VALUE, "type": kind, field: value}}
+    (result,) = robot.call("/arm/set_parameters", parameters=[parameter]).results
     assert result.successful is (result.reason == "")
     return str(result.reason)
 
@@ -474,8 +474,8 @@ def test_parameters_are_held_and_checked_by_what_the_panel_knows(
     assert (reason == "") is (EVENTS in robot.run(STEP_S).said)
     if not reason:
         (held,) = robot.call("/arm/get_parameters", names=[name]).values
-        found = getattr(held, field)
-        assert (list(found) if isinstance(value, list) else found) == value
+        sent = getattr(held, field)
+        assert (list(sent) if isinstance(value, list) else sent) == value
 
 
 def test_the_first_values_of_parameters_fit_and_can_be_given(loaded: Loaded) -> None:
@@ -558,7 +558,7 @@ def test_the_reference_system_is_as_it_was() -> None:
     robot.run(PERMITTED_S)
     assert robot.values("/last_heard") == ["hello (/operation1)"]
     assert runs(robot.timed("/operation_enabled")) == [(0.0, True), (PERMITTED_S, False)]
-    latched: Mapping[str, Qos] = {name: one.qos for name, one in robot.robot.publishes.items()}
+    latched: Mapping[str, Qos] = {name: topic.qos for name, topic in robot.robot.publishes.items()}
     assert latched["/operation_enabled"].transient_local
     assert robot.call("/reset").message == "not while operation is forbidden"
     assert robot.call("/light", data=True).message == "the light is on"

@@ -153,7 +153,7 @@ def stepped(robot: ReplayedRobot, times: Iterable[float]) -> list[tuple[float, s
 def test_a_recording_has_its_topics_types_and_qos(made: Made, tmp_path: Path, opened: Opened) -> None:
     recording = opened(made(tmp_path))
     topics = recording.topics
-    assert {topic: one.type for topic, one in topics.items()} == {
+    assert {topic: recorded.type for topic, recorded in topics.items()} == {
         topic: name for topic, (name, _) in TOPICS.items()
     }
     assert topics["/operation_enabled"].qos == Qos(True, True, 1)
@@ -230,8 +230,10 @@ def test_a_file_that_is_cut_off_is_named_with_what_helps(
     with pytest.raises(RecordingError) as raised:
         Recording(path)
     helps = f"`mcap recover {file} -o recovered.mcap` saves the messages that are whole"
-    what = "can't be read: it is not an MCAP file" if kept == 1 else "was not finished, or is cut off"
-    assert str(raised.value) in (f"{file} {what}", f"{file} {what}; {helps}")
+    problem = (
+        "can't be read: it is not an MCAP file" if kept == 1 else "was not finished, or is cut off"
+    )
+    assert str(raised.value) in (f"{file} {problem}", f"{file} {problem}; {helps}")
 
 
 def test_a_file_of_messages_that_are_not_there_ends_with_an_error(

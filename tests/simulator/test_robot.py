@@ -95,7 +95,7 @@ def test_its_parameters_are_described_and_answered_as_rclcpp_does() -> None:
     speed, serial = values_of("describe_parameters", "speed", "serial")
     assert speed["floating_point_range"] == [{"from_value": 0.0, "to_value": 500.0, "step": 10.0}]
     assert (speed["read_only"], serial["read_only"]) == (False, True)
-    assert [one["double_value"] for one in values_of("get_parameters", "speed")] == [120.0]
+    assert [value["double_value"] for value in values_of("get_parameters", "speed")] == [120.0]
     assert values_of("get_parameters", "speed", "nothing") == []
 
 
@@ -115,10 +115,10 @@ def test_its_parameters_are_set_or_refused_with_words(
     name: str, kind: int, field: str, value: Any, reason: str
 ) -> None:
     robot = DemoRobot()
-    given = SimpleNamespace(
+    parameter = SimpleNamespace(
         name=name, value=SimpleNamespace(**{**EMPTY_VALUE, "type": kind, field: value})
     )
-    request = SimpleNamespace(parameters=[given])
+    request = SimpleNamespace(parameters=[parameter])
     (result,) = robot.parameters.serve(f"{NODE}/set_parameters", request)["results"]
     assert result == {"successful": not reason, "reason": reason}
     events = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
@@ -161,7 +161,7 @@ def test_a_panel_sets_and_follows_its_parameters(
     kiosk = servers(Server(ROOT, KIOSK_PANEL=str(path)))
     until(lambda: kiosk.widget("speed")["enabled"], "its parameters are read")
     shown = kiosk.snapshot()
-    assert {name: one["text"] for name, one in shown["widgets"].items()} == {
+    assert {name: widget["text"] for name, widget in shown["widgets"].items()} == {
         "speed": "120",
         "parts": "24",
         "work_light": "Off",

@@ -25,10 +25,10 @@ def forbid_resources() -> None:
     program += struct.pack("HBBI", RETURN, 0, 0, ALLOW)
     program += struct.pack("HBBI", RETURN, 0, 0, ERRNO | errno.EPERM)
     code = ctypes.create_string_buffer(program)
-    given = ctypes.create_string_buffer(
+    filter_program = ctypes.create_string_buffer(
         struct.pack("HxxxxxxQ", len(program) // 8, ctypes.addressof(code))
     )
     library = ctypes.CDLL(None, use_errno=True)
     library.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
-    if library.prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, given, 0, 0):
+    if library.prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, filter_program, 0, 0):
         raise OSError(ctypes.get_errno(), "seccomp")

@@ -229,11 +229,11 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     wanted = tokens(link.zid, 2)
     link.declare_tokens(wanted)
 
-    def found() -> set[str]:
+    def present() -> set[str]:
         replies = session.liveliness().get(bridge_dialect.TOKENS, timeout=1)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
 
-    until(lambda: found() == set(wanted), "the tokens of the new session are there")
+    until(lambda: present() == set(wanted), "the tokens of the new session are there")
 
 
 def test_lossless_topic_keeps_every_sample_between_two_drains(

@@ -198,16 +198,16 @@ def looking(server: Server, address: str, count: int) -> Iterator[list[ClientCon
         for _ in range(count):
             way = socket.create_connection(("127.0.0.1", server.port), 10, (address, 0))
             sockets.append(stack.enter_context(connect(url, sock=way, open_timeout=ENOUGH_S)))
-        yield [one for one in sockets if not refused(one)]
+        yield [socket for socket in sockets if not refused(socket)]
 
 
-def refused(one: ClientConnection) -> bool:
+def refused(socket: ClientConnection) -> bool:
     """Whether the server has closed the socket at once."""
     with suppress(ConnectionClosed):
-        one.ping().wait(ENOUGH_S)
-    if one.protocol.state is State.OPEN:
+        socket.ping().wait(ENOUGH_S)
+    if socket.protocol.state is State.OPEN:
         return False
-    assert one.close_code == 4429
+    assert socket.close_code == 4429
     return True
 
 

@@ -53,9 +53,9 @@ class Client:
 
     @property
     def id(self) -> str:
-        found = re.search(r'data-me="([0-9a-f]*)"', self.http.get("/pages/operation").text)
-        assert found
-        return found[1]
+        match = re.search(r'data-me="([0-9a-f]*)"', self.http.get("/pages/operation").text)
+        assert match
+        return match[1]
 
 
 @contextmanager
@@ -75,10 +75,10 @@ def clients_of(server: Server) -> Iterator[Callable[..., Client]]:
         return made[-1]
 
     yield make
-    for one in made:
+    for client in made:
         if server.process.running:
-            one.control("release")
-        one.http.close()
+            client.control("release")
+        client.http.close()
 
 
 @pytest.fixture(scope="module")
@@ -200,8 +200,8 @@ def test_every_client_may_stop_and_the_log_says_that_it_had_no_control(
 
 def test_only_one_of_many_clients_gets_control(client: Callable[..., Client]) -> None:
     clients = [client(f"192.0.2.{n}") for n in range(1, 9)]
-    assert [one.take() for one in clients] == [True] + [False] * 7
-    assert [one.press().status_code for one in clients] == [200] + [409] * 7
+    assert [client.take() for client in clients] == [True] + [False] * 7
+    assert [client.press().status_code for client in clients] == [200] + [409] * 7
 
 
 def test_asking_granting_and_giving_up(own_client: Callable[..., Client], own_kiosk: Server) -> None:
@@ -458,9 +458,9 @@ def test_an_act_is_answered_with_a_receipt_and_the_same_id_is_the_same_act(
 
 def test_a_form_that_is_sent_twice_is_one_act(client: Callable[..., Client]) -> None:
     ann = client("192.0.2.1")
-    found = re.search(r'name="id" value="([0-9a-f]+)"', ann.http.get("/pages/operation").text)
-    assert found
-    fields = {"to": "", "page": "operation", "id": found[1]}
+    match = re.search(r'name="id" value="([0-9a-f]+)"', ann.http.get("/pages/operation").text)
+    assert match
+    fields = {"to": "", "page": "operation", "id": match[1]}
     assert ann.http.post("/control/take", data=fields).status_code == 303
     assert ann.control("release").json()["done"]
     assert ann.http.post("/control/take", data=fields).status_code == 303

@@ -29,9 +29,9 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def looks(kiosk: Server, path: str, cookie: str = "") -> tuple[str, ...]:
     """(theme, text size, hand) of a page."""
     answer = kiosk.http.get(path, headers={**HTML, "cookie": cookie}, follow_redirects=True)
-    found = LOOK.search(answer.text)
-    assert found is not None, path
-    return found.groups()
+    match = LOOK.search(answer.text)
+    assert match is not None, path
+    return match.groups()
 
 
 @pytest.mark.parametrize("path", PAGES)
@@ -56,8 +56,8 @@ def test_a_choice_is_kept_and_goes_back_to_its_page(kiosk: Server) -> None:
 
 
 def test_what_is_no_choice_is_ignored_and_the_others_are_kept(kiosk: Server) -> None:
-    given = {"theme": "neon", "text_size": "large", "font": "Comic", "hand": ""}
-    answer = kiosk.http.post("/display", data=given)
+    form = {"theme": "neon", "text_size": "large", "font": "Comic", "hand": ""}
+    answer = kiosk.http.post("/display", data=form)
     assert answer.status_code == 303
     (cookie,) = answer.headers.get_list("set-cookie")
     assert cookie.startswith("kiosk_text_size=large;")

@@ -65,10 +65,10 @@ def connected(server: Server) -> socket.socket:
     return socket.create_connection(("127.0.0.1", server.port), 10)
 
 
-def drop(one: socket.socket) -> None:
+def drop(client: socket.socket) -> None:
     """Closes with a reset, as a machine does that was switched off and on."""
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-    one.close()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    client.close()
 
 
 def lines_after(server: Server, act: Callable[[], None]) -> list[str]:
@@ -86,13 +86,13 @@ def lines_after(server: Server, act: Callable[[], None]) -> list[str]:
 def test_clients_that_drop_pipelined_requests_leave_nothing_in_the_log(cell: Server) -> None:
     def act() -> None:
         for number in range(20):
-            one = connected(cell)
-            one.sendall(POST * 200)
-            (drop if number % 2 else socket.socket.close)(one)
+            client = connected(cell)
+            client.sendall(POST * 200)
+            (drop if number % 2 else socket.socket.close)(client)
         for path in PATHS:
-            one = connected(cell)
-            one.sendall(get(path) * 20)
-            drop(one)
+            client = connected(cell)
+            client.sendall(get(path) * 20)
+            drop(client)
 
     assert lines_after(cell, act) == []
 
@@ -103,14 +103,14 @@ def test_clients_that_drop_sockets_at_any_moment_leave_nothing_in_the_log(cell: 
 
     def act() -> None:
         for _ in range(60):
-            with connected(cell) as one, suppress(OSError):
-                one.settimeout(chance.choice((0.001, 0.02, 0.2)))
-                one.sendall(handshake(chance.choice(SOCKETS)))
+            with connected(cell) as client, suppress(OSError):
+                client.settimeout(chance.choice((0.001, 0.02, 0.2)))
+                client.sendall(handshake(chance.choice(SOCKETS)))
                 for _ in range(chance.randrange(4)):
-                    one.recv(65_536)
-                    one.sendall(frame(0x81, chance.choice(said)))
+                    client.recv(65_536)
+                    client.sendall(frame(0x81, chance.choice(said)))
                 if chance.random() < 0.5:
-                    drop(one)
+                    drop(client)
 
     assert lines_after(cell, act) == []
 
@@ -129,9 +129,9 @@ REFUSED: Final = {
 def test_a_refused_socket_is_answered_and_not_logged(cell: Server, request_: bytes) -> None:
     def act() -> None:
         for _ in range(10):
-            with connected(cell) as one:
-                one.sendall(request_)
-                assert one.recv(65_536).startswith(b"HTTP/1.1 4")
+            with connected(cell) as client:
+                client.sendall(request_)
+                assert client.recv(65_536).startswith(b"HTTP/1.1 4")
 
     assert lines_after(cell, act) == []
 
@@ -155,11 +155,11 @@ def test_a_broken_frame_closes_the_socket_and_is_not_logged(
     cell: Server, path: str, data: bytes
 ) -> None:
     def act() -> None:
-        with connected(cell) as one:
-            one.sendall(handshake(path))
-            assert b" 101 " in one.recv(65_536)
-            one.sendall(data)
-            while one.recv(65_536):
+        with connected(cell) as client:
+            client.sendall(handshake(path))
+            assert b" 101 " in client.recv(65_536)
+            client.sendall(data)
+            while client.recv(65_536):
                 pass
 
     assert lines_after(cell, act) == []
@@ -171,15 +171,15 @@ NO_REQUESTS: Final = (b"\x16\x03\x01\x02\x00\x01", b"GET /\xff HTTP/1.1\r\n\r\n"
 def test_what_is_no_request_and_no_text_is_one_line_each(cell: Server) -> None:
     def act() -> None:
         for data in NO_REQUESTS * 10:
-            with connected(cell) as one:
-                one.sendall(data)
-                assert one.recv(65_536).startswith(b"HTTP/1.1 400 ")
+            with connected(cell) as client:
+                client.sendall(data)
+                assert client.recv(65_536).startswith(b"HTTP/1.1 400 ")
         for path in SOCKETS * 5:
-            with connected(cell) as one:
-                one.sendall(handshake(path))
-                one.recv(65_536)
-                one.sendall(NOT_TEXT)
-                while one.recv(65_536):
+            with connected(cell) as client:
+                client.sendall(handshake(path))
+                client.recv(65_536)
+                client.sendall(NOT_TEXT)
+                while client.recv(65_536):
                     pass
 
     lines = lines_after(cell, act)
@@ -240,7 +240,7 @@ def test_the_count_is_written_by_the_server() -> None:
     words = CLIENT_FAULTS["Unsupported upgrade request."]
     with ready(Server(ROOT, app="tests.support.apps.hasty:app")) as hasty:
         for _ in range(3):
-            with connected(hasty) as one:
-                one.sendall(handshake("presses").replace(b"Upgrade: websocket", b"Upgrade: h2c"))
-                one.recv(65_536)
+            with connected(hasty) as client:
+                client.sendall(handshake("presses").replace(b"Upgrade: websocket", b"Upgrade: h2c"))
+                client.recv(65_536)
         assert hasty.process.count(f"{words}: 2 more in the last minute") == 1

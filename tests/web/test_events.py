@@ -147,13 +147,13 @@ def test_slow_reader_costs_one_event_and_then_gets_the_newest() -> None:
 def test_a_permission_is_sent_in_the_same_turn_to_all() -> None:
     async def work() -> None:
         bench = Bench()
-        async with bench.stream() as (one, _), bench.stream() as (other, _):
+        async with bench.stream() as (stream, _), bench.stream() as (other, _):
             permits(bench.robot)
             bench.publisher.post(view_of(bench.robot))
             await turns()
-            for client in (one, other):
+            for client in (stream, other):
                 assert client.events("operation-enabled-updated") == [{"enabled": True, "reason": None}]
-            assert one.got[-1]["body"] is other.got[-1]["body"]
+            assert stream.got[-1]["body"] is other.got[-1]["body"]
 
     run(work)
 
@@ -229,11 +229,11 @@ def test_its_body_goes_past_the_layers_and_its_begin_through_them() -> None:
 
 def test_none_of_the_applications_own_layers_is_between_a_body_and_the_server() -> None:
     async def work() -> None:
-        found: list[Send] = []
+        sends: list[Send] = []
 
         class Asking(Response):
             async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-                found.extend((server_send(scope, send), send))
+                sends.extend((server_send(scope, send), send))
                 await super().__call__(scope, receive, send)
 
         app = Application(max_body_size=1000)
@@ -242,7 +242,7 @@ def test_none_of_the_applications_own_layers_is_between_a_body_and_the_server() 
         scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": []}
         server = client.send
         await app(scope, client.receive, server)
-        own, wrapped = found
+        own, wrapped = sends
         assert own is server
         assert wrapped is not server
         assert client.got[0]["status"] == 200

@@ -30,14 +30,18 @@ def test_every_widget_kind_is_in_the_gallery() -> None:
 
 def test_roles_states_shapes_and_colours_are_in_it() -> None:
     """What a role, a lamp or a display may be has an example."""
-    assert {one.table.get("role", "neutral") for one in EXAMPLES} | {"hold"} == {*get_args(KeyRole)}
+    assert {example.table.get("role", "neutral") for example in EXAMPLES} | {"hold"} == {
+        *get_args(KeyRole)
+    }
     lamp = Indicator.model_fields["states"].annotation
     (state,) = {argument for argument in get_args(lamp) if argument is not Ellipsis}
-    lamps = [one.shown for one in EXAMPLES if one.kind == "indicator"]
+    lamps = [example.shown for example in EXAMPLES if example.kind == "indicator"]
     for key in ("shape", "colour"):
-        assert {*get_args(state.model_fields[key].annotation)} <= {one[key] for one in lamps}
+        assert {*get_args(state.model_fields[key].annotation)} <= {lamp[key] for lamp in lamps}
     for kind in ("readout", "indicator"):
-        assert {one.shown["state"] for one in EXAMPLES if one.kind == kind} == {*get_args(State)}
+        assert {example.shown["state"] for example in EXAMPLES if example.kind == kind} == {
+            *get_args(State)
+        }
 
 
 def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:

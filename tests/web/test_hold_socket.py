@@ -55,9 +55,9 @@ class Socket:
         self.stamp, self.at = said["stamp"], time.monotonic()
         return said
 
-    def say(self, **what: Any) -> None:
+    def say(self, **fields: Any) -> None:
         after = 1000 * (time.monotonic() - self.at)
-        self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **what}))
+        self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **fields}))
 
     def begin(self, **more: Any) -> dict[str, Any]:
         self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self.event_id, **more})
@@ -253,7 +253,7 @@ def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
         socket.say(do="beat", lease="x", number=1)
         socket.hear()
     new = refused()[: len(refused()) - before]
-    assert [(one["kind"], one["action"], one["outcome"]) for one in new] == [
+    assert [(entry["kind"], entry["action"], entry["outcome"]) for entry in new] == [
         ("refused", "hold", "refused"),
         ("closed", "hold", "refused"),
     ]
@@ -336,7 +336,8 @@ def test_widget_that_is_not_a_hold_is_not_found(demo: Server) -> None:
 
 def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
     robots = "".join(
-        f'[[robot]]\nid = "{one}"\nname = "{one}"\nnamespace = "/{one}"\n' for one in ("r1", "r2")
+        f'[[robot]]\nid = "{robot}"\nname = "{robot}"\nnamespace = "/{robot}"\n'
+        for robot in ("r1", "r2")
     )
     panel = PANEL.replace("[[interlock]]", robots + "[[interlock]]")
     with demo_server(tmp_path, panel, app=PATIENT) as server:

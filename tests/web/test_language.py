@@ -69,8 +69,8 @@ def test_a_page_is_in_the_language_of_its_reader(server: Server) -> None:
 
 
 def test_the_cookie_counts_before_the_browsers_settings(server: Server) -> None:
-    given = {"cookie": f"{COOKIE}={LANGUAGE}", "accept-language": "en"}
-    assert '<html lang="qps" ' in server.http.get("/", headers=given).text
+    headers = {"cookie": f"{COOKIE}={LANGUAGE}", "accept-language": "en"}
+    assert '<html lang="qps" ' in server.http.get("/", headers=headers).text
 
 
 def test_events_are_in_the_language_of_their_reader(server: Server) -> None:

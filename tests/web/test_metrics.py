@@ -24,9 +24,9 @@ def read(metrics: Metrics) -> Samples:
     """(name, values of its labels) → value; the one robot of these panels has no name."""
     families = text_string_to_metric_families(exposition(metrics)[0].decode())
     samples = [sample for family in families for sample in family.samples]
-    found = {(s.name, tuple(s.labels.values())): s.value for s in samples}
-    assert len(found) == len(samples), "a sample is there twice"
-    return found
+    values = {(s.name, tuple(s.labels.values())): s.value for s in samples}
+    assert len(values) == len(samples), "a sample is there twice"
+    return values
 
 
 def nowhere() -> Fleet:
@@ -93,6 +93,6 @@ def test_open_streams_are_counted() -> None:
 
 
 def test_two_applications_count_for_themselves() -> None:
-    one, other = Metrics(), Metrics()
-    one.pressed("published")
+    metrics, other = Metrics(), Metrics()
+    metrics.pressed("published")
     assert ("kiosk_presses_total", ("published",)) not in read(other)

@@ -35,15 +35,15 @@ def kiosk(panel: Path) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def described(kiosk: Server) -> dict[str, Any]:
-    found: dict[str, Any] = kiosk.http.get("/openapi.json").json()
-    return found
+    schema: dict[str, Any] = kiosk.http.get("/openapi.json").json()
+    return schema
 
 
-def tables(of: Any) -> Iterator[dict[str, Any]]:
+def tables(node: Any) -> Iterator[dict[str, Any]]:
     """Every table in it, itself too."""
-    if isinstance(of, dict):
-        yield of
-    for inner in of.values() if isinstance(of, dict) else of if isinstance(of, list) else ():
+    if isinstance(node, dict):
+        yield node
+    for inner in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
         yield from tables(inner)
 
 
@@ -51,9 +51,9 @@ def test_every_reference_leads_somewhere(described: dict[str, Any]) -> None:
     for table in tables(described):
         assert "$defs" not in table
         if "$ref" in table:
-            found = described
+            node = described
             for step in table["$ref"].removeprefix("#/").split("/"):
-                found = found[step]
+                node = node[step]
 
 
 @pytest.mark.parametrize(
@@ -73,9 +73,9 @@ def test_every_reference_leads_somewhere(described: dict[str, Any]) -> None:
 def test_every_status_is_described(
     described: dict[str, Any], method: str, path: str, statuses: str
 ) -> None:
-    found = described["paths"][path][method]["responses"]
-    assert set(statuses.split()) <= set(found)
-    assert "HTTPValidationError" not in str(found)
+    responses = described["paths"][path][method]["responses"]
+    assert set(statuses.split()) <= set(responses)
+    assert "HTTPValidationError" not in str(responses)
 
 
 def test_a_receipts_code_is_described(described: dict[str, Any]) -> None:
@@ -125,7 +125,7 @@ def test_schemathesis_finds_nothing(kiosk: Server, described: dict[str, Any], tm
         check=False,
     )
     assert done.returncode == 0, done.stdout
-    operations = [path for path, of in described["paths"].items() for _ in of]
+    operations = [path for path, methods in described["paths"].items() for _ in methods]
     tried = [path for path in operations if not path.endswith("/events")]
     assert f"Selected: {len(tried)}/{len(operations)}" in done.stdout
     assert "Traceback" not in kiosk.process.text

@@ -29,8 +29,8 @@ def read_by(language: str) -> dict[str, str]:
 
 def widget(kiosk: Server, name: str, language: str) -> dict[str, Any]:
     text = kiosk.http.get("/events?once=1", headers=read_by(language)).text
-    found: dict[str, Any] = json.loads(events_in(text)[0][1])["widgets"][name]
-    return found
+    shown: dict[str, Any] = json.loads(events_in(text)[0][1])["widgets"][name]
+    return shown
 
 
 def text_of(kiosk: Server, name: str, language: str) -> Any:
@@ -100,9 +100,9 @@ def test_a_form_takes_the_decimal_comma_of_its_language_and_of_no_other(kiosk: S
             headers=read_by(language),
             follow_redirects=True,
         )
-        found = re.search(r'id="receipt-set_limit"[^>]*>([^<]*)<', answer.text)
-        assert found is not None
-        return found[1]
+        match = re.search(r'id="receipt-set_limit"[^>]*>([^<]*)<', answer.text)
+        assert match is not None
+        return match[1]
 
     assert sent("de", "0,5").startswith("Gesendet auf /limit")
     assert sent("de", "－０，５").endswith("Grenze ist −0,5: erlaubt ist 0 bis 2,5 m/s.")

@@ -31,16 +31,16 @@ namespace = "/r2"
 
 def scope_of(root: str, of_server: str, path: str) -> Scope:
     """The scope behind the layer; the server puts its own root path before each path, as uvicorn."""
-    found: list[Scope] = []
+    scopes: list[Scope] = []
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        found.append(scope)
+        scopes.append(scope)
 
     path = of_server + path
     scope = {"type": "http", "root_path": of_server, "path": path, "raw_path": path.encode()}
     queue: asyncio.Queue[Message] = asyncio.Queue()
     asyncio.run(RootPath(app, root)(scope, queue.get, queue.put))
-    return found[0]
+    return scopes[0]
 
 
 @pytest.mark.parametrize("of_server", ["", "/cell1", "/other"])
@@ -68,24 +68,24 @@ def test_without_a_root_path_nothing_changes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "parsed"), [("", ""), ("/", ""), ("/a", "/a"), ("/a/b-1.x/", "/a/b-1.x")]
+    ("written", "parsed"), [("", ""), ("/", ""), ("/a", "/a"), ("/a/b-1.x/", "/a/b-1.x")]
 )
-def test_a_root_path_is_read(given: str, parsed: str) -> None:
-    assert parse_root_path(given) == parsed
+def test_a_root_path_is_read(written: str, parsed: str) -> None:
+    assert parse_root_path(written) == parsed
 
 
 @pytest.mark.parametrize(
-    "given", ["a", "//a", "/a//b", "/a b", "/..", "/a/../b", "/ä", '/"', "http://a"]
+    "written", ["a", "//a", "/a//b", "/a b", "/..", "/a/../b", "/ä", '/"', "http://a"]
 )
-def test_another_root_path_is_refused(given: str) -> None:
+def test_another_root_path_is_refused(written: str) -> None:
     with pytest.raises(SettingsError, match="must be a path such as /cell1"):
-        Settings.from_environment({"KIOSK_ROOT_PATH": given})
+        Settings.from_environment({"KIOSK_ROOT_PATH": written})
 
 
-@pytest.mark.parametrize("given", ["/pages", "/static/x", "/log.csv"])
-def test_a_path_that_the_panel_has_itself_is_refused(given: str) -> None:
+@pytest.mark.parametrize("written", ["/pages", "/static/x", "/log.csv"])
+def test_a_path_that_the_panel_has_itself_is_refused(written: str) -> None:
     with pytest.raises(SettingsError, match="the panel has a path like this itself"):
-        root_path_of(Settings.from_environment({"KIOSK_ROOT_PATH": given}), None)
+        root_path_of(Settings.from_environment({"KIOSK_ROOT_PATH": written}), None)
 
 
 def test_all_own_paths_are_known() -> None:

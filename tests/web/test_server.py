@@ -275,7 +275,7 @@ def test_static_files_are_kept_for_ever_under_their_revision(demo: Server) -> No
     plain = demo.http.get(sheet[1], headers={"accept-encoding": "identity"})
     assert "content-encoding" not in plain.headers
     assert plain.text == answer.text
-    assert {one.headers["vary"] for one in (answer, plain)} == {"Accept-Encoding"}
+    assert {response.headers["vary"] for response in (answer, plain)} == {"Accept-Encoding"}
     assert demo.http.get("/static/x/../../pyproject.toml").status_code == 404
 
 
@@ -378,9 +378,9 @@ def test_head_answers_as_get_without_a_body(demo: Server, path: str, packed: str
 
 
 def test_head_of_a_static_file_says_its_length(demo: Server) -> None:
-    found = re.search(r"/static/\w+/kiosk\.css", demo.http.get("/").text)
-    assert found
-    head, got = demo.http.head(found[0]), demo.http.get(found[0])
+    match = re.search(r"/static/\w+/kiosk\.css", demo.http.get("/").text)
+    assert match
+    head, got = demo.http.head(match[0]), demo.http.get(match[0])
     assert {**got.headers, "date": head.headers["date"]} == dict(head.headers)
     assert head.content == b""
 
@@ -510,12 +510,12 @@ def test_no_thread_or_task_is_left_behind_by_a_hundred_streams(demo: Server) -> 
 
     before = threads()
 
-    def one() -> None:
+    def stream() -> None:
         with demo.http.stream("GET", "/events") as response, demo.socket() as socket:
             next(response.iter_text())
             socket.say("junk")
 
-    workers = [threading.Thread(target=one) for _ in range(100)]
+    workers = [threading.Thread(target=stream) for _ in range(100)]
     for worker in workers:
         worker.start()
     for worker in workers:

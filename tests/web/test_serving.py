@@ -62,16 +62,16 @@ def shortest_heads() -> Iterator[Server]:
 
 
 def opened(server: Server, address: str = "127.0.0.1") -> socket.socket:
-    one = socket.create_connection(("127.0.0.1", server.port), 10, (address, 0))
-    one.settimeout(10)
-    return one
+    client = socket.create_connection(("127.0.0.1", server.port), 10, (address, 0))
+    client.settimeout(10)
+    return client
 
 
-def is_closed(one: socket.socket) -> bool:
+def is_closed(client: socket.socket) -> bool:
     """Whether the server has closed it; what it said before is read."""
-    one.setblocking(False)
+    client.setblocking(False)
     try:
-        while one.recv(65_536):
+        while client.recv(65_536):
             pass
         return True
     except BlockingIOError:
@@ -80,12 +80,12 @@ def is_closed(one: socket.socket) -> bool:
         return True
 
 
-def pushed(one: socket.socket, piece: bytes, most: int) -> int:
+def pushed(client: socket.socket, piece: bytes, most: int) -> int:
     """How many bytes the server took until it closed the connection."""
     sent = 0
     with suppress(OSError):
         while sent < most:
-            one.sendall(piece)
+            client.sendall(piece)
             sent += len(piece)
     return sent
 
@@ -93,34 +93,34 @@ def pushed(one: socket.socket, piece: bytes, most: int) -> int:
 def memory(server: Server) -> int:
     """The most that the server ever had, in bytes."""
     status = Path(f"/proc/{server.process.pid}/status").read_text()
-    found = re.search(r"VmHWM:\s+(\d+) kB", status)
-    assert found
-    return int(found[1]) * 1024
+    match = re.search(r"VmHWM:\s+(\d+) kB", status)
+    assert match
+    return int(match[1]) * 1024
 
 
-def upgraded(one: socket.socket) -> str:
+def upgraded(client: socket.socket) -> str:
     """The answer to who wants a socket for presses, with compression."""
     key = base64.b64encode(os.urandom(16)).decode()
-    one.sendall(
+    client.sendall(
         b"GET /presses HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n"
         b"Sec-WebSocket-Key: " + key.encode() + b"\r\n\r\n"
     )
     answer = b""
     while b"\r\n\r\n" not in answer:
-        answer += one.recv(4096)
+        answer += client.recv(4096)
     return answer.decode()
 
 
 def test_a_socket_that_sends_too_much_is_closed_at_once_and_nothing_is_unpacked(plain: Server) -> None:
     before = memory(plain)
     for _ in range(6):
-        with opened(plain) as one:
-            answer = upgraded(one)
+        with opened(plain) as client:
+            answer = upgraded(client)
             assert answer.startswith("HTTP/1.1 101 ")
             assert "permessage-deflate" not in answer
-            one.sendall(struct.pack(">BBQ4s", 0x81, 0xFF, 16 * MB, bytes(4)))
-            assert pushed(one, bytes(65_536), 16 * MB) < 12 * MB  # the rest waits in no kernel
+            client.sendall(struct.pack(">BBQ4s", 0x81, 0xFF, 16 * MB, bytes(4)))
+            assert pushed(client, bytes(65_536), 16 * MB) < 12 * MB  # the rest waits in no kernel
     assert memory(plain) - before < 8 * MB
 
 
@@ -146,14 +146,14 @@ def test_a_message_in_pieces_is_bounded_as_a_whole(plain: Server) -> None:
     ],
 )
 def test_a_head_has_its_time(shortest_heads: Server, said: list[bytes]) -> None:
-    with opened(shortest_heads) as one:
+    with opened(shortest_heads) as client:
         left = iter(said)
 
         def closed() -> bool:
-            if is_closed(one):
+            if is_closed(client):
                 return True
             with suppress(OSError, StopIteration):
-                one.send(next(left))
+                client.send(next(left))
             return False
 
         until(closed, "it is closed", every_s=0.1)
@@ -162,9 +162,9 @@ def test_a_head_has_its_time(shortest_heads: Server, said: list[bytes]) -> None:
 @pytest.mark.parametrize("piece", [b"X-A: " + b"b" * 1000 + b"\r\n", b"b" * 1000], ids=["many", "long"])
 def test_a_head_has_its_size(plain: Server, piece: bytes) -> None:
     before = memory(plain)
-    with opened(plain) as one:
-        one.sendall(HEAD + b"X: ")
-        assert pushed(one, piece, 64 * MB) < 12 * MB
+    with opened(plain) as client:
+        client.sendall(HEAD + b"X: ")
+        assert pushed(client, piece, 64 * MB) < 12 * MB
     assert memory(plain) - before < 8 * MB
 
 
@@ -185,9 +185,9 @@ def test_streams_sockets_and_kept_connections_have_no_such_time() -> None:
 @pytest.mark.parametrize("path", ["/widgets/operation", "/widgets/operation/cancel"])
 def test_a_body_has_its_time(hasty: Server, path: str) -> None:
     head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-    with opened(hasty) as one:
-        one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
-        answer = b"".join(iter(lambda: one.recv(65_536), b"")).decode()  # until it is closed
+    with opened(hasty) as client:
+        client.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
+        answer = b"".join(iter(lambda: client.recv(65_536), b"")).decode()  # until it is closed
         assert answer.startswith("HTTP/1.1 408 ")
         assert "the body took longer than 0.5 s" in answer
 
@@ -198,22 +198,22 @@ def test_a_body_has_its_time(hasty: Server, path: str) -> None:
 )
 def test_oversized_body_gets_its_response(plain: Server, path: str, more: str) -> None:
     head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n{more}"
-    with opened(plain) as one:
-        one.sendall(f"{head}Content-Length: {5 * MB}\r\n\r\n".encode())
+    with opened(plain) as client:
+        client.sendall(f"{head}Content-Length: {5 * MB}\r\n\r\n".encode())
         for _ in range(50):
-            one.sendall(bytes(MB // 10))  # a client that reads only when it has sent all
-        assert one.recv(65_536).startswith(b"HTTP/1.1 413 ")
+            client.sendall(bytes(MB // 10))  # a client that reads only when it has sent all
+        assert client.recv(65_536).startswith(b"HTTP/1.1 413 ")
         if not more:  # the connection goes on
-            one.sendall(HEAD + b"\r\n")
-            until(lambda: b"HTTP/1.1 200 OK" in one.recv(65_536), "the next answer")
+            client.sendall(HEAD + b"\r\n")
+            until(lambda: b"HTTP/1.1 200 OK" in client.recv(65_536), "the next answer")
 
 
 def test_the_rest_of_a_body_is_not_read_for_ever(plain: Server) -> None:
     head = "POST /none HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
     before = memory(plain)
-    with opened(plain) as one:
-        one.sendall(f"{head}Content-Length: {500 * MB}\r\n\r\n".encode())
-        assert pushed(one, bytes(65_536), 500 * MB) < DRAIN_MOST + 12 * MB
+    with opened(plain) as client:
+        client.sendall(f"{head}Content-Length: {500 * MB}\r\n\r\n".encode())
+        assert pushed(client, bytes(65_536), 500 * MB) < DRAIN_MOST + 12 * MB
     assert memory(plain) - before < 8 * MB
 
 
@@ -221,8 +221,8 @@ def test_dropped_request_body_leaves_no_traceback(plain: Server) -> None:
     lines = len(plain.process.lines)
     head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
     for _ in range(20):
-        with opened(plain) as one:
-            one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
+        with opened(plain) as client:
+            client.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
     assert plain.press("operation", "after them").status_code == 200
     said = plain.process.lines[lines:]
     until(lambda: any("press " in line for line in plain.process.lines[lines:]), "what came after")
@@ -236,10 +236,10 @@ def test_other_machines_leave_places_for_the_kiosk(hasty: Server) -> None:
         streams = []
         for address in (f"127.0.0.{number}" for number in range(2, 2 + CONNECTIONS)):
             for _ in range(2 * limits.client):
-                one = stack.enter_context(opened(hasty, address))
-                streams.append(one)
+                client = stack.enter_context(opened(hasty, address))
+                streams.append(client)
                 with suppress(OSError):
-                    one.sendall(HEAD.replace(b"healthz", b"events") + b"\r\n")
+                    client.sendall(HEAD.replace(b"healthz", b"events") + b"\r\n")
         until(
             lambda: sum(map(is_closed, streams)) == len(streams) - limits.others,
             "others have their places",
@@ -256,9 +256,9 @@ def test_silent_connections_give_way_to_their_own_client(hasty: Server, address:
         silent = [stack.enter_context(opened(hasty, address)) for _ in range(3 * CONNECTIONS)]
         until(lambda: sum(map(is_closed, silent)) >= 2 * CONNECTIONS, "some have given way")
         for _ in range(3):
-            with opened(hasty, address) as one:
-                one.sendall(HEAD + b"\r\n")
-                assert one.recv(65_536).startswith(b"HTTP/1.1 200 ")
+            with opened(hasty, address) as client:
+                client.sendall(HEAD + b"\r\n")
+                assert client.recv(65_536).startswith(b"HTTP/1.1 200 ")
 
 
 def test_it_takes_the_files_that_it_may(servers: Callable[[Server], Server]) -> None:
@@ -339,10 +339,10 @@ def test_a_named_proxy_is_believed(servers: Callable[[Server], Server]) -> None:
 def test_what_a_proxy_says_is_at_the_cell_only_where_the_proxy_is(
     peer: str, forwarded: str, client: str
 ) -> None:
-    found: list[str] = []
+    addresses: list[str] = []
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        found.append(scope["client"][0])
+        addresses.append(scope["client"][0])
 
     async def serve() -> None:
         scope = {
@@ -354,7 +354,7 @@ def test_what_a_proxy_says_is_at_the_cell_only_where_the_proxy_is(
         await Proxies(app, ["127.0.0.1", "192.0.2.2"])(scope, queue.get, queue.put)
 
     asyncio.run(serve())
-    assert found == [client]
+    assert addresses == [client]
 
 
 # Where it listens.
@@ -390,15 +390,15 @@ def test_the_start_says_what_it_uses_and_where_it_is(servers: Callable[[Server],
 
 
 @pytest.mark.parametrize(
-    ("host", "found"),
+    ("host", "addresses"),
     [
         ("127.0.0.1", ["http://127.0.0.1:80"]),
         ("::1", ["http://[::1]:80"]),
         ("0.0.0.0", ["http://localhost:80", "http://cell1.local:80"]),
     ],
 )
-def test_a_panel_is_found_by_its_names(host: str, found: list[str]) -> None:
-    assert urls(None, [(host, 80)], ["localhost", "cell1.local"]) == found
+def test_a_panel_is_found_by_its_names(host: str, addresses: list[str]) -> None:
+    assert urls(None, [(host, 80)], ["localhost", "cell1.local"]) == addresses
 
 
 def test_an_address_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:

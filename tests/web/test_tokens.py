@@ -50,8 +50,8 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def contrast(one: str, other: str) -> float:
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+def contrast(colour: str, other: str) -> float:
+    light, dark = sorted((luminance(colour), luminance(other)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
 
 
@@ -64,17 +64,19 @@ def test_contrast_is_that_of_the_standard() -> None:
 def test_texts_have_their_contrast(theme: str) -> None:
     known = colours(theme)
     least = 7.0 if theme == "contrast" else TEXT
-    found = {pair: round(contrast(known[pair[0]], known[pair[1]]), 2) for pair in TEXTS}
+    contrasts = {pair: round(contrast(known[pair[0]], known[pair[1]]), 2) for pair in TEXTS}
     exempt = {("white", "simulated"), ("white", "simulated-stripe"), ("alarm", "raised")}
-    poor = {pair: it for pair, it in found.items() if it < (TEXT if pair in exempt else least)}
+    poor = {
+        pair: ratio for pair, ratio in contrasts.items() if ratio < (TEXT if pair in exempt else least)
+    }
     assert poor == {}
 
 
 @pytest.mark.parametrize("theme", get_args(Theme))
 def test_edges_and_the_focus_can_be_seen(theme: str) -> None:
     known = colours(theme)
-    found = {pair: round(contrast(known[pair[0]], known[pair[1]]), 2) for pair in GRAPHICS}
-    assert {pair: it for pair, it in found.items() if it < GRAPHIC} == {}
+    contrasts = {pair: round(contrast(known[pair[0]], known[pair[1]]), 2) for pair in GRAPHICS}
+    assert {pair: ratio for pair, ratio in contrasts.items() if ratio < GRAPHIC} == {}
 
 
 def test_a_locked_key_has_the_colour_of_the_contract() -> None:

@@ -15,7 +15,7 @@ SOCKET: Final = (
     "&document_id=bare&tab_id={id}&EIO=4&transport=websocket"
 )
 BARE: Final = Bare(
-    "websocket", SOCKET, say=("40",), found=r"'client_id': '([0-9a-f-]+)'", answers=("2", "3")
+    "websocket", SOCKET, say=("40",), id_pattern=r"'client_id': '([0-9a-f-]+)'", answers=("2", "3")
 )
 
 

@@ -62,7 +62,7 @@ def place_below(namespace: str) -> Place:
 
 
 @pytest.mark.parametrize(
-    ("graph", "below", "given", "robot", "name"),
+    ("graph", "below", "written", "robot", "name"),
     [
         (ONE, "", "/speed", "", "/speed"),
         (ONE, "", "speed", "", "/speed"),
@@ -73,14 +73,14 @@ def place_below(namespace: str) -> Place:
     ],
 )
 def test_a_topic_is_found_by_its_name(
-    graph: GraphSnapshot, below: str, given: str, robot: str, name: str
+    graph: GraphSnapshot, below: str, written: str, robot: str, name: str
 ) -> None:
-    found, one = topic_named(graph, place_below(below), given)
-    assert (found.namespace, one.name) == (robot, name)
+    robot_graph, topic = topic_named(graph, place_below(below), written)
+    assert (robot_graph.namespace, topic.name) == (robot, name)
 
 
 @pytest.mark.parametrize(
-    ("graph", "below", "given", "sentence"),
+    ("graph", "below", "written", "sentence"),
     [
         (ONE, "", "/sped", "no topic /sped is there: did you mean /speed?"),
         (ONE, "", "/enabled", "did you mean /arm/enabled or /arm2/enabled?"),
@@ -91,15 +91,15 @@ def test_a_topic_is_found_by_its_name(
     ],
 )
 def test_a_topic_that_is_not_there_is_a_sentence(
-    graph: GraphSnapshot, below: str, given: str, sentence: str
+    graph: GraphSnapshot, below: str, written: str, sentence: str
 ) -> None:
     with pytest.raises(LinkError) as caught:
-        topic_named(graph, place_below(below), given)
+        topic_named(graph, place_below(below), written)
     assert sentence in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("of", "type_name", "sentence"),
+    ("surveyed", "type_name", "sentence"),
     [
         (topic("/x", announced=False), "", "The robot has /x, and the bridge does not forward it."),
         (topic("/secret", announced=False), "", "does not forward /secret: see `allow` and `deny`"),
@@ -112,20 +112,20 @@ def test_a_topic_that_is_not_there_is_a_sentence(
     ],
 )
 def test_a_topic_that_can_not_be_read_is_a_sentence(
-    of: SurveyedTopic, type_name: str, sentence: str, monkeypatch: pytest.MonkeyPatch
+    surveyed: SurveyedTopic, type_name: str, sentence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def settled(observer: Any, graph: GraphSnapshot, *_: Any) -> GraphSnapshot:
         return graph
 
     monkeypatch.setattr(topic_reader, "settled_graph", settled)
     observer: Any = None
-    graph = graph_of(("", [of]), config={"deny": {"publishers": "^/secret$"}})
+    graph = graph_of(("", [surveyed]), config={"deny": {"publishers": "^/secret$"}})
     with pytest.raises(LinkError) as caught:
-        asyncio.run(TopicReader.find(observer, graph, place_below(""), of.name, type_name))
+        asyncio.run(TopicReader.find(observer, graph, place_below(""), surveyed.name, type_name))
     assert sentence in str(caught.value)
 
 
-def given(*words: str) -> Place:
+def place_from(*words: str) -> Place:
     parser = argparse.ArgumentParser()
     add_options(parser)
     return place_of(parser.parse_args(words))
@@ -137,16 +137,16 @@ PANEL = 'title = "x"\ndistro = "humble"\nnamespace = "/r7"\n[[page]]\nid = "a"\n
 def test_a_panel_file_says_where_the_robot_is(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(PANEL)
-    found = given("--panel", str(path))
-    assert (found.namespace, found.distro, found.connect) == ("/r7", "humble", ())
+    place = place_from("--panel", str(path))
+    assert (place.namespace, place.distro, place.connect) == ("/r7", "humble", ())
     robot = '[[robot]]\nid = "a"\nname = "A"\nnamespace = "/r9"\nconnect = ["tcp/r9:7447"]\n'
     path.write_text(PANEL.replace('namespace = "/r7"\n', robot))
-    found = given("--panel", str(path), "--distro", "jazzy")
-    assert (found.robots, found.bridges) == (("/r9",), 1)
-    assert (found.namespace, found.distro, found.connect) == ("/r9", "jazzy", ("tcp/r9:7447",))
-    assert given("--panel", str(path), "--connect", "tcp/x:1").connect == ("tcp/x:1",)
+    place = place_from("--panel", str(path), "--distro", "jazzy")
+    assert (place.robots, place.bridges) == (("/r9",), 1)
+    assert (place.namespace, place.distro, place.connect) == ("/r9", "jazzy", ("tcp/r9:7447",))
+    assert place_from("--panel", str(path), "--connect", "tcp/x:1").connect == ("tcp/x:1",)
     with pytest.raises(PanelError):
-        given("--panel", str(tmp_path / "none.toml"))
+        place_from("--panel", str(tmp_path / "none.toml"))
 
 
 @pytest.mark.parametrize(
@@ -154,13 +154,13 @@ def test_a_panel_file_says_where_the_robot_is(tmp_path: Path) -> None:
 )
 def test_mistyped_option_is_reported(words: Sequence[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        given(*words)
+        place_from(*words)
     assert "is not a" in capsys.readouterr().err
 
 
 def test_a_namespace_may_be_given_with_or_without_its_slash() -> None:
-    assert given("--namespace", "robot1/").namespace == "/robot1"
-    assert given("--namespace", "/").namespace == ""
+    assert place_from("--namespace", "robot1/").namespace == "/robot1"
+    assert place_from("--namespace", "/").namespace == ""
 
 
 def test_a_rate_is_that_of_the_window() -> None:

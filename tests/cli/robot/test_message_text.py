@@ -107,8 +107,8 @@ def test_csv_has_all_values_in_order() -> None:
     ],
 )
 def test_a_field_of_a_message(path: str, value: Any) -> None:
-    found = read(STATE, JOINTS, path)
-    assert (list(found) if path == "name" else found) == value
+    read_value = read(STATE, JOINTS, path)
+    assert (list(read_value) if path == "name" else read_value) == value
 
 
 def test_a_message_of_many_elements_is_read_whole() -> None:

@@ -57,8 +57,8 @@ def test_topics_outside_of_a_namespace_are_those_of_its_nodes() -> None:
     robot = RobotGraph(bridges=(Bridge(zid="a", version="v1", config={}),), topics=topics)
     observer: Any = None  # nothing is listened to: no type is known
     known = asyncio.run(read_scaffold_input(observer, robot, "/amr", INTERFACES, 0))
-    assert [one.name for one in known.topics] == ["/speed", "//diagnostics", "/rosout"]
-    assert [one.key for one in known.topics] == ["amr/speed", "diagnostics", "rosout"]
+    assert [topic.name for topic in known.topics] == ["/speed", "//diagnostics", "/rosout"]
+    assert [topic.key for topic in known.topics] == ["amr/speed", "diagnostics", "rosout"]
 
 
 def graph_of(*namespaces: str) -> GraphSnapshot:

@@ -54,8 +54,8 @@ def settled(
 ) -> tuple[GraphSnapshot, int]:
     """The graph, and how often it was read."""
     reader = Reader(graphs[1:] or graphs)
-    found = asyncio.run(settled_graph(reader, graphs[0], place, is_enough, within_s, every_s=0.001))
-    return found, reader.read
+    graph = asyncio.run(settled_graph(reader, graphs[0], place, is_enough, within_s, every_s=0.001))
+    return graph, reader.read
 
 
 WHOLE = graph_of(topic("/a"), topic("/b"))

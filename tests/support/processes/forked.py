@@ -45,8 +45,8 @@ def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> 
 def _parent(python: str, module: str) -> socket.socket:
     """The socket to a parent of forked processes, which is started on first use."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    for one in (ours, theirs):
-        one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
+    for sock in (ours, theirs):
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
     process = subprocess.Popen(
         [python, "-m", module, str(theirs.fileno())],
         cwd=ROOT,
