@@ -224,7 +224,7 @@ class Wire:
     """Counts the bytes that a page receives, compressed, with headers and streams."""
 
     def __init__(self, session: CDPSession) -> None:
-        self._of: dict[str, int] = {}
+        self._sizes: dict[str, int] = {}
         self._messages = 0
         session.on("Network.responseReceived", self._answered)
         session.on("Network.dataReceived", self._more)
@@ -234,17 +234,17 @@ class Wire:
 
     @property
     def bytes(self) -> int:
-        return sum(self._of.values()) + self._messages
+        return sum(self._sizes.values()) + self._messages
 
     def _answered(self, event: Any) -> None:
-        self._of[event["requestId"]] = int(event["response"]["encodedDataLength"])
+        self._sizes[event["requestId"]] = int(event["response"]["encodedDataLength"])
 
     def _more(self, event: Any) -> None:
-        known = self._of.get(event["requestId"], 0)
-        self._of[event["requestId"]] = known + int(event["encodedDataLength"])
+        known = self._sizes.get(event["requestId"], 0)
+        self._sizes[event["requestId"]] = known + int(event["encodedDataLength"])
 
     def _whole(self, event: Any) -> None:
-        self._of[event["requestId"]] = int(event["encodedDataLength"])
+        self._sizes[event["requestId"]] = int(event["encodedDataLength"])
 
     def _message(self, event: Any) -> None:
         frame = event["response"]
