@@ -45,7 +45,7 @@ def test_a_percentile_lies_between_the_two_nearest_values(percent: float, expect
     assert percentile([4.0, 1.0, 3.0, 2.0], percent) == pytest.approx(expected)
 
 
-def test_of_nothing_there_is_no_percentile() -> None:
+def test_percentile_of_no_values_is_nan() -> None:
     assert math.isnan(percentile([], 50))
 
 
@@ -55,7 +55,7 @@ def test_each_change_is_matched_to_when_it_showed() -> None:
     assert toggles_matched(said, shown).ms == (1.0, 2.0, 1.5)
 
 
-def test_a_late_one_is_late_and_not_lost() -> None:
+def test_late_change_is_not_lost() -> None:
     said = [(0.0, False), (10.0, True), (20.0, False), (30.0, True)]
     shown = [(45.0, False), (45.1, True), (45.2, False), (45.3, True)]
     matched = toggles_matched(said, shown)
@@ -63,7 +63,7 @@ def test_a_late_one_is_late_and_not_lost() -> None:
     assert matched.ms == pytest.approx((45.0, 35.1, 25.2, 15.3))
 
 
-def test_what_never_showed_is_lost() -> None:
+def test_change_that_never_showed_is_lost() -> None:
     said = [(0.0, False), (10.0, True), (20.0, False), (30.0, True)]
     matched = toggles_matched(said, [(21.0, False), (31.0, True)])
     assert matched.lost == 2
@@ -78,7 +78,7 @@ def test_a_press_counts_from_its_release_to_its_first_arrival() -> None:
     assert (matched.lost, twice) == (1, 1)
 
 
-def test_what_shows_after_a_stall_is_old_by_when_it_was_put() -> None:
+def test_age_after_a_stall_counts_from_the_put() -> None:
     went_on = 10_000 * MS
     shown = [
         (9_000 * MS, 8_999 * MS),  # before
@@ -108,7 +108,7 @@ def test_a_slope_is_given_in_one_unit() -> None:
     assert slope([(1, 12.0), (2, 14.0), (4, 18.0)], noise=0.0).per_unit == pytest.approx(2.0)
 
 
-def test_nothing_to_compare_with_is_no_ratio() -> None:
+def test_ratio_without_a_rival_is_unknown() -> None:
     assert math.isnan(ratio(1.0, 0.0))
     assert math.isnan(ratio(1.0, math.nan))
 
@@ -125,7 +125,7 @@ def test_the_best_rival_is_neither_this_panel_nor_the_floor() -> None:
     assert best_rival(results(down=down), "down", "p50") == ("plain", 1.2)
 
 
-def test_targets_are_judged_by_what_was_measured() -> None:
+def test_targets_are_judged_by_measured_figures() -> None:
     down = phase(
         kiosk={"p50": 1.2, "p99": 3.7}, floor={"p50": 0.9, "p99": 1.0}, plain={"p50": 1.2, "p99": 1.9}
     )
@@ -136,7 +136,7 @@ def test_targets_are_judged_by_what_was_measured() -> None:
     assert by_text(judged, "of its own p50").reached is False
 
 
-def test_a_limit_that_is_to_be_kept_under_is_not_kept_at_it() -> None:
+def test_target_below_a_limit_is_missed_at_the_limit() -> None:
     cost = phase(kiosk={"server_1000": 4.0, "server_wide": 19.9})
     judged = targets(results(cost=cost))
     assert by_text(judged, "1 kHz on a topic: server").reached is False

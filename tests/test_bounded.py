@@ -20,7 +20,7 @@ def test_the_oldest_leave_when_they_are_too_large_and_the_newest_stays() -> None
     assert list(queue) == ["d"]
 
 
-def test_what_is_taken_makes_room() -> None:
+def test_taking_an_item_makes_room() -> None:
     queue: BoundedQueue[str] = BoundedQueue(9, 10)
     queue.add("a", 9)
     assert queue.take() == "a"

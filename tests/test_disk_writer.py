@@ -91,7 +91,7 @@ def flush(writer: DiskWriter[str]) -> bool:
     return asyncio.run(asyncio.wait_for(writer.flushed(), ENOUGH_S))
 
 
-def test_what_waits_together_is_written_in_one_batch_in_its_order(file: TextFile, start: Start) -> None:
+def test_waiting_items_are_written_in_one_batch_in_order(file: TextFile, start: Start) -> None:
     writer = start()
     file.block()
     writer.put("a")
@@ -115,7 +115,7 @@ def test_a_batch_has_no_more_items_than_allowed(file: TextFile, start: Start) ->
     assert max(map(len, file.batches)) == 2
 
 
-def test_a_full_queue_takes_only_what_is_not_bounded(file: TextFile, start: Start) -> None:
+def test_full_queue_accepts_only_unbounded_items(file: TextFile, start: Start) -> None:
     writer = start(most=10)
     file.block()
     writer.put("a")
@@ -132,7 +132,7 @@ def test_a_full_queue_takes_only_what_is_not_bounded(file: TextFile, start: Star
     assert writer.waiting == 0
 
 
-def test_what_the_disk_refuses_is_handed_back_at_once(file: TextFile, start: Start) -> None:
+def test_refused_items_are_returned_at_once(file: TextFile, start: Start) -> None:
     writer = start()
     file.fails = FULL
     writer.put("a")

@@ -159,7 +159,7 @@ def test_a_room_imports_only_from_those_before_it(room: str) -> None:
     assert back == []
 
 
-def test_what_all_may_import_imports_no_room() -> None:
+def test_common_modules_import_no_room() -> None:
     assert {name for module in COMMON for name in of_project(module)} <= COMMON
 
 
@@ -194,7 +194,7 @@ def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) ->
     assert {"mcap", "prometheus_client", *of_faults, *of_demos} & set(read.split()) == set()
 
 
-def test_only_a_replay_needs_what_a_kiosk_does_not_have() -> None:
+def test_only_replay_imports_the_extra_packages() -> None:
     """`make_builtin` is not in the wheel."""
     lacking = ("rosbags", "numpy", "apsw", "ruamel")
     need = {m for m in MODULES for name in imported()[m] if name.partition(".")[0] in lacking}
@@ -203,7 +203,7 @@ def test_only_a_replay_needs_what_a_kiosk_does_not_have() -> None:
     assert needed_by == {"app.simulator.bag.recording"}
 
 
-def test_what_a_start_makes_is_left_alone_by_the_garbage_collector(tmp_path: Path) -> None:
+def test_objects_of_the_start_are_frozen_for_the_garbage_collector(tmp_path: Path) -> None:
     env = {**os.environ, "KIOSK_DATA": str(tmp_path)}
     code = "import app.main, gc; print(gc.isenabled(), gc.get_freeze_count(), len(gc.get_objects()))"
     said = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
@@ -228,7 +228,7 @@ def test_the_interfaces_know_nothing_but_errors() -> None:
         "app.runtime.robot_session",
     ],
 )
-def test_what_decides_knows_no_http(module: str) -> None:
+def test_deciding_modules_import_no_http(module: str) -> None:
     frameworks = {"starlette", "uvicorn", "jinja2", "app.web.routes"}
     assert {name for name in imported()[module] if name.startswith(tuple(frameworks))} == set()
 

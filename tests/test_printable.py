@@ -39,7 +39,7 @@ SHOWN = "in \\u202everted\\u202c red\\u2028\\u2066line\\u0085"
         "a\\u202eb",
     ],
 )
-def test_what_does_no_harm_stays_as_it_is(text: str) -> None:
+def test_harmless_text_stays_unchanged(text: str) -> None:
     assert printable(text) == text
 
 
@@ -99,7 +99,7 @@ def test_sentences_and_errors_are_printable() -> None:
     assert str(InputError(f'no input "{BAD}"')) == f'no input "{ESCAPED}"'
 
 
-def test_what_a_robot_and_a_browser_say_is_shown_by_its_escapes(
+def test_text_of_robots_and_browsers_is_shown_with_escapes(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(Server(ROOT, KIOSK_DATA=str(tmp_path)))

@@ -65,7 +65,7 @@ def test_so_many_at_once_and_then_so_many_a_second() -> None:
     assert taken("a") == 10
 
 
-def test_only_those_are_remembered_that_did_it_last() -> None:
+def test_only_the_latest_clients_are_remembered() -> None:
     buckets = TokenBuckets(Quota(1, 1), lambda: 0.0)
     for key in range(10 * MAX_BUCKETS):
         buckets.take_token(key)

@@ -186,7 +186,7 @@ def test_rosout_gets_the_exception_and_half_a_surrogate_as_text() -> None:
     assert "ValueError: the cause" in text
 
 
-def test_one_of_several_robots_is_named_and_has_its_log_to_itself() -> None:
+def test_log_of_several_robots_is_separate_and_named() -> None:
     first: list[Mapping[str, object]] = []
     second: list[Mapping[str, object]] = []
     logger = logging.getLogger("test.robots")

@@ -26,7 +26,7 @@ def test_kiosk_mode_overrides_the_panel_file(mode: str) -> None:
 
 
 @pytest.mark.parametrize("mode", ["Demo", "simulated", " live", "0"])
-def test_an_unknown_mode_is_refused_with_what_would_be_right(mode: str) -> None:
+def test_unknown_mode_is_refused_with_the_valid_modes(mode: str) -> None:
     with pytest.raises(SettingsError, match=f'KIOSK_MODE is "{mode}": it must be "demo" or "live"'):
         Settings.from_environment({"KIOSK_MODE": mode})
 
@@ -113,7 +113,7 @@ def test_kiosk_data_is_the_folder_of_whatever_mode(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["templates", "static", "zenoh.json5", "panel.toml"])
-def test_what_the_project_ships_is_found(name: str) -> None:
+def test_shipped_files_are_found(name: str) -> None:
     assert shipped_path(name).exists()
 
 
@@ -127,9 +127,7 @@ def test_a_host_that_could_never_match_is_refused(hosts: str) -> None:
     ("name", "meant"),
     [("KIOSK_PANNEL", "KIOSK_PANEL"), ("KIOSK_HOST", "KIOSK_HOSTS"), ("KIOSK_panel", "KIOSK_PANEL")],
 )
-def test_an_unknown_variable_stops_the_start_and_the_error_names_what_was_meant(
-    name: str, meant: str
-) -> None:
+def test_unknown_variable_stops_the_start_and_the_error_suggests_a_name(name: str, meant: str) -> None:
     with pytest.raises(SettingsError, match=f"^{name} is not a setting .* did you mean {meant}\\?$"):
         Settings.from_environment({name: ""})
 

@@ -46,7 +46,7 @@ def test_installing_a_package_prints_no_warnings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("step", ["update", "install"])
-def test_what_can_not_be_installed_is_said_with_the_reason(tmp_path: Path, step: str) -> None:
+def test_package_that_cannot_be_installed_is_named_with_the_reason(tmp_path: Path, step: str) -> None:
     done = installed(tmp_path, f'[ "$1" != {step} ] || {{ echo "E: no network" >&2; exit 100; }}')
     assert done.returncode == 1
     assert done.stderr.splitlines() == [
@@ -55,7 +55,7 @@ def test_what_can_not_be_installed_is_said_with_the_reason(tmp_path: Path, step:
     ]
 
 
-def test_without_the_right_to_install_it_names_what_is_missing(tmp_path: Path) -> None:
+def test_missing_packages_are_named_without_the_right_to_install(tmp_path: Path) -> None:
     done = installed(tmp_path, "exit 9", user=1000)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.splitlines() == [
@@ -76,7 +76,7 @@ def test_a_kind_of_namespace_that_is_not_allowed_is_named_before_the_tests(
     assert "not allowed here" in done.stderr
 
 
-def test_for_some_tests_it_only_names_what_is_missing(tmp_path: Path) -> None:
+def test_missing_packages_are_only_named_for_some_tests(tmp_path: Path) -> None:
     """`make system` with ARGS, also as root on Debian."""
     called = tmp_path / "called"
     commands = {"apt-get": f"touch {called}", "id": "echo 0", "cmake": "exit 1"}

@@ -220,7 +220,9 @@ def test_messages_that_keep_a_value_fresh_need_one_timer(cell: partial[Cell]) ->
     assert len(air.engine._timers) == 1
 
 
-def test_an_alarm_whose_source_is_unknown_locks_what_it_inhibits(cell: partial[Cell]) -> None:
+def test_an_alarm_whose_source_is_unknown_locks_the_widgets_that_it_inhibits(
+    cell: partial[Cell],
+) -> None:
     air = cell(AIR)
     assert air.inhibiting() == ["air"]
     air.publish(6.0)
@@ -312,7 +314,7 @@ def test_the_alarms_that_a_robot_publishes_are_bounded(cell: partial[Cell]) -> N
     assert robot.engine.refused_entries == 5
 
 
-def test_an_evaluation_looks_only_at_what_may_have_changed(
+def test_an_evaluation_reads_only_alarms_that_may_have_changed(
     cell: partial[Cell], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     many = "".join(

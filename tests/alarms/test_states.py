@@ -62,7 +62,7 @@ def documented() -> dict[tuple[State, Event, AlarmKind], tuple[str, bool]]:
     return rows
 
 
-def test_the_table_is_the_documented_one() -> None:
+def test_state_table_is_the_documented_table() -> None:
     rows = documented()
     for key in product(State, Event, KINDS):
         row = find_row(*key)
@@ -139,7 +139,7 @@ def test_an_alarm_stays_while_its_source_is_unknown() -> None:
     assert update_level(unknown, PLAIN, 0, NOW).state is State.RETURNED_UNACKNOWLEDGED
 
 
-def test_what_is_acknowledged_while_unknown_is_normal_only_when_it_is_heard() -> None:
+def test_alarm_acknowledged_while_unknown_is_normal_only_after_a_message() -> None:
     returned = update_level(raised(PLAIN), PLAIN, 0, NOW)
     unknown = acknowledge(update_level(returned, PLAIN, None, NOW), PLAIN, 1).status
     assert unknown.state is State.ACKNOWLEDGED

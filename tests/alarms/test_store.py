@@ -39,7 +39,7 @@ def row(n: int, at: float = NOW.wall) -> HistoryRow:
     return HistoryRow(at, f"air{n}", "unacknowledged", n, "", "", "{}")
 
 
-def test_what_is_written_is_there_after_opening_again(tmp_path: Path) -> None:
+def test_written_alarms_are_read_after_reopening(tmp_path: Path) -> None:
     store = open_store(tmp_path / "alarms.sqlite")
     store.write([row(1), row(2)], {"air1": "one", "air2": "two"})
     store.write([row(3)], {"air1": None})
@@ -73,7 +73,7 @@ def test_the_history_is_bounded_by_days_and_size_and_alarms_that_stand_are_kept(
     assert store.standing() == {"air1": "one"}
 
 
-def test_a_torn_write_is_not_there_and_all_before_it_is(tmp_path: Path) -> None:
+def test_torn_write_loses_only_itself(tmp_path: Path) -> None:
     path, torn = tmp_path / "alarms.sqlite", tmp_path / "torn"
     store = open_store(path)
     store.write([row(1)], {"air1": "one"})
@@ -119,7 +119,7 @@ def restarted(folder: Path, before: Cell, alarms: str) -> Cell:
     return after
 
 
-def test_what_was_active_before_a_restart_is_not_known_until_it_is_heard(tmp_path: Path) -> None:
+def test_alarm_active_before_a_restart_is_unknown_until_a_message(tmp_path: Path) -> None:
     before = Cell(tmp_path, DELAYED)
     before.publish(4.5)
     before.wait_until_due()

@@ -96,7 +96,7 @@ def test_a_press_and_its_outcome_are_in_the_file(tmp_path: Path) -> None:
     assert verify(tmp_path).fault == ""
 
 
-def test_what_is_waiting_is_written_before_the_end(tmp_path: Path) -> None:
+def test_waiting_entries_are_written_before_shutdown(tmp_path: Path) -> None:
     async def work(log: OperatorLog) -> None:
         entry = await log.pressed(pressed())
         log.add(sent(entry))
@@ -253,7 +253,7 @@ def test_too_many_at_once_are_refused_in_words(
     run(tmp_path, work)
 
 
-def test_what_could_not_be_written_of_a_sent_press_is_written_later(tmp_path: Path, disk: Disk) -> None:
+def test_unwritten_result_of_a_sent_press_is_written_later(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         entry = await log.pressed(pressed(1))
         disk.fails = LogError("no space left on device")
@@ -275,7 +275,7 @@ def test_what_could_not_be_written_of_a_sent_press_is_written_later(tmp_path: Pa
     assert verify(tmp_path).fault == ""
 
 
-def test_what_is_not_known_to_be_on_the_disk_is_said(tmp_path: Path, disk: Disk) -> None:
+def test_receipt_says_that_an_entry_may_not_be_on_disk(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         entry = await log.pressed(pressed(1))
         disk.sync_fails = LogError("input/output error")
@@ -291,7 +291,7 @@ def test_what_is_not_known_to_be_on_the_disk_is_said(tmp_path: Path, disk: Disk)
     assert verify(tmp_path).fault == ""
 
 
-def test_it_is_tried_again_ever_more_rarely(tmp_path: Path, disk: Disk) -> None:
+def test_pauses_between_write_attempts_grow(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         disk.fails, began = LogError("no space left on device"), time.monotonic()
         await asyncio.gather(log.pressed(pressed(1)), return_exceptions=True)

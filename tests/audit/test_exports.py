@@ -188,7 +188,7 @@ def test_exports_and_searches_disturb_neither_presses_nor_holds(kiosk: Server) -
         assert holds(kiosk)
 
 
-def test_one_export_at_a_time_and_it_is_whole(kiosk: Server) -> None:
+def test_exports_run_one_at_a_time_and_are_complete(kiosk: Server) -> None:
     with exporting(kiosk) as (first, *_), unread(kiosk, 10):
         assert first.stdout is not None
         first_statuses = {line.split()[0] for line, _ in zip(first.stdout, range(3), strict=False)}
@@ -242,7 +242,7 @@ def test_an_export_that_breaks_off_is_not_taken_for_whole(kiosk: Server) -> None
     assert kiosk.http.get("/log.csv?before=100").status_code == 200
 
 
-def test_who_goes_leaves_no_process_and_no_line(kiosk: Server) -> None:
+def test_client_that_leaves_an_export_leaves_no_process_and_no_log_line(kiosk: Server) -> None:
     with unread(kiosk, 1):
         until(lambda: children(kiosk), "its process runs")
     until(lambda: not children(kiosk), "it is gone")
@@ -312,7 +312,7 @@ def test_an_export_that_no_client_reads_is_given_up(
     assert "was not taken for 0.2 s" in caplog.text
 
 
-def test_an_export_of_what_can_not_be_read_says_why(tmp_path: Path) -> None:
+def test_export_of_an_unreadable_log_says_why(tmp_path: Path) -> None:
     async def work() -> None:
         mine = readers.Readers(tmp_path)
         async with mine.export(Filter(), None, True) as export:

@@ -90,7 +90,7 @@ def test_no_press_is_sent_when_the_log_is_gone_and_a_new_one_says_so(
     assert verify(folder, head.hash).fault == ""
 
 
-def test_what_was_renamed_has_all_that_was_written(tmp_path: Path) -> None:
+def test_renamed_log_has_all_written_entries(tmp_path: Path) -> None:
     async def work(log: OperatorLog) -> None:
         for number in range(20):
             await log.closed(sent(await log.pressed(pressed(number))))
@@ -107,7 +107,7 @@ def test_what_was_renamed_has_all_that_was_written(tmp_path: Path) -> None:
     assert verify(tmp_path, verified.head).fault == ""
 
 
-def test_what_stands_in_the_place_of_the_log_is_kept(tmp_path: Path) -> None:
+def test_file_in_the_place_of_the_log_is_kept(tmp_path: Path) -> None:
     async def work(log: OperatorLog) -> None:
         await log.pressed(pressed(1))
         removed(tmp_path)
@@ -172,7 +172,7 @@ def test_a_lock_that_is_gone_is_taken_again_and_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("required", [True, False])
-def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, required: bool) -> None:
+def test_no_press_is_sent_while_another_server_has_the_folder(tmp_path: Path, required: bool) -> None:
     async def work(log: OperatorLog) -> None:
         (tmp_path / LOCK).unlink()
         other = DataDir(tmp_path)

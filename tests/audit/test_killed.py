@@ -61,7 +61,7 @@ def killed_under_presses(
         client.join()
 
 
-def test_nothing_is_lost_by_kills_under_presses(
+def test_kills_during_presses_lose_no_entry(
     bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     seed = random.randrange(10**9)

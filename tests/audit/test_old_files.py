@@ -147,7 +147,7 @@ def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
     assert [line for line in german if SENT in line] == [line for line in english if SENT in line]
 
 
-def test_texts_of_the_panel_numbers_and_times_are_in_the_language_of_who_reads_an_entry(
+def test_texts_numbers_and_times_of_an_entry_are_in_the_readers_language(
     folder: Path, tmp_path: Path
 ) -> None:
     label = PanelText({"en": "Limit", "de": "Grenze"}, "en")
@@ -205,6 +205,6 @@ def test_entry_with_a_former_code_is_shown_with_its_sentence(language: str) -> N
         assert entry.reason_in(language) == render(sentence, language)
 
 
-def test_open_press_with_a_former_code_has_the_present_one() -> None:
+def test_open_press_with_a_former_code_has_the_present_code() -> None:
     press = OpenPress(new_entry("pressed"), "", "", '{"code":"goal_lost","params":{}}', False)
     assert press.code == "goal_forgotten"

@@ -107,7 +107,7 @@ def test_a_full_disk_locks_and_opens_again_by_itself(
     assert done.stdout.startswith(b"ok, ")
 
 
-def test_one_line_lets_presses_go_on_without_a_log(
+def test_one_setting_permits_presses_without_a_log(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(small_disk(tmp_path, "[log]\nrequired = false\n"))
@@ -302,7 +302,7 @@ def test_the_page_works_without_scripts(
         context.close()
 
 
-def test_a_demo_without_a_folder_has_one_of_its_own(
+def test_demo_without_a_folder_uses_a_separate_folder(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     servers(Server(ROOT, KIOSK_DATA="", XDG_STATE_HOME=str(tmp_path)))

@@ -89,7 +89,7 @@ def counted() -> Counted:
     return Counted()
 
 
-def test_a_browser_has_so_many_at_once_and_then_one_from_time_to_time(counted: Counted) -> None:
+def test_browser_has_a_burst_of_logged_refusals_then_one_per_interval(counted: Counted) -> None:
     assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
     counted.now += 10 / OF_BROWSER.per_s
     assert counted.come(KIM, ENOUGH) == 10
@@ -97,12 +97,12 @@ def test_a_browser_has_so_many_at_once_and_then_one_from_time_to_time(counted: C
     assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
 
 
-def test_one_browser_takes_nothing_from_another(counted: Counted) -> None:
+def test_refusals_of_a_browser_do_not_use_up_the_quota_of_another(counted: Counted) -> None:
     counted.come(KIM, 10_000)
     assert counted.come(LEE, 10) == 10
 
 
-def test_an_address_that_changes_its_cookies_has_an_allowance_of_its_own(counted: Counted) -> None:
+def test_address_that_changes_its_cookies_has_its_own_quota(counted: Counted) -> None:
     entries = sum(
         counted.come(Origin(address="10.0.0.7", browser=f"b{number}"), 10) for number in range(1000)
     )
@@ -120,14 +120,14 @@ def test_all_together_have_a_bound(counted: Counted) -> None:
     assert entries <= OF_ALL.burst + day * OF_ALL.per_s
 
 
-def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
+def test_quota_remembers_a_bounded_number_of_browsers(counted: Counted) -> None:
     for number in range(10_000):
         counted.now += 1 / OF_ALL.per_s
         counted.come(Origin(address=f"10.1.{number}", browser="b"), 1)
     assert len(counted.refusals._browsers) == MAX_BUCKETS
 
 
-def test_what_is_left_out_is_summed_up_by_browser_and_the_rest_together(counted: Counted) -> None:
+def test_suppressed_refusals_are_counted_by_browser_and_the_rest_together(counted: Counted) -> None:
     counted.come(KIM, 60 + 7)
     for number in range(2 * MAX_BROWSERS):
         counted.come(Origin(address=f"10.0.0.{number}", browser="c"), 61)
@@ -232,7 +232,7 @@ def test_sent_presses_are_never_limited(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("inputs", [{"message": "much too long"}, {"nothing": 1}])
-def test_bad_input_is_limited_too_and_says_what_is_wrong(tmp_path: Path, inputs: Any) -> None:
+def test_invalid_input_is_limited_too_and_says_its_error(tmp_path: Path, inputs: Any) -> None:
     async def work(cell: Cell) -> None:
         first = await cell.press("first", **inputs)
         for number in range(ENOUGH):
@@ -269,7 +269,7 @@ def test_the_same_id_is_the_same_press_and_displaces_no_other(tmp_path: Path) ->
     written(tmp_path, work)
 
 
-def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
+def test_cancels_of_unknown_goals_are_limited_too(tmp_path: Path) -> None:
     async def work(cell: Cell) -> None:
         presses = presses_of(
             panel_of(COUNT), robot_there(panel_of(COUNT)), cell, press_log=cell.logbook

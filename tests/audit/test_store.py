@@ -72,7 +72,7 @@ def test_a_hash_can_be_computed_by_any_reader_of_the_file(
     assert digest == written.hash == hashlib.sha256(text.encode()).hexdigest()
 
 
-def test_an_outcome_says_which_press_it_is_of(store: Store, tmp_path: Path) -> None:
+def test_outcome_has_the_number_of_its_press(store: Store, tmp_path: Path) -> None:
     fill(store, 1)
     closed, opened = read(tmp_path, every=True)
     assert (closed.kind, closed.of, closed.outcome, closed.verdict) == (
@@ -212,7 +212,7 @@ def writes_no_unicode(db: sqlite3.Connection) -> None:
         (writes_no_unicode, "entry 5 was changed"),
     ],
 )
-def test_what_was_done_to_the_file_is_named(
+def test_change_to_the_file_is_named(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     tamper: Callable[[sqlite3.Connection], None],
@@ -315,7 +315,7 @@ def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:
 # Retention.
 
 
-def test_old_entries_go_and_what_is_left_can_be_verified(store: Store, tmp_path: Path) -> None:
+def test_old_entries_are_removed_and_the_rest_can_be_verified(store: Store, tmp_path: Path) -> None:
     fill(store, REMOVED_AT_ONCE)
     year_later = time.time_ns() // 1_000_000 + 366 * DAY_MS
     before = store.head
@@ -332,7 +332,7 @@ def test_old_entries_go_and_what_is_left_can_be_verified(store: Store, tmp_path:
     assert verify(tmp_path).fault == ""
 
 
-def test_nothing_young_goes(store: Store) -> None:
+def test_young_entries_are_never_removed(store: Store) -> None:
     fill(store, 5)
     assert not store.remove_old(1, 512, time.time_ns() // 1_000_000)
     assert store.head.count == 10
@@ -349,7 +349,7 @@ def test_only_old_entries_are_removed(store: Store, tmp_path: Path) -> None:
     assert verify(tmp_path).fault == ""
 
 
-def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Store) -> None:
+def test_setting_the_clock_does_not_make_entries_old(store: Store) -> None:
     at_1970 = [new_entry("refused", FROM)._replace(at=number) for number in range(1, 4)]
     store.append(at_1970)
     fill(store, 1)

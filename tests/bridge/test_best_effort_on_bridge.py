@@ -58,7 +58,7 @@ def notes(kiosk: Server, note: str) -> bool:
     return bool(kiosk.widget("words")["note"] == note)
 
 
-def test_a_display_adapts_and_an_interlock_says_it(
+def test_best_effort_publisher_is_read_by_a_display_and_reported_by_an_interlock(
     own_bridge: Bridge, own_node: RosNode, publish: Callable[[str], None], tmp_path: Path
 ) -> None:
     with live_server(own_bridge, tmp_path, PANEL) as kiosk:

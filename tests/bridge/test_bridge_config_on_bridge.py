@@ -38,7 +38,7 @@ def bridge(domain: int, panel: Path, tmp_path: Path) -> Iterator[Bridge]:
     mine.end()
 
 
-def test_the_panel_works_through_it_and_nothing_else_does(
+def test_generated_config_forwards_the_panels_topics_only(
     bridge: Bridge,
     panel: Path,
     tmp_path: Path,

@@ -146,7 +146,7 @@ def test_a_call_that_succeeds_shows_the_answer(kiosk: Server, robot: CycloneRobo
     assert "the sum is 42" in kiosk.http.get("/").text
 
 
-def test_the_robot_says_no_with_its_words(kiosk: Server, robot: CycloneRobot) -> None:
+def test_rejection_shows_the_robots_words(kiosk: Server, robot: CycloneRobot) -> None:
     robot.answer_set_enabled(success=False, message="the door is open")
     receipt = press(kiosk, "enable")
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
@@ -545,7 +545,7 @@ def test_a_goals_state_is_not_known_while_the_server_is_lost(
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
 
 
-def test_a_late_answer_corrects_what_every_browser_shows(
+def test_late_reply_corrects_the_result_in_every_browser(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:
     robot.answer_slow(seconds=6)

@@ -167,7 +167,7 @@ def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNod
         (image("rgb8", 3) | {"height": 11}, "not a complete sensor_msgs/msg/Image"),
     ],
 )
-def test_what_can_not_be_shown_says_why(
+def test_picture_that_cannot_be_shown_says_why(
     kiosk: Server, node: RosNode, page: Page, fields: dict[str, Any], said: str
 ) -> None:
     node.advertise("/test_raw", RAW, **BEST_EFFORT)

@@ -161,7 +161,7 @@ def test_hz_of_a_silent_topic_has_no_rate(cyclone_bridge: Bridge, io: RosNode) -
         ),
     ],
 )
-def test_what_is_not_there_is_a_sentence(
+def test_missing_topic_is_reported_with_a_sentence(
     cyclone_bridge: Bridge, io: RosNode, words: Sequence[str], sentence: str
 ) -> None:
     done = run(cyclone_bridge, *words)
@@ -181,7 +181,7 @@ def test_what_is_not_there_is_a_sentence(
         ),
     ],
 )
-def test_no_router_is_a_sentence_that_says_what_to_do(host: str, more: str) -> None:
+def test_missing_router_is_reported_with_the_remedy(host: str, more: str) -> None:
     endpoint = f"tcp/{host}:{free_port()}"
     done = command.run(COMMAND, "topics", "--connect", endpoint, "--wait", "0.3")
     assert (done.returncode, done.stdout) == (1, "")
@@ -191,7 +191,7 @@ def test_no_router_is_a_sentence_that_says_what_to_do(host: str, more: str) -> N
     )
 
 
-def test_a_router_without_a_bridge_is_a_finding_of_its_own(peer: tuple[str, Any]) -> None:
+def test_router_without_a_bridge_is_a_separate_finding(peer: tuple[str, Any]) -> None:
     endpoint, _ = peer
     done = command.run(COMMAND, "topics", "--connect", endpoint)
     assert (done.returncode, done.stdout) == (1, "")
@@ -278,9 +278,7 @@ def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
     assert path.read_text() == text
 
 
-def test_a_scaffold_beside_a_bridge_that_starts_has_what_is_on_the_robot(
-    domain: int, tmp_path: Path
-) -> None:
+def test_scaffold_waits_for_a_starting_bridge_and_has_all_topics(domain: int, tmp_path: Path) -> None:
     bridge = Bridge(domain + 1)
     node = RosNode(bridge.domain)
     path = tmp_path / "cell.toml"
@@ -353,7 +351,7 @@ def test_each_command_of_the_page_works(domain: int, tmp_path: Path) -> None:
         bridge.end()
 
 
-def test_a_scaffold_of_a_robot_with_a_namespace_has_it(domain: int, tmp_path: Path) -> None:
+def test_scaffold_of_a_robot_with_a_namespace_has_the_namespace(domain: int, tmp_path: Path) -> None:
     bridge = Bridge(domain + 1, "/robot1")
     bridge.start()
     node = RosNode(bridge.domain)

@@ -86,7 +86,7 @@ def test_the_documented_setting_reaches_nodes_on_fast_dds(domain: int) -> None:
 
 @pytest.mark.real_time
 @pytest.mark.usefixtures("robot")
-def test_the_doctor_names_what_the_range_alone_lacks(domain: int, tmp_path: Path) -> None:
+def test_doctor_names_the_setting_that_the_discovery_range_lacks(domain: int, tmp_path: Path) -> None:
     bridge = started(domain, "")
     panel = tmp_path / "cell1.toml"
     panel.write_text(panel_of(readout("/words")))

@@ -272,7 +272,7 @@ def test_a_listener_holds_a_route_only_where_it_is_to(
     assert bool(remote) is hold
 
 
-def test_nothing_there_is_an_error_that_says_where() -> None:
+def test_missing_bridge_is_an_error_with_the_endpoint() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
 
     async def read() -> None:

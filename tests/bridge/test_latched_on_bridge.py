@@ -80,7 +80,7 @@ def test_late_subscribers_get_the_last_message_also_the_first_of_them(
     assert kiosk.widget("shown")["text"] == "—"  # the panel's own message is not the robot's
 
 
-def test_nothing_is_sent_again_after_the_connection_was_lost(
+def test_lost_connection_repeats_no_command(
     kiosk: Server, own_bridge: Bridge, late: Callable[[str], RosNode]
 ) -> None:
     kiosk.press("mode", "automatic")

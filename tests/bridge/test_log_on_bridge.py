@@ -100,7 +100,7 @@ def test_a_pause_keeps_the_lines_and_the_page_stays_small(
     expect(widget(page, "robot").locator(".left-out")).to_contain_text("more lines are not shown")
 
 
-def test_a_hidden_page_asks_for_nothing(kiosk: Server, node: RosNode, page: Page) -> None:
+def test_hidden_page_requests_no_log_lines(kiosk: Server, node: RosNode, page: Page) -> None:
     page.goto(kiosk.url)
     expect(rows(page)).not_to_have_count(0)
     page.evaluate(HIDE, True)
@@ -115,7 +115,7 @@ def test_a_hidden_page_asks_for_nothing(kiosk: Server, node: RosNode, page: Page
     assert len(hidden) <= 4, hidden  # both logs, after the page shows again
 
 
-def test_the_panels_own_lines_are_shown_where_it_says_so(kiosk: Server) -> None:
+def test_panels_own_log_lines_are_shown_if_the_widget_asks_for_them(kiosk: Server) -> None:
     """The lines of the node `web_ui`: its link was there before, so that some are in it."""
     assert lines(kiosk, "all", node="web_ui")
     assert not lines(kiosk, "robot", node="web_ui")
@@ -131,6 +131,6 @@ def test_without_scripts_the_newest_lines_are_on_the_page(
     expect(widget(without_scripts, "robot").locator(".wanted")).to_be_hidden()
 
 
-def test_what_is_no_log_has_no_lines(kiosk: Server) -> None:
+def test_widget_that_is_not_a_log_has_no_lines(kiosk: Server) -> None:
     assert kiosk.http.get("/widgets/nothing/lines").status_code == 404
     assert kiosk.http.get("/widgets/robot/lines", params={"level": "loud"}).status_code == 422

@@ -91,7 +91,7 @@ def press(server: Server, widget: str, **inputs: Any) -> None:
     assert (answer.status_code, answer.json()["outcome"]) == (200, "published"), answer.text
 
 
-def test_what_is_left_out_arrives_as_ros_would_have_it(cell: Server, robot: RosNode) -> None:
+def test_omitted_fields_arrive_with_ros_defaults(cell: Server, robot: RosNode) -> None:
     before = time.time()
     path = heard_after(robot, PATH, lambda: press(cell, "go"))
     after = time.time()

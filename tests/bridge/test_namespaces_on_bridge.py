@@ -138,7 +138,7 @@ def test_the_log_and_parameter_events_are_where_the_bridge_has_them(
     until(lambda: heard(node, "of limit"), "the robot's nodes have its lines")
 
 
-def test_what_is_not_below_the_namespace_is_shown_locks_and_is_published(started: Started) -> None:
+def test_topics_outside_the_namespace_are_shown_lock_and_are_published(started: Started) -> None:
     _, node, kiosk = started(OF_ROBOT + OF_CELL, "--prefixed", namespace="/amr")
     node.advertise("/diagnostics", DIAGNOSTICS)
     node.advertise("/cell/permitted", "std_msgs/msg/Bool")

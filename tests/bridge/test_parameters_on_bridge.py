@@ -137,7 +137,7 @@ def test_a_value_is_set_and_shown_as_the_node_has_it(kiosk: Server, robot: Cyclo
         ("name", 7, "parameter_not_a_text", "1000"),
     ],
 )
-def test_what_the_node_would_not_take_is_not_sent(
+def test_value_outside_the_nodes_limits_is_not_sent(
     kiosk: Server, robot: CycloneRobot, widget: str, value: Any, code: str, limits: str
 ) -> None:
     receipt = press(kiosk, widget, value)
@@ -147,9 +147,7 @@ def test_what_the_node_would_not_take_is_not_sent(
     assert robot.parameter_requests(service="set_parameters") == 0
 
 
-def test_a_parameter_that_is_declared_anew_is_described_anew(
-    kiosk: Server, robot: CycloneRobot
-) -> None:
+def test_redeclared_parameter_is_described_again(kiosk: Server, robot: CycloneRobot) -> None:
     robot.declare_parameter(name="limit", value="ten")
     until(lambda: kiosk.widget("limit")["state"] == "unreadable", "its type is another one")
     assert "limit of /cyclone_robot is string" in kiosk.widget("limit")["reason"]
@@ -159,7 +157,7 @@ def test_a_parameter_that_is_declared_anew_is_described_anew(
     assert kiosk.widget("name")["text"] == "fixed"
 
 
-def test_what_the_node_refuses_comes_with_its_words(kiosk: Server, robot: CycloneRobot) -> None:
+def test_refused_parameter_shows_the_nodes_reason(kiosk: Server, robot: CycloneRobot) -> None:
     robot.refuse_parameters(reason="the arm moves")
     receipt = press(kiosk, "speed", 0.9)
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
@@ -262,7 +260,7 @@ def test_lost_bridge_while_setting_leaves_the_result_unknown(
     assert (kiosk.widget("name")["state"], kiosk.widget("name")["text"]) == ("live", "later")
 
 
-def test_it_works_by_forms_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:
+def test_parameters_are_set_by_forms_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:
     form = (
         "_id=f1&speed=1.1&name=x&enabled=false&enabled=true&limit=7&serial=&nothing=&count=&mistyped="
     )

@@ -52,14 +52,14 @@ def publishers(domain: int, tmp_path: Path) -> Iterator[Publishers]:
     mine.close()
 
 
-def test_a_false_that_a_new_publisher_says_is_never_passed_over_where_that_one_was_seen(
+def test_false_of_a_new_publisher_is_never_missed_once_its_token_was_seen(
     publishers: Publishers,
 ) -> None:
     trials = [publishers.trial("fast", kind) for kind in (ONCE, AT_ONCE) for _ in range(TRIALS)]
     assert [trial for trial in trials if trial.permitted and (trial.announced or trial.received)] == []
 
 
-def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishers: Publishers) -> None:
+def test_silent_publisher_locks_until_a_message_arrives(publishers: Publishers) -> None:
     publishers.open()
     silent = Kind("silent", times=0, matched=False)
     with publishers.running("fast", silent):

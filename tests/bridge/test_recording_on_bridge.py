@@ -81,7 +81,7 @@ def says(node: RosNode, kiosk: Server, text: str) -> None:
     )
 
 
-def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
+def test_recording_around_a_press_is_read_by_ros_2(
     own_bridge: Bridge,
     own_node: RosNode,
     tmp_path: Path,
@@ -155,7 +155,7 @@ def test_a_hold_is_recorded_from_its_begin_to_its_end(
     ]
 
 
-def test_a_killed_server_leaves_a_recording_to_the_next_one(
+def test_next_server_finishes_the_recording_of_a_killed_server(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(recording(own_bridge, tmp_path, after_s=60))
@@ -188,7 +188,7 @@ def presses_in(unfinished: Path) -> int:
     return count
 
 
-def test_without_a_disk_it_says_so_and_presses_work(
+def test_full_disk_is_reported_and_presses_work_without_recording(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     (tmp_path / "data").mkdir()

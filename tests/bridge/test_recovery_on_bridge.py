@@ -107,7 +107,7 @@ def test_after_a_kill_a_goal_can_be_canceled(
     until(lambda: logged(tmp_path)[-1] == ("corrected", "canceled"), "logged")
 
 
-def test_a_second_kill_loses_it_no_more_than_the_first(
+def test_goal_is_still_followed_after_a_second_kill(
     start: Start, robot: CycloneRobot, tmp_path: Path
 ) -> None:
     robot.fibonacci(step_s=30)
@@ -203,7 +203,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
     assert "no longer knows this goal" in again.widget("count")["result"]
 
 
-def test_without_a_log_nothing_is_known(
+def test_goal_before_a_restart_is_unknown_without_a_log(
     start: Callable[..., Server], robot: CycloneRobot, tmp_path: Path
 ) -> None:
     path = tmp_path / "unlogged.toml"

@@ -95,7 +95,7 @@ def test_two_publishers_of_one_type_have_a_topic_each(server: Server, node: RosN
     assert node.heard_data("/operation2")[two:] == ["to two"]
 
 
-def test_nothing_known_is_locked_and_says_what_it_waits_for(server: Server) -> None:
+def test_unknown_permission_locks_and_says_what_is_missing(server: Server) -> None:
     until(server.ready, "ready")
     shown = server.widget("operation1")
     assert shown["enabled"] is False
@@ -211,7 +211,7 @@ def on_rosout(node: RosNode, text: str) -> dict[str, object]:
     return lines[0]
 
 
-def test_what_was_typed_and_what_uvicorn_says_is_not_on_rosout(server: Server, node: RosNode) -> None:
+def test_typed_text_and_uvicorn_lines_are_not_on_rosout(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
     before = len(node.heard("/rosout"))
     head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
@@ -244,7 +244,7 @@ def test_debug_is_hidden_unless_asked_for(
 
 
 @pytest.mark.parametrize("robot_first", [True, False])
-def test_another_type_on_the_robot_locks_and_says_which(
+def test_type_that_differs_on_the_robot_locks_and_is_named(
     own_bridge: Bridge,
     own_node: RosNode,
     tmp_path: Path,

@@ -133,7 +133,7 @@ interlock = "{lock}"
 )
 
 
-def test_a_second_publisher_locks_where_only_one_may_be_and_is_named(
+def test_second_publisher_of_a_single_publisher_interlock_locks_and_is_named(
     own_bridge: Bridge, nodes: Callable[[str], RosNode], tmp_path: Path
 ) -> None:
     door, robot = nodes("door"), nodes("robot")

@@ -147,7 +147,7 @@ CROWDED: Final = """() => [...document.querySelectorAll(".gallery .key .face")].
 SCREENS: Final = ((1280, 800), (1024, 600), (800, 480))
 
 
-def test_nothing_is_crowded_in_the_gallery(shipped: Server, page: Page) -> None:
+def test_gallery_targets_have_enough_room(shipped: Server, page: Page) -> None:
     """Each kind in each state, with the sentences of each language at each size."""
     for language in sorted(files_of_languages()):
         page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
@@ -311,7 +311,7 @@ def shifts(pages: Sequence[Page], url: str, states: Sequence[str]) -> list[list[
 @pytest.mark.parametrize(
     ("path", "states"), [("/pages/setup", ["online"]), ("/", ["locked", "permitted"])]
 )
-def test_nothing_moves_after_the_page_is_there(
+def test_layout_does_not_shift_after_load(
     example: Server, chromium: Browser, path: str, states: list[str]
 ) -> None:
     """Values come, and locks come and fall: what a key says moves nothing but its own face."""

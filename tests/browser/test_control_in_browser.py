@@ -206,7 +206,7 @@ def test_a_request_is_withdrawn(opens: Opens) -> None:
 
 
 @pytest.mark.parametrize("kiosk", [f"takeover_after_s = {IDLE_S}"], indirect=True)
-def test_an_idle_holder_gives_way_and_one_at_work_does_not(opens: Opens) -> None:
+def test_idle_holder_loses_control_on_request_and_active_holder_keeps_it(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
     tap(second, "Request control")
@@ -277,7 +277,7 @@ def test_closed_page_frees_control_for_the_requester(opens: Opens) -> None:
     has_role(second, "holding")
 
 
-def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:
+def test_released_control_is_not_taken_again_by_a_page_load(opens: Opens) -> None:
     cell = opens()
     has_role(cell, "holding")
     tap(cell, "Release control")
@@ -336,9 +336,7 @@ def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
     locked_free(second)
 
 
-def test_a_page_that_came_by_a_link_on_another_site_learns_who_it_is(
-    kiosk: Server, opens: Opens
-) -> None:
+def test_page_opened_by_a_link_on_another_site_is_identified(kiosk: Server, opens: Opens) -> None:
     first = opens(FIRST)
     take(first)
     linking = first.context.new_page()

@@ -101,7 +101,7 @@ def test_an_allowed_site_shows_values_and_no_controls(own_page: Page, tmp_path: 
         assert page.context.cookies(server.url) == []
 
 
-def test_the_server_refuses_what_a_frame_presses(own_page: Page, tmp_path: Path) -> None:
+def test_server_refuses_presses_from_a_frame(own_page: Page, tmp_path: Path) -> None:
     page = own_page
     with embedded(tmp_path, ALLOWED) as (server, around):
         page.goto(around)
@@ -119,7 +119,7 @@ def test_the_server_refuses_what_a_frame_presses(own_page: Page, tmp_path: Path)
 @pytest.mark.parametrize(
     "rules", ["", 'origins = ["https://dashboard.example"]'], ids=["none", "another"]
 )
-def test_any_other_site_shows_nothing(own_page: Page, tmp_path: Path, rules: str) -> None:
+def test_frame_on_any_other_site_stays_empty(own_page: Page, tmp_path: Path, rules: str) -> None:
     page = own_page
     with embedded(tmp_path, rules) as (_, around):
         with page.expect_console_message(lambda said: "frame-ancestors" in said.text):

@@ -118,7 +118,7 @@ def test_cleaning_lock_takes_thirty_seconds(screen: Page) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
+def test_cleaning_shows_only_the_state_and_presses_nothing(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
 ) -> None:
     page = touched(touchscreen, kiosk, size)
@@ -155,14 +155,14 @@ def test_cleaning_lock_ends_by_itself(screen: Page) -> None:
     expect(screen.locator(HEARD)).to_have_text("stop (/operation)")
 
 
-def test_it_goes_on_when_the_page_is_loaded_again(screen: Page) -> None:
+def test_cleaning_continues_after_a_reload(screen: Page) -> None:
     clean(screen, 30)
     screen.reload()
     expect(screen.locator("#cleaning")).to_be_visible()
     expect(screen.locator("[data-widget=jog] .hold")).to_be_disabled()
 
 
-def test_a_hold_ends_when_it_starts(screen: Page) -> None:
+def test_cleaning_ends_a_hold(screen: Page) -> None:
     def holds() -> bool:  # as soon as its script is there
         screen.keyboard.up(" ")
         screen.locator(".hold").focus()
@@ -211,7 +211,7 @@ def test_waking_touch_on_a_dark_screen_presses_nothing(sleepy: Page, dimming: Se
     assert "jog" not in dimming.process.text
 
 
-def test_the_touch_after_it_presses(sleepy: Page) -> None:
+def test_touch_after_cleaning_presses(sleepy: Page) -> None:
     load = middle(sleepy.locator("[data-widget=load] > [type=submit]"))
     before = sleepy.locator(HEARD).inner_text()
     wakes(sleepy, partial(sleepy.touchscreen.tap, *load))
@@ -346,7 +346,7 @@ def test_a_browser_may_turn_the_panels_sounds_off(chromium: Browser, with_sounds
         settled(page)
 
 
-def test_holds_stay_locked_after_it_while_a_keypad_is_open(screen: Page) -> None:
+def test_holds_stay_locked_after_cleaning_while_a_keypad_is_open(screen: Page) -> None:
     screen.locator("#input-speed").tap()
     expect(screen.locator(".sheet")).to_be_visible()
     clean(screen, 1)

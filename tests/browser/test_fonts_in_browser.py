@@ -41,7 +41,7 @@ def publish_at(page: Page, size: tuple[int, int]) -> FloatRect:
     return place(button(page, "Publish"))
 
 
-def test_the_bar_fits_and_nothing_moves_when_somebody_asks(opens: Opens) -> None:
+def test_control_bar_fits_and_does_not_shift_on_a_control_request(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
     before = {size: publish_at(first, size) for size in SIZES}

@@ -185,7 +185,7 @@ def test_lost_permission_ends_the_hold(thumb: Thumb, robot: RosNode) -> None:
     assert len(robot.heard(TOPIC)) == count
 
 
-def test_the_knob_follows_the_finger_and_the_server_says_what_it_sent(
+def test_knob_follows_the_finger_and_the_page_shows_the_sent_value(
     thumb: Thumb, robot: RosNode
 ) -> None:
     before = len(robot.heard(TOPIC))

@@ -144,7 +144,7 @@ def are_initial(page: Page) -> None:
     expect(page.locator(GAIN)).not_to_have_value("4.5")
 
 
-def test_it_is_there_after_another_page_and_nothing_is_sent(kiosk: Server, page: Page) -> None:
+def test_entry_is_kept_over_another_page_and_is_not_sent(kiosk: Server, page: Page) -> None:
     sent: list[str] = []
     page.on("request", lambda request: sent.append(request.url) if request.method == "POST" else None)
     page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(str(text))))
@@ -182,7 +182,7 @@ def test_a_parameter_follows_the_robot_again_after_it_is_set(kiosk: Server, page
     expect(page.locator(GAIN)).to_have_value("3")
 
 
-def test_what_is_outside_the_limits_or_no_number_is_not_restored(kiosk: Server, page: Page) -> None:
+def test_entry_outside_the_limits_or_not_a_number_is_not_restored(kiosk: Server, page: Page) -> None:
     opened(page, kiosk)
     initial = page.locator(GAINS).input_value()
     for level, gains in (("2000.1", "1, 6"), ("1,5", "1.5; 2"), ("", "1,234")):
@@ -230,7 +230,7 @@ def test_restart_discards_the_entered_value(page: Page, tmp_path: Path, change: 
         again.end()
 
 
-def test_each_robot_has_its_own(page: Page, tmp_path: Path) -> None:
+def test_each_robot_has_its_own_kept_entries(page: Page, tmp_path: Path) -> None:
     robots = "".join(
         f'[[robot]]\nid = "{id}"\nname = "{id}"\nnamespace = "/{id}"\n' for id in ("r1", "r2")
     )

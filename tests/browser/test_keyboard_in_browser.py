@@ -66,7 +66,7 @@ def test_keyboard_edits_at_the_caret(screen: Page) -> None:
     expect(screen.locator("#input-note")).to_have_value("x")
 
 
-def test_it_takes_no_more_than_the_field(screen: Page) -> None:
+def test_keyboard_accepts_no_more_characters_than_the_field(screen: Page) -> None:
     keyboard_for(screen, "#input-order")
     screen.locator("#input-order").evaluate("(input) => input.setSelectionRange(4, 4)")
     press(screen, *"12345678")
@@ -159,7 +159,7 @@ def test_enter_and_escape_that_end_a_conversion_close_nothing(screen: Page) -> N
     expect(screen.locator(".sheet")).to_have_count(0)
 
 
-def test_a_bar_code_replaces_what_the_field_that_asks_for_it_has(desk: Page) -> None:
+def test_bar_code_replaces_the_value_of_its_field(desk: Page) -> None:
     Keys(desk, READER_S).type("AB 12-3\n")
     expect(desk.locator("#input-order")).to_have_value("AB 12-3")
     Keys(desk, READER_S).type("999\n")
@@ -198,7 +198,9 @@ def test_typing_by_hand_is_not_taken_for_a_bar_code(desk: Page) -> None:
 
 
 @pytest.mark.parametrize("apart_s", [READER_S, HUMAN_S])
-def test_a_reader_presses_nothing_that_has_the_focus(desk: Page, kiosk: Server, apart_s: float) -> None:
+def test_bar_code_reader_does_not_press_the_focused_button(
+    desk: Page, kiosk: Server, apart_s: float
+) -> None:
     """Neither its Enter nor, of a fast one, a space in its code: a pressed key keeps the focus."""
     posts: list[str] = []
     desk.on("websocket", lambda socket: socket.on("framesent", lambda sent: posts.append(str(sent))))

@@ -71,7 +71,7 @@ def test_touch_opens_the_keypad_with_name_value_limits_and_unit(screen: Page) ->
     expect(screen.locator("#input-speed")).to_have_attribute("inputmode", "none")
 
 
-def test_what_is_set_is_in_the_field_and_only_a_press_sends_it(screen: Page, kiosk: Server) -> None:
+def test_keypad_value_is_in_the_field_and_sent_by_a_press_only(screen: Page, kiosk: Server) -> None:
     sent: list[str] = []
     screen.on("request", lambda request: sent.append(request.url) if request.method == "POST" else None)
     open_for(screen, "#input-speed")
@@ -86,7 +86,7 @@ def test_what_is_set_is_in_the_field_and_only_a_press_sends_it(screen: Page, kio
     expect(screen.locator(HEARD)).to_have_text("4711 80 210.0 0.0 (/operation2)")
 
 
-def test_what_is_out_of_limits_stays_and_cannot_be_set(screen: Page) -> None:
+def test_value_outside_the_limits_stays_on_the_keypad_and_cannot_be_set(screen: Page) -> None:
     for keys, said, reason in (
         ("320", "Too high", "Outside the limits"),
         ("5", "Too low", "Outside the limits"),
@@ -104,7 +104,7 @@ def test_what_is_out_of_limits_stays_and_cannot_be_set(screen: Page) -> None:
         settled(screen)
 
 
-def test_nothing_entered_cannot_be_set(screen: Page) -> None:
+def test_empty_keypad_cannot_be_set(screen: Page) -> None:
     sheet = open_for(screen, "#input-speed")
     sheet.get_by_role("button", name="Clear").tap()
     expect(sheet.locator("output")).to_be_empty()
@@ -112,7 +112,7 @@ def test_nothing_entered_cannot_be_set(screen: Page) -> None:
     expect(sheet.locator(".why")).to_have_text("Enter a number")
 
 
-def test_its_keys(screen: Page) -> None:
+def test_keypad_keys_edit_the_number(screen: Page) -> None:
     sheet = open_for(screen, "#input-offset")
     entered = sheet.locator("output")
     enter(screen, "2.255")
@@ -226,7 +226,7 @@ def test_hold_buttons_are_locked_while_the_keypad_is_open(screen: Page) -> None:
     expect(screen.locator("#why-jog")).to_have_text("")
 
 
-def test_a_hold_ends_when_it_opens(screen: Page) -> None:
+def test_opening_the_keypad_ends_a_hold(screen: Page) -> None:
     def holds() -> bool:  # as soon as its script is there, and the stream has enabled it
         screen.keyboard.up(" ")
         screen.get_by_role("button", name="Left").focus()
@@ -239,7 +239,7 @@ def test_a_hold_ends_when_it_opens(screen: Page) -> None:
     screen.keyboard.up(" ")
 
 
-def test_a_lock_that_came_while_it_was_open_is_there_after_it(screen: Page, kiosk: Server) -> None:
+def test_lock_during_an_open_keypad_shows_after_closing(screen: Page, kiosk: Server) -> None:
     open_for(screen, "#input-speed")
     permit(kiosk, HALT)
     expect(screen.locator('[data-widget="jog"] .hold')).to_be_disabled()
@@ -248,7 +248,7 @@ def test_a_lock_that_came_while_it_was_open_is_there_after_it(screen: Page, kios
     expect(screen.get_by_role("button", name="Left")).to_be_disabled()
 
 
-def test_a_page_that_was_cut_off_while_it_was_open_is_locked_after_it(
+def test_page_cut_off_during_an_open_keypad_is_locked_after_closing(
     screen: Page, kiosk: Server
 ) -> None:
     open_for(screen, "#input-speed")
@@ -280,7 +280,7 @@ def test_a_second_tap_on_set_presses_nothing_below(screen: Page) -> None:
     assert screen.evaluate("hit()")
 
 
-def test_another_field_takes_its_place_and_nothing_was_entered(screen: Page) -> None:
+def test_tapping_another_field_moves_the_keypad_and_discards_the_entry(screen: Page) -> None:
     open_for(screen, "#input-speed")
     enter(screen, "80")
     screen.locator("#input-order").tap()
@@ -312,7 +312,7 @@ def test_a_bar_code_is_not_confirmed_as_a_number(screen: Page) -> None:
     expect(screen.locator("#input-speed")).to_have_value("120")
 
 
-def test_its_words_come_from_the_server(screen: Page) -> None:
+def test_keypad_words_come_from_the_server(screen: Page) -> None:
     """The browser has a number, a unit and limits, and no word of its own."""
     served = screen.context.request.get(screen.url).text()
     open_for(screen, "#input-speed")
@@ -330,7 +330,7 @@ def test_its_words_come_from_the_server(screen: Page) -> None:
     ("keyboard", "has_touch", "opens"),
     [("auto", False, False), ("on", False, True), ("off", True, False), ("off", False, False)],
 )
-def test_the_panel_file_says_where_it_opens(
+def test_panel_file_sets_where_the_keypad_opens(
     chromium: Browser,
     servers: Callable[[Server], Server],
     tmp_path_factory: pytest.TempPathFactory,
@@ -353,7 +353,7 @@ def test_the_panel_file_says_where_it_opens(
             expect(page.locator("#input-note")).not_to_have_attribute("inputmode", "none")
 
 
-def test_without_scripts_there_is_nothing_of_it(chromium: Browser, kiosk: Server) -> None:
+def test_keypad_is_absent_without_scripts(chromium: Browser, kiosk: Server) -> None:
     context = chromium.new_context(java_script_enabled=False, has_touch=True)
     page = context.new_page()
     page.goto(kiosk.url)

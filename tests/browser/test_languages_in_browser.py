@@ -86,7 +86,7 @@ def test_a_word_of_the_menu_is_not_broken_in_japanese(server: Server, page: Page
     assert key.evaluate(LINES) == 1
 
 
-def test_of_a_third_line_nothing_shows(server: Server, page: Page) -> None:
+def test_lock_reason_shows_at_most_two_lines(server: Server, page: Page) -> None:
     page.context.add_cookies([{"name": COOKIE, "value": "ja", "url": server.url}])
     page.goto(server.url)
     texts = page.locator('[data-widget="allow"]').locator(".receipt, .why")

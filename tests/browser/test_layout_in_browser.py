@@ -150,7 +150,7 @@ def take_control(page: Page) -> None:
     expect(button).to_be_enabled()
 
 
-def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
+def test_confirmation_names_the_robot_and_empty_inputs(shown: Page) -> None:
     expect(shown.locator("html[data-floor]")).to_be_attached()
     take_control(shown)
     dialog = asked(shown.locator('[data-widget="allow"] > button'))
@@ -189,7 +189,7 @@ def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:
     assert box(shown, '[data-widget="n"]')["y"] == box(shown, '[data-widget="speed"]')["y"]
 
 
-def test_what_only_shows_is_no_higher_than_what_it_shows(shown: Page) -> None:
+def test_displays_are_no_higher_than_their_content(shown: Page) -> None:
     low, high = box(shown, '[data-widget="enabled"]'), box(shown, '[data-widget="feed"]')
     middle, height = low["y"] + low["height"] / 2, high["height"]
     assert abs(middle - high["y"] - height / 2) < 12  # beside it

@@ -86,7 +86,7 @@ def test_killed_bridge_is_shown_with_the_controls_that_it_locks(
     expect(said(page, "node", "locks")).to_have_text("Locks nothing.")
 
 
-def test_a_node_that_hangs_is_silent_and_one_that_died_is_gone(
+def test_hung_node_is_silent_and_killed_node_is_lost(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
 ) -> None:
     speaking(own_node)

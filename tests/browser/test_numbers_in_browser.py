@@ -190,7 +190,7 @@ WAYS: Final = {"typed": typed, "pasted": pasted, "composed": composed, "a form":
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("language", "locale"), READERS)
-def test_what_is_entered_is_what_the_robot_receives_or_it_is_refused(
+def test_entered_number_reaches_the_robot_exactly_or_is_refused(
     node: RosNode, opens: Opens, language: str, locale: str, way: str
 ) -> None:
     page = opens(language, locale, java_script_enabled=way != "a form")
@@ -266,7 +266,7 @@ def test_confirmation_question_shows_the_values_that_are_sent(node: RosNode, ope
     assert node.heard_data(TOPIC)[before:] == [-1234.5]
 
 
-def test_a_slider_and_its_buttons_show_what_is_sent(node: RosNode, opens: Opens) -> None:
+def test_slider_and_its_buttons_show_the_value_that_is_sent(node: RosNode, opens: Opens) -> None:
     page = opens("de", "en-US")
     before = len(node.heard(TOPIC))
     more = page.locator('[data-widget="height"] .step').last

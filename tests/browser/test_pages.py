@@ -350,7 +350,7 @@ def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
     assert len(posts) == 1
 
 
-def test_five_visible_windows_of_one_browser_all_work_beside_hidden_ones(
+def test_five_visible_windows_of_a_browser_work_beside_hidden_windows(
     server: Server, node: RosNode, chromium: Browser
 ) -> None:
     """A browser opens six connections to one server over HTTP/1.1."""

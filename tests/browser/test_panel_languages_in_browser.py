@@ -22,9 +22,7 @@ def choose(page: Page, language: str) -> None:
     page.get_by_role("button", name=language, exact=True).click()
 
 
-def test_a_browser_changes_its_language_and_no_other_ones(
-    chromium: Browser, page: Page, kiosk: Server
-) -> None:
+def test_browser_changes_its_own_language_only(chromium: Browser, page: Page, kiosk: Server) -> None:
     other = chromium.new_page()
     for browser_page in (page, other):
         browser_page.goto(kiosk.url)

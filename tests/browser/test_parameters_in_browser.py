@@ -67,7 +67,7 @@ def test_texts_and_switches_are_set(kiosk: Server, robot: CycloneRobot, page: Pa
     assert (robot.parameters()["name"], robot.parameters()["enabled"]) == ("grüezi", False)
 
 
-def test_what_the_robot_says_before_the_receipt_is_in_the_input_after_it(
+def test_value_reported_before_the_receipt_is_in_the_input_after_it(
     kiosk: Server, robot: CycloneRobot, own_page: Page
 ) -> None:
     page = own_page
@@ -105,7 +105,7 @@ def test_an_input_follows_the_robot_until_it_is_touched(
     expect(entry).to_have_value("22")
 
 
-def test_what_a_dialog_shows_is_what_is_set(
+def test_confirmed_value_is_the_value_in_the_dialog(
     cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path, page: Page
 ) -> None:
     """The input follows the robot behind the dialog; the question stays what it was."""
@@ -128,7 +128,7 @@ def test_what_a_dialog_shows_is_what_is_set(
         assert robot.parameters()["limit"] == 20
 
 
-def test_what_is_out_of_range_is_marked_and_refused(
+def test_value_out_of_range_is_marked_and_refused(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:
     page.goto(kiosk.url)

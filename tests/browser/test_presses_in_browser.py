@@ -137,7 +137,7 @@ def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, way: s
         assert began - press["late"] - ROUNDED_MS < at < shown.evaluate("Date.now()"), by
 
 
-def test_each_press_has_an_id_of_its_own(shown: Page) -> None:
+def test_each_press_has_its_own_id(shown: Page) -> None:
     for by in ("mouse", "Enter", "mouse"):
         make(shown, by)
         expect(publish(shown)).not_to_have_attribute("aria-busy", "true")

@@ -123,7 +123,9 @@ def button(page: Page, name: str) -> Locator:
 
 
 @pytest.mark.parametrize("look", ["normal", "large"])
-def test_nothing_overflows_on_any_screen(cell: Server, several: Server, page: Page, look: str) -> None:
+def test_no_element_overflows_on_any_screen(
+    cell: Server, several: Server, page: Page, look: str
+) -> None:
     for url in (f"{cell.url}/pages/cell", f"{cell.url}/pages/setup", several.url):
         page.context.add_cookies([{"name": "kiosk_text_size", "value": look, "url": url}])
         page.goto(url)
@@ -263,7 +265,9 @@ def test_a_keyboard_reaches_the_whole_reason(long: Server, page: Page) -> None:
     expect(page.locator("#whole p")).to_contain_text(DOORS)
 
 
-def test_what_a_key_was_answered_is_shown_whole_and_presses_nothing(long: Server, page: Page) -> None:
+def test_touching_a_buttons_result_shows_its_full_text_and_presses_nothing(
+    long: Server, page: Page
+) -> None:
     sized(page, 1024, 600).goto(long.url)
     key = page.locator("[data-widget=reset]")
     more = key.get_by_role("button", name="Show the whole text")

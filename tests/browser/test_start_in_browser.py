@@ -325,7 +325,7 @@ def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
     assert streams == []
 
 
-def test_what_lies_over_a_page_is_hidden_without_the_popover_api(demo: Server) -> None:
+def test_overlays_are_hidden_without_the_popover_api(demo: Server) -> None:
     """In the markup, for a browser without scripts."""
     html = demo.http.get(OPERATION).text
     popovers = html.count(" popover")

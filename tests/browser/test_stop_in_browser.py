@@ -77,7 +77,7 @@ def pressed(server: Server, before: int) -> None:
 
 
 @pytest.mark.parametrize("fingers", [1, 4])
-def test_it_is_pressed_while_other_fingers_rest_on_the_glass(
+def test_stop_works_while_other_fingers_rest_on_the_glass(
     page: Page, cell: Server, fingers: int
 ) -> None:
     resting = [(640.0 + 40 * n, 300.0) for n in range(fingers)]
@@ -93,7 +93,7 @@ def test_it_is_pressed_while_other_fingers_rest_on_the_glass(
     pressed(cell, before)
 
 
-def test_it_is_pressed_while_a_finger_holds_the_robot(page: Page, cell: Server) -> None:
+def test_stop_works_while_a_finger_holds_the_robot(page: Page, cell: Server) -> None:
     touch, before = Touch(page), stops(cell)
     hold = middle(page.get_by_role("button", name="Left"))
 
@@ -129,9 +129,7 @@ def test_a_tap_is_one_press_and_a_finger_that_slides_off_none(page: Page, cell: 
     pressed(cell, before + 1)
 
 
-def test_a_finger_whose_pointer_is_taken_away_has_pressed_only_while_it_was_on_stop(
-    page: Page, cell: Server
-) -> None:
+def test_cancelled_touch_presses_stop_only_if_the_finger_was_on_stop(page: Page, cell: Server) -> None:
     """A browser takes the pointers of all fingers away where one of them scrolls the page."""
     touch, (x, y), before = Touch(page), middle(page.locator(STOP)), stops(cell)
     touch.send("touchStart", (x, y))
@@ -142,7 +140,7 @@ def test_a_finger_whose_pointer_is_taken_away_has_pressed_only_while_it_was_on_s
     pressed(cell, before)
 
 
-def test_a_key_of_the_keyboard_presses_it_once(page: Page, cell: Server) -> None:
+def test_keyboard_key_presses_stop_once(page: Page, cell: Server) -> None:
     before = stops(cell)
     page.locator(STOP).focus()
     page.keyboard.press(" ")
@@ -265,7 +263,7 @@ def test_the_question_presses_with_yes_only(page: Page, cell: Server) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_it_is_bare_and_pressed_while_the_screen_is_cleaned(
+def test_stop_stays_uncovered_and_works_during_cleaning(
     touchscreen: Page, cell: Server, size: tuple[int, int]
 ) -> None:
     page = touched(touchscreen, cell, size)

@@ -20,7 +20,7 @@ from app.cli.command import main
         (seconds(600), "600", 600),
     ],
 )
-def test_what_is_right_is_a_number(type_: Callable[[str], float], text: str, value: float) -> None:
+def test_valid_argument_is_a_number(type_: Callable[[str], float], text: str, value: float) -> None:
     assert type_(text) == value
 
 
@@ -39,7 +39,9 @@ def test_what_is_right_is_a_number(type_: Callable[[str], float], text: str, val
         (seconds(600), "601", '"601" is not a time: up to 600 seconds'),
     ],
 )
-def test_what_is_wrong_is_a_sentence(type_: Callable[[str], float], text: str, sentence: str) -> None:
+def test_invalid_argument_is_reported_with_a_sentence(
+    type_: Callable[[str], float], text: str, sentence: str
+) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as raised:
         type_(text)
     assert sentence in str(raised.value)

@@ -54,7 +54,7 @@ def plugin(config: zenoh.Config) -> dict[str, object]:
     return plugin_config
 
 
-def test_it_lets_through_what_the_panel_uses_and_nothing_else(panel: Path) -> None:
+def test_generated_config_allows_the_panels_names_only(panel: Path) -> None:
     said = plugin(written(panel, "--domain", "7"))
     assert said["namespace"] == "/cell9"
     assert said["domain"] == 7
@@ -73,7 +73,7 @@ def test_it_lets_through_what_the_panel_uses_and_nothing_else(panel: Path) -> No
     }
 
 
-def test_it_waits_as_long_as_the_panel_does(panel: Path) -> None:
+def test_generated_config_has_the_panels_timeouts(panel: Path) -> None:
     assert plugin(written(panel))["queries_timeout"] == {
         "default": 5.0,
         "services": ["^/reset$=12.5"],
@@ -130,7 +130,7 @@ def test_the_rest_is_as_in_the_shipped_file(panel: Path, place: str) -> None:
     assert json.loads(written(panel).get_json(place)) == json.loads(shipped.get_json(place))
 
 
-def test_its_plugin_blocks_and_is_named_as_in_the_shipped_file(panel: Path) -> None:
+def test_generated_plugin_section_is_as_in_the_shipped_file(panel: Path) -> None:
     shipped = plugin(zenoh.Config.from_file(ROOT / "deploy/bridge.json5"))
     said = plugin(written(panel))
     assert {key: said[key] for key in shipped} == shipped
@@ -146,7 +146,9 @@ def test_the_domain_is_this_machines_by_default(panel: Path, monkeypatch: pytest
     assert plugin(written(panel))["domain"] == 42
 
 
-def test_of_several_robots_one_is_named(panel: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_config_for_several_robots_needs_a_robots_name(
+    panel: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     panel.write_text(SEVERAL)
     config = written(panel, "--robot", "left")
     assert plugin(config)["namespace"] == "/l"

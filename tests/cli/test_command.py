@@ -117,7 +117,7 @@ def after(*words: str, said: str) -> list[str]:
     return output.splitlines()[-1].split()
 
 
-def test_to_check_a_panel_takes_no_server_and_what_it_imports_is_left_alone() -> None:
+def test_check_loads_no_server_and_excludes_imports_from_garbage_collection() -> None:
     said = "gc.isenabled(), gc.get_freeze_count() > len(gc.get_objects()), *sys.modules"
     collects, frozen, *modules = after("check", said=said)
     assert (collects, frozen) == ("True", "True")

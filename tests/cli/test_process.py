@@ -25,7 +25,7 @@ def start(request: pytest.FixtureRequest) -> Start:
     return started
 
 
-def test_it_has_the_folder_and_the_environment_that_it_is_given(start: Start, tmp_path: Path) -> None:
+def test_forked_command_has_the_given_folder_and_environment(start: Start, tmp_path: Path) -> None:
     shutil.copy(PACKAGE / "panel.toml", tmp_path / "cell1.toml")
     env = {"KIOSK_PANEL": "cell1.toml"}
     done = command.finished(start(COMMAND, "check", folder=tmp_path, env=env))

@@ -147,7 +147,7 @@ def test_the_permission_of_a_row_is_by_principal_act_and_server(bench: Bench) ->
     assert [entry.outcome for entry in bench.log.entries] == ["refused", "refused", "accepted"]
 
 
-def test_what_apply_refuses_is_answered_and_logged_with_its_sentence(bench: Bench) -> None:
+def test_refusal_of_an_act_is_answered_and_logged_with_its_sentence(bench: Bench) -> None:
     receipt = bench.increase("a1", name="other")
     assert (receipt.outcome, receipt.code, receipt.cause) == (
         "refused",

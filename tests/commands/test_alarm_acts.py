@@ -114,7 +114,7 @@ def test_an_alarm_that_is_not_there_is_refused_with_a_sentence(panel: Panel) -> 
         ("shelve", {"reason": "Tests", "until": "2026-05-04T14:00:00"}),
     ],
 )
-def test_what_is_missing_or_malformed_is_an_error_of_the_request(
+def test_missing_or_malformed_field_is_a_request_error(
     panel: Panel, act: str, values: dict[str, Any]
 ) -> None:
     with pytest.raises(InputError):

@@ -140,7 +140,7 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
     run(test)
 
 
-def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
+def test_control_characters_in_a_reply_are_shown_as_escapes() -> None:
     async def test(bench: Bench) -> None:
         call = bench.call()
         await queried(bench, 1)
@@ -193,7 +193,7 @@ def test_calls_without_an_answer_are_bounded_and_forgotten() -> None:
     run(test)
 
 
-def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
+def test_late_reply_corrects_its_own_press_only() -> None:
     async def test(bench: Bench) -> None:
         await bench.call("p1")
         second = bench.call("p2")
@@ -530,7 +530,7 @@ def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
     run(test)
 
 
-def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
+def test_error_while_following_a_goal_leaves_its_result_unknown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fails(*_: Any) -> str:

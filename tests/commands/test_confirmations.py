@@ -104,7 +104,7 @@ def test_the_name_of_a_constant_confirms_by_its_value() -> None:
     assert asyncio.run(pressed()).outcome == "confirmed"
 
 
-def test_what_came_unseen_confirms_by_when_it_came() -> None:
+def test_unread_message_confirms_by_its_arrival_time() -> None:
     """All in one turn: of what came and went before the newest, only what is later than the command."""
 
     async def pressed(came_at: float) -> Receipt:
@@ -150,7 +150,7 @@ def test_an_older_entry_does_not_confirm_with_a_message_of_another_node() -> Non
     assert asyncio.run(pressed()).outcome == "unknown"
 
 
-def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
+def test_command_without_confirmation_is_unknown_and_corrected_later() -> None:
     async def pressed() -> tuple[Receipt, Receipt | None, str]:
         desk = Desk(panel_of())
         first = await desk.press()
@@ -167,7 +167,7 @@ def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
     assert (corrected.outcome, shown) == ("confirmed", "confirmed")
 
 
-def test_of_two_commands_and_one_effect_only_what_shows_after_it_confirms() -> None:
+def test_two_commands_with_one_effect_are_confirmed_by_later_messages_only() -> None:
     """The effect of the first came before the second was sent: the second is not known."""
 
     async def pressed() -> list[Receipt]:
@@ -204,7 +204,7 @@ def test_one_effect_confirms_one_of_two_commands(said: list[str], outcomes: list
     assert [receipt.outcome for receipt in asyncio.run(pressed())] == outcomes
 
 
-def test_nothing_is_waited_for_in_the_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_confirmation_stays_pending_in_the_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(confirmations, "LATE_S", 0.05)
 
     async def pressed() -> list[Any]:
@@ -308,13 +308,13 @@ def panel_file(folder: Path, more: str) -> Path:
         ),
     ],
 )
-def test_what_is_wrong_with_it_is_reported_at_load(tmp_path: Path, more: str, fault: str) -> None:
+def test_faulty_confirmation_is_reported_at_load(tmp_path: Path, more: str, fault: str) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(panel_file(tmp_path, more))
     assert fault in faults_text(caught.value)
 
 
-def test_the_type_is_that_which_the_panel_gives_elsewhere(tmp_path: Path) -> None:
+def test_confirmation_uses_the_topics_type_in_the_panel(tmp_path: Path) -> None:
     interlock = f'\n[[interlock]]\nid = "a"\ntopic = "/last"\ntype = "{BOOL}"\n'
     path = panel_file(tmp_path, 'confirm = { topic = "/last", equals = "{fan}" }' + interlock)
     assert load_panel(path).subscriptions() == {"/last": BOOL}

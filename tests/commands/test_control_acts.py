@@ -158,7 +158,9 @@ def test_an_id_of_another_act_is_refused_and_does_nothing(bench: Bench, other: A
     run(work())
 
 
-def test_what_refuses_a_press_refuses_an_act(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_act_is_refused_for_the_same_reasons_as_a_press(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async def work() -> None:
         late = await bench.do("take", at=0.0)
         assert (late.outcome, late.code, late.cause) == ("refused", "late", "interlock")
@@ -188,7 +190,7 @@ def test_giving_up_is_never_refused_for_the_log_or_the_time(
     run(work())
 
 
-def test_refusals_beyond_the_logs_quota_are_counted_and_what_is_done_is_logged(bench: Bench) -> None:
+def test_refused_acts_beyond_the_quota_are_counted_and_applied_acts_are_logged(bench: Bench) -> None:
     async def work() -> None:
         bench.log.full = True
         await bench.do("take", ANN, "a1")
@@ -199,7 +201,7 @@ def test_refusals_beyond_the_logs_quota_are_counted_and_what_is_done_is_logged(b
     assert bench.log.left_out_of == [BOB.client.id]
 
 
-def test_what_time_changes_is_logged_too(bench: Bench) -> None:
+def test_change_of_control_by_time_is_logged(bench: Bench) -> None:
     async def work() -> None:
         await bench.do("take", ANN, "a1")
         await bench.do("ask", BOB, "a2")

@@ -98,7 +98,7 @@ def pressed(widget: str, way: Way, late: Late, robot: RobotState) -> Receipt:
 
 
 @pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
-def test_a_permission_that_is_taken_back_while_it_is_encoded_stops_it(widget: str) -> None:
+def test_permission_withdrawn_during_encoding_stops_the_press(widget: str) -> None:
     robot, way = robot_permits(), Way()
     receipt = pressed(widget, way, Late(robot, False), robot)
     assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
@@ -107,13 +107,13 @@ def test_a_permission_that_is_taken_back_while_it_is_encoded_stops_it(widget: st
 
 
 @pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
-def test_one_that_is_given_again_lets_it_through(widget: str) -> None:
+def test_permission_given_again_before_sending_permits_the_press(widget: str) -> None:
     robot, way = robot_permits(), Way()
     pressed(widget, way, Late(robot, True, True), robot)
     assert len(way.sent) >= 1
 
 
-def test_news_that_come_faster_than_they_are_taken_in_stop_it() -> None:
+def test_samples_that_arrive_faster_than_they_are_ingested_stop_the_press() -> None:
     robot, way = robot_permits(), Way()
     late = Late(robot, *[True] * (MAX_FINAL_CHECKS + 5), ends=False)
     receipt = pressed("guarded", way, late, robot)
@@ -175,7 +175,7 @@ async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
     await kiosk.stop()
 
 
-def test_nothing_is_sent_after_a_false_that_is_in_the_inbox(
+def test_false_in_the_inbox_stops_the_press(
     own_bridge: Bridge, own_node: RosNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A node permits and forbids 400 times a second, while someone presses all the time."""

@@ -194,7 +194,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: Bench) -> None:
+def test_hold_sends_at_its_rate_and_one_message_at_the_end(bench: Bench) -> None:
     holding = bench.begun()
     bench.keep(holding, 1.0)
     bench.holds.end(holding, RELEASED)
@@ -207,7 +207,7 @@ def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: 
     assert coded(receipt.reason, "seconds") == ("hold_released", "1.0")
 
 
-def test_each_message_has_the_time_of_its_own_sending() -> None:
+def test_each_hold_message_has_its_own_sending_time() -> None:
     stamped = "geometry_msgs/msg/PointStamped"
     header = {"header": {"stamp": "{now}"}}
     jog = {**JOG, "type": stamped, "message": {**header, "point": {"x": "{speed}"}}, "release": header}
@@ -249,7 +249,7 @@ def test_every_other_end_says_why_and_wants_a_new_press(bench: Bench, code: str)
     assert bench.points == [MOVES, STOPS]
 
 
-def test_without_a_heartbeat_it_ends_a_quarter_of_a_second_after_the_last_was_sent(
+def test_missing_heartbeat_ends_a_hold_after_a_quarter_of_a_second(
     bench: Bench,
 ) -> None:
     holding = bench.begun()
@@ -296,14 +296,14 @@ def test_lost_permission_ends_the_hold_at_once(bench: Bench) -> None:
     assert bench.points == [MOVES, STOPS]
 
 
-def test_what_has_come_but_is_not_taken_in_yet_counts_before_a_message(bench: Bench) -> None:
+def test_samples_in_the_inbox_count_before_the_next_hold_message(bench: Bench) -> None:
     bench.begun()
     bench.pending.append(lambda: permits(bench.robot, False))
     bench.loop.pass_time(0.05)
     assert bench.points == [MOVES, STOPS]
 
 
-def test_what_comes_while_a_message_is_encoded_counts_before_it_is_sent(bench: Bench) -> None:
+def test_samples_during_encoding_count_before_the_hold_message_is_sent(bench: Bench) -> None:
     bench.begun()
     looks: list[bool] = []
 
@@ -468,7 +468,9 @@ def test_small_counter_wraps_around() -> None:
     assert sent[:300] == [n % 256 for n in range(1, 301)]
 
 
-def test_log_lines_say_who_how_long_and_why(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+def test_log_lines_of_a_hold_have_client_duration_and_reason(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.INFO, "kiosk.holds")
     holding = bench.begun()
     bench.keep(holding, 0.5)
@@ -490,7 +492,7 @@ def test_log_lines_say_who_how_long_and_why(bench: Bench, caplog: pytest.LogCapt
         (1500, 0, math.inf),
     ],
 )
-def test_the_age_of_what_a_browser_says_shows_in_the_servers_own_time(
+def test_heartbeats_age_is_measured_by_the_servers_clock(
     stamp_ms: float, after_ms: float, age_s: float
 ) -> None:
     assert 101.0 - sent_at(100.0, stamp_ms, after_ms, 101.0) == pytest.approx(age_s)

@@ -48,7 +48,7 @@ def stick(**more: Any) -> Joystick:
     return Joystick.model_validate(STICK | more)
 
 
-def test_it_begins_in_the_middle_and_sends_what_the_newest_beat_has() -> None:
+def test_joystick_begins_with_zeros_and_sends_the_newest_deflection() -> None:
     bench = bench_of()
     holding = held(bench)
     assert bench.points == [STOPS, (2.0, -2.0, 0.0)]
@@ -111,7 +111,7 @@ def test_lost_certainty_ends_the_joystick_with_zeros(cause: str) -> None:
     assert (len(bench.points), len(bench.receipts)) == (count, 1)
 
 
-def test_what_zenoh_refuses_ends_it_and_nothing_is_said_later() -> None:
+def test_zenoh_error_ends_a_joystick_hold_and_no_message_follows() -> None:
     bench = bench_of()
     held(bench)
     bench.way.fails = "gone"
@@ -173,7 +173,7 @@ def test_the_dead_zone_is_zero_and_begins_with_zero(
     assert shaped(stick(dead_zone=0.2, shape=shape), position) == pytest.approx(sent)
 
 
-def test_a_ramp_limits_how_fast_it_gets_and_never_how_it_stops() -> None:
+def test_ramp_limits_acceleration_but_not_stopping() -> None:
     joystick = stick(ramp_s=0.5, rate_hz=20)  # a tenth with each message
     assert moved(joystick, (0.0, 0.0), (1.0, -1.0)) == pytest.approx((0.1, -0.1))
     assert moved(joystick, (0.8, -0.8), (0.2, 0.0)) == (0.2, 0.0)
@@ -181,7 +181,7 @@ def test_a_ramp_limits_how_fast_it_gets_and_never_how_it_stops() -> None:
 
 
 @given(UNIT, UNIT, st.floats(0.001, 1))
-def test_a_ramp_never_passes_what_is_wanted(before: float, wanted: float, step: float) -> None:
+def test_ramp_never_exceeds_the_target(before: float, wanted: float, step: float) -> None:
     next_value = ramped(before, wanted, step)
     assert abs(next_value) <= max(abs(wanted), 0.0) + 1e-12
     assert next_value * wanted >= 0

@@ -257,7 +257,7 @@ def test_a_list_shows_its_beginning_however_long_its_texts_are(
         ),
     ],
 )
-def test_what_is_wrong_in_the_panel_file_is_reported(more: dict[str, Any], fault: str) -> None:
+def test_faulty_list_or_option_in_the_panel_file_is_reported(more: dict[str, Any], fault: str) -> None:
     assert any(message.startswith(f"page[0].widget[0]{fault}") for message in faults({**GAINS, **more}))
 
 

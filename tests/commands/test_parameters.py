@@ -241,7 +241,7 @@ def test_an_event_while_the_node_is_asked_goes_over_its_answer() -> None:
 
 
 @pytest.mark.parametrize("event", ["skipped", "new", "deleted", "too large"])
-def test_what_an_event_may_hide_is_asked_for(event: str) -> None:
+def test_parameter_events_that_may_hide_a_change_cause_a_query(event: str) -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
@@ -336,7 +336,7 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
     run(test)
 
 
-def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_it(
+def test_node_that_has_just_responded_is_not_queried_again_at_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A program that read again and again had the node asked hundreds of times a second."""
@@ -406,7 +406,7 @@ def test_node_without_the_parameter_is_queried_ever_more_rarely(
     run(test)
 
 
-def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> None:
+def test_undeclared_parameter_does_not_affect_the_others() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.answer(1, DESCRIBE, descriptors=[])
@@ -433,7 +433,7 @@ def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> Non
         (descriptor("speed", DOUBLE, read_only=True), value(DOUBLE, 1), "live", ("read_only",)),
     ],
 )
-def test_what_a_node_says_locks_or_not(
+def test_parameters_state_decides_the_lock(
     described: dict[str, Any], held: dict[str, Any], state: str, reason: tuple[str, ...]
 ) -> None:
     async def test(bench: Bench) -> None:
@@ -554,7 +554,7 @@ def test_a_value_of_another_type_is_refused(entered: Any, kind: str) -> None:
         ({"unit": "m"}, Range(), "a number", [1e300], []),
     ],
 )
-def test_a_panel_narrows_what_the_node_describes(
+def test_panel_narrows_the_limits_of_the_node(
     own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
 ) -> None:
     speed, known = widget(**own), ParameterState("live", range=theirs)

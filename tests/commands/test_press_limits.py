@@ -87,7 +87,7 @@ def test_a_flood_reaches_the_robot_at_the_rate_of_a_client(
     assert mine.process.text.count("press ") <= came[200] + 2
 
 
-def test_what_is_too_many_gets_429_and_may_come_later_by_the_same_id(strict: Server) -> None:
+def test_press_over_the_rate_limit_gets_429_and_may_be_repeated_with_its_id(strict: Server) -> None:
     answer = used_up(strict)
     assert answer.headers["retry-after"] == "1"
     assert (answer.json()["outcome"], answer.json()["widget"]) == ("refused", "free")
@@ -97,7 +97,9 @@ def test_what_is_too_many_gets_429_and_may_come_later_by_the_same_id(strict: Ser
     assert strict.process.count(f"press {press_id} of") == 1
 
 
-def test_what_is_no_press_is_none_too_many(tmp_path: Path, servers: Callable[[Server], Server]) -> None:
+def test_invalid_requests_do_not_count_as_presses(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
     mine = servers(serving(tmp_path, app="tests.support.apps.strict:app"))
     for _ in range(2 * PRESSES):
         assert mine.http.post("/widgets/nothing", json={"inputs": {}}).status_code == 404

@@ -52,7 +52,7 @@ def open_presses_in(folder: Path, robot: str = "", since: int = 0) -> list[OpenP
     return open_presses(folder, robot, ["count"], since)
 
 
-def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
+def test_log_lists_presses_without_a_final_entry(tmp_path: Path) -> None:
     async def test() -> None:
         log = await opened(tmp_path)
         await pressed(log, "done", "accepted", "succeeded")
@@ -167,7 +167,9 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
     run(tmp_path, test, "accepted")
 
 
-def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goal_is_queried_until_its_result_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("app.commands.actions.results.ASK_AGAIN_S", 0)
 
     async def test(rig: Rig, entry: Entry) -> None:
@@ -184,7 +186,7 @@ def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.M
     run(tmp_path, test, "accepted")
 
 
-def test_it_is_asked_for_and_can_be_canceled_only_when_its_server_is_offered(tmp_path: Path) -> None:
+def test_goal_is_queried_and_canceled_only_while_its_server_is_offered(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
         rig.bench.robot.graph.apply_token(token, False)
@@ -212,7 +214,7 @@ def test_cut_connection_leaves_the_goal_in_doubt(tmp_path: Path) -> None:
     run(tmp_path, test, "accepted")
 
 
-def test_its_feedback_says_that_it_is_under_way(tmp_path: Path) -> None:
+def test_feedback_shows_that_a_goal_is_running(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         goal = {"uuid": goal_id(entry.hash).bytes}
@@ -232,7 +234,7 @@ def test_its_feedback_says_that_it_is_under_way(tmp_path: Path) -> None:
     ("before", "words"),
     [(["accepted"], "no longer knows this goal"), ([], "does not know this goal")],
 )
-def test_what_the_robot_does_not_know_opens_and_is_logged(
+def test_goal_unknown_to_the_robot_unlocks_and_is_logged(
     tmp_path: Path, before: list[str], words: str
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
@@ -251,7 +253,7 @@ def test_what_the_robot_does_not_know_opens_and_is_logged(
     run(tmp_path, test, *before)
 
 
-def test_an_end_in_the_meantime_has_no_time_of_its_own(tmp_path: Path) -> None:
+def test_goal_that_ended_in_the_meantime_has_no_end_time(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         await rig.answer(status=5)
@@ -260,7 +262,7 @@ def test_an_end_in_the_meantime_has_no_time_of_its_own(tmp_path: Path) -> None:
     run(tmp_path, test, "accepted")
 
 
-def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> None:
+def test_goal_without_any_response_locks_for_a_limited_time(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         assert rig.bench.line.timeouts == [LATE_S]
@@ -283,7 +285,7 @@ def test_cancel_finds_a_running_goal(tmp_path: Path) -> None:
     run(tmp_path, test, "accepted")
 
 
-def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Path) -> None:
+def test_cancel_of_an_unknown_goal_queries_the_goal_again(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         assert await canceled(rig, 2) == "rejected"
@@ -334,7 +336,7 @@ def test_no_more_are_asked_for_than_may_be_sent_and_the_newest_is_shown(tmp_path
     run(tmp_path, test, "accepted")
 
 
-def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
+def test_goals_of_another_robot_or_older_than_a_day_are_not_followed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
@@ -361,7 +363,7 @@ def unreadable(rig: Rig, monkeypatch: pytest.MonkeyPatch, *, unneeded: bool) -> 
 
 
 @pytest.mark.parametrize("needed", [True, False])
-def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
+def test_unreadable_log_is_reported_as_unknown_goals(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, needed: bool
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
@@ -377,7 +379,7 @@ def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
     run(tmp_path, test, "accepted")
 
 
-def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
+def test_results_during_an_unreadable_log_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
@@ -391,7 +393,7 @@ def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
     run(tmp_path, test)
 
 
-def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
+def test_goals_sent_during_an_unreadable_log_stay_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:

@@ -137,7 +137,7 @@ def test_a_press_that_was_cut_off_is_unknown_and_not_sent_again(
     assert (len(robot.requests("/slow")), len(robot.requests("/set_enabled"))) == (1, 1)
 
 
-def test_what_is_known_later_is_in_the_receipt(start: Start, robot: CycloneRobot) -> None:
+def test_receipt_has_the_outcome_that_is_known_later(start: Start, robot: CycloneRobot) -> None:
     robot.fibonacci(step_s=30)
     kiosk = start()
     assert press(kiosk, "count", "goal-1").json()["outcome"] == "accepted"

@@ -82,7 +82,7 @@ class Desk:
         return [INTERFACES.decode(FLOAT, payload).data for _, payload in self.way.sent]
 
 
-def test_the_keys_have_the_values_next_to_the_reported_one() -> None:
+def test_step_buttons_have_the_values_next_to_the_reported_value() -> None:
     desk = Desk()
     desk.reports(40.0)
     view = desk.shown()
@@ -163,7 +163,7 @@ def test_the_value_stands_in_a_text_too_and_as_a_whole_number() -> None:
     assert INTERFACES.decode(text, payload).data == "speed=50"
 
 
-def test_a_step_has_faults_of_its_own(tmp_path: Any) -> None:
+def test_faults_of_a_step_are_reported(tmp_path: Any) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(
         'title = "T"\n[[page]]\nid = "p"\ntitle = "P"\n[[page.widget]]\nid = "speed"\nkind = "step"\n'

@@ -103,7 +103,7 @@ def test_the_sdist_is_unpacked_by_the_oldest_python_too(
         assert (tmp_path / name / "panel/pyproject.toml").is_file()
 
 
-def test_without_its_documentation_it_is_no_release(checkout: ModuleType, tmp_path: Path) -> None:
+def test_release_without_documentation_fails(checkout: ModuleType, tmp_path: Path) -> None:
     with pytest.raises(release.ReleaseError, match="`make docs` writes it"):
         checkout.pack_docs(tmp_path)
     checkout.SITE.mkdir(parents=True)

@@ -221,7 +221,7 @@ def instructions(name: str) -> list[str]:
     return re.findall(rf"^{name} +(.*)$", last, re.MULTILINE)
 
 
-def test_the_image_has_what_the_service_page_installs(wheel: Path) -> None:
+def test_image_installs_as_the_service_page_does(wheel: Path) -> None:
     installs = [
         command for command in of_pages(SERVICE) if "pip install" in command or " -m venv " in command
     ]
@@ -236,7 +236,7 @@ def test_the_image_has_what_the_service_page_installs(wheel: Path) -> None:
     assert [pattern for pattern in ignored if pattern[:1] != "#"] == ["*", f"!{lock}", f"!{built}"]
 
 
-def test_the_image_names_no_host_and_runs_as_a_user_of_its_own() -> None:
+def test_image_names_no_host_and_runs_as_its_own_user() -> None:
     images = re.findall(r"^FROM (\S+)", CONTAINERFILE, re.MULTILINE)
     images += [service["image"] for service in COMPOSE["services"].values()]
     assert [image for image in images if "." in image.split("/")[0] and "/" in image] == []
@@ -281,7 +281,7 @@ def test_the_image_starts_read_only_and_its_health_check_sees_it(container: Proc
     assert inside(check.replace(":8000/", ":8001/")) != 0  # where nothing serves
 
 
-def test_the_composition_gives_both_what_they_need_and_no_more() -> None:
+def test_composition_gives_each_service_minimal_access() -> None:
     services = COMPOSE["services"]
     assert set(services) == {"panel", "bridge"}
     for service in services.values():

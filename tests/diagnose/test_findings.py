@@ -33,7 +33,7 @@ def test_each_finding_is_named_in_a_test(code: str) -> None:
 
 
 @pytest.mark.parametrize("code", KINDS)
-def test_each_sentence_ends_as_one_and_says_what_to_do(code: str) -> None:
+def test_each_finding_is_a_full_sentence_with_a_remedy(code: str) -> None:
     kind = KINDS[code]
     assert re.search(r"[.?)}]$", kind.sentence)
     assert kind.do.endswith((".", "?"))
@@ -113,7 +113,7 @@ def test_a_fast_publisher_is_not_taken_for_copies(times: list[float], expected: 
     assert copies([sample(at) for at in times]) == expected
 
 
-def test_the_same_by_two_bridges_are_no_copies_of_one() -> None:
+def test_equal_samples_of_two_bridges_are_not_duplicates() -> None:
     both = [
         sample(at + late, source=source) for at in (0.0, 0.5) for late, source in ((0, "a"), (0, "b"))
     ]

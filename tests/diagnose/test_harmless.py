@@ -17,7 +17,7 @@ from tests.support.parts import ROOT
 OUT = f'"{LEFT_OUT}"'
 
 
-def test_a_panel_file_keeps_its_lines_and_what_it_is_about() -> None:
+def test_harmless_panel_file_keeps_its_lines_keys_and_names() -> None:
     text = (
         "# PIN 1234\n"
         'title = "Cell of Mr. Smith"\n'
@@ -42,7 +42,7 @@ def test_a_panel_file_keeps_its_lines_and_what_it_is_about() -> None:
     )
 
 
-def test_a_zenoh_file_keeps_addresses_without_what_follows_them() -> None:
+def test_harmless_zenoh_file_keeps_addresses_without_their_parameters() -> None:
     text = (
         "{ /* who: me */ mode: 'peer',"
         " connect: { endpoints: ['tls/[::1]:7447#password=x', 'x', ['y']] },\n"

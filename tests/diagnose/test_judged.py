@@ -239,7 +239,7 @@ def test_a_bridge_that_reaches_no_node(config: dict[str, Any], code: str, tmp_pa
         ({"deny": {"publishers": "^/.*/a.*b.*$|^/speed.*$"}}, False),
     ],
 )
-def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> None:
+def test_topics_that_a_bridge_denies_are_found(config: dict[str, Any], expected: bool) -> None:
     assert denies([Bridge(zid="b1", config=config)], "publishers", "/words") is expected
 
 

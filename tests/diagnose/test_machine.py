@@ -114,7 +114,7 @@ def test_a_full_disk(setup: Setup) -> None:
     assert full.details == {"free_mb": 20, "needed_mb": 562}  # the log's 512 and others
 
 
-def test_what_is_there_already_is_not_needed_again(setup: Setup) -> None:
+def test_size_of_the_existing_log_reduces_the_needed_disk_space(setup: Setup) -> None:
     setup.data.mkdir()
     with (setup.data / "operators-log.sqlite3").open("wb") as file:
         os.truncate(file.fileno(), 500 * MB)
@@ -189,7 +189,7 @@ def test_a_page_that_does_not_fit_the_screen(setup: Setup) -> None:
     assert codes(setup, text) == ["page_too_large"]
 
 
-def test_what_is_no_screen_is_passed_over(tmp_path: Path) -> None:
+def test_connectors_without_a_screen_are_ignored(tmp_path: Path) -> None:
     connect(tmp_path, edid(1280, 800, 282, 176), "card0-DP-1", "disconnected")
     connect(tmp_path, b"", "card0-HDMI-A-1")
     connect(tmp_path, b"\xff" * 128, "card1-DP-1")

@@ -8,7 +8,7 @@ from tests.support.parts import ROOT
 UNIT = ROOT / "deploy/zenoh-bridge-ros2dds.service"
 
 
-def test_systemd_finds_no_fault_in_it(tmp_path: Path) -> None:
+def test_systemd_accepts_the_bridges_unit(tmp_path: Path) -> None:
     text = UNIT.read_text()
     assert text.count("ExecStart=zenoh-bridge-ros2dds ") == 1
     copy = tmp_path / UNIT.name  # with a program that is there
@@ -17,7 +17,7 @@ def test_systemd_finds_no_fault_in_it(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_its_configuration_is_where_the_guide_puts_it() -> None:
+def test_bridge_units_configuration_is_where_the_guide_puts_it() -> None:
     guide = (ROOT / "docs/how-to/bridge.md").read_text()
     place = UNIT.read_text().partition(" -c ")[2].split()[0]
     assert f"cp bridge.json5 {place}" in guide

@@ -61,7 +61,7 @@ HOSTILE_TYPES = [
 @pytest.mark.parametrize("role", ["MP", "MS"])
 @pytest.mark.parametrize("key", ["chatter", "robot1/arm/_state", "A/b_C3"])
 @pytest.mark.parametrize("latched", [True, False])
-def test_a_token_shows_what_it_was_made_from(role: TopicRole, key: str, latched: bool) -> None:
+def test_token_parses_to_its_parts(role: TopicRole, key: str, latched: bool) -> None:
     made = token("b1", role, key, BOOL, Qos(transient_local=latched), HASH)
     endpoint = parsed(made)
     assert endpoint is not None
@@ -135,7 +135,7 @@ def test_a_bridges_own_token_shows_the_bridge() -> None:
         "x/@/b1/@ros2_lv",
     ],
 )
-def test_what_is_no_topics_token_shows_nothing(key: str) -> None:
+def test_key_that_is_not_a_topics_token_parses_to_nothing(key: str) -> None:
     assert parsed(key) is None
 
 
@@ -204,7 +204,7 @@ def test_a_route_of_the_admin_space_is_read(direction: str) -> None:
     "key",
     ["@/b1/ros2/route/service/srv/add", "@/b1/ros2/route/topic/pub/", "@/b1/ros2/version", ""],
 )
-def test_what_is_no_topics_route_is_none(key: str) -> None:
+def test_key_that_is_not_a_topics_route_is_no_route(key: str) -> None:
     assert bridge_dialect.route_of(key) is None
 
 

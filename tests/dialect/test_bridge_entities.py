@@ -36,7 +36,7 @@ def test_qos_and_type_of_a_dds_writer() -> None:
 
 
 @pytest.mark.parametrize(("role", "reliable"), [("writer", True), ("reader", False)])
-def test_what_is_left_out_is_the_default_of_dds(role: str, reliable: bool) -> None:
+def test_omitted_qos_is_the_default_of_dds(role: str, reliable: bool) -> None:
     entity = parsed(role=role)
     assert (entity.reliable, entity.transient_local, entity.depth) == (reliable, False, None)
     assert parsed(participant=CYCLONE).depth == 1

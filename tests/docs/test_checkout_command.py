@@ -34,7 +34,7 @@ def run(command: str, folder: Path, **env: str) -> subprocess.CompletedProcess[s
     )
 
 
-def test_it_runs_in_any_folder_with_any_modules_around(checkout: Path, tmp_path: Path) -> None:
+def test_checkout_command_runs_in_any_folder(checkout: Path, tmp_path: Path) -> None:
     for folder in ("here", "path"):
         (tmp_path / folder / "app").mkdir(parents=True)
         (tmp_path / folder / "app/__init__.py").write_text("raise SystemExit('another app')\n")
@@ -61,7 +61,7 @@ def test_a_wheel_is_built_with_the_locked_packages_of_a_build_alone(tmp_path: Pa
     assert "tests/requirements.lock" not in done.stdout
 
 
-def test_the_first_run_says_what_takes_its_time() -> None:
+def test_first_run_says_why_it_takes_time() -> None:
     """Each step that takes seconds is named before it begins."""
     command = ["make", "--dry-run", "--assume-new=deploy/requirements.lock", "run"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

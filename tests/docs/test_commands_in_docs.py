@@ -75,7 +75,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
     mine.shell.close()
 
 
-def test_each_command_is_run_by_a_test_or_it_is_said_why_not() -> None:
+def test_each_documented_command_has_a_test_or_a_reason() -> None:
     missing = [
         f"{command.place}: {command.command}" for command in shown() if row_of(command.command) is None
     ]
@@ -90,7 +90,7 @@ def test_each_row_is_of_a_command_that_a_page_shows() -> None:
 @pytest.mark.parametrize(
     "row", [row for row in rows() if row.kind != "run"], ids=lambda row: row.command
 )
-def test_what_is_not_run_here_has_its_reason_or_its_test(row: Row) -> None:
+def test_command_that_is_not_run_here_has_a_reason_or_a_test(row: Row) -> None:
     if row.kind == "not_run":
         assert len(row.text("why").split()) > 2
     else:
@@ -99,7 +99,7 @@ def test_what_is_not_run_here_has_its_reason_or_its_test(row: Row) -> None:
 
 
 @pytest.mark.parametrize(("row", "command"), runs(), ids=lambda value: getattr(value, "place", ""))
-def test_it_does_what_its_page_says(machine: Machine, row: Row, command: Shown) -> None:
+def test_documented_command_works_as_its_page_says(machine: Machine, row: Row, command: Shown) -> None:
     if name := runs_beside(command.command):
         machine.beside(name)
         assert machine.running is not None

@@ -234,7 +234,7 @@ def test_every_variable_is_a_setting() -> None:
     assert named <= set(VARIABLES)
 
 
-def test_every_target_of_make_is_one() -> None:
+def test_every_make_target_in_docs_exists() -> None:
     makefile = (ROOT / "Makefile").read_text()
     named = set(re.findall(r"\bmake ([a-z][a-z-]*)", "\n".join(blocks_of_sh())))
     assert "bench" in named

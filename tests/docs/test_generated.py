@@ -68,7 +68,7 @@ def test_a_key_without_a_description_is_named() -> None:
         schema.about("panel", "shade")
 
 
-def test_nothing_is_described_that_is_no_key() -> None:
+def test_every_described_key_exists() -> None:
     known = {f"{table}.{key}" for table, key in keys()}
     any_table = {key for _, key in keys()}
     for table, described in schema.WORDS.items():
@@ -141,7 +141,7 @@ def test_advice_is_for_sentences_that_are_there() -> None:
     assert advised.isdisjoint(plain)
 
 
-def test_what_the_code_locks_by_has_advice() -> None:
+def test_every_lock_code_has_advice() -> None:
     source = "".join(path.read_text() for path in places.modules())
     codes = set(re.findall(r'\b(?:locked\(|Verdict\(False, )"(\w+)"', source)) & set(SENTENCES)
     assert {"link_connecting", "interlock_not_permitted", "press_in_progress"} <= codes
@@ -204,7 +204,7 @@ def test_each_path_of_http_is_in_its_reference() -> None:
             assert written.replace("{act}", "take") in page, route
 
 
-def test_what_faults_measured_is_written_to_its_page(tmp_path: Path) -> None:
+def test_measured_fault_times_are_written_to_their_page(tmp_path: Path) -> None:
     page = tmp_path / "reliability.md"
     page.write_text((ROOT / "docs/reliability.md").read_text())
     results.write("| what breaks |", page)

@@ -86,13 +86,13 @@ def test_the_lines_to_change_are_in_the_shipped_files() -> None:
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/how-to/bridge.md", "docs/compatibility.md"])
-def test_the_version_of_the_bridge_is_the_tested_one(name: str) -> None:
+def test_documented_bridge_version_is_the_tested_version(name: str) -> None:
     cargo = (ROOT / "tests/bridge_crate/Cargo.toml").read_text()
     (version,) = re.findall(r'zenoh-plugin-ros2dds = \{ version = "=([\d.]+)"', cargo)
     assert version in (ROOT / name).read_text()
 
 
-def test_what_the_service_page_says_of_the_unit_is_in_it() -> None:
+def test_settings_that_the_service_page_names_are_in_the_unit() -> None:
     page = (DOCS / "how-to/service.md").read_text()
     unit = (ROOT / "deploy/operator-panel.service").read_text().splitlines()
     said = re.findall(r"`([A-Z]\w+=\S+?)`", page)

@@ -27,7 +27,7 @@ def test_each_link_leads_to_a_page_of_the_documentation_or_to_a_file(name: str) 
     assert [link for link in links(name) - known if not (ROOT / link).is_file()] == []
 
 
-def test_its_panel_is_good_as_it_is(tmp_path: Path) -> None:
+def test_panel_of_the_readme_is_valid(tmp_path: Path) -> None:
     (example,) = re.findall(r"^```toml\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
     path = tmp_path / "cell1.toml"
     path.write_text(example)
@@ -35,11 +35,11 @@ def test_its_panel_is_good_as_it_is(tmp_path: Path) -> None:
     assert (panel.mode, [widget.id for widget in panel.widgets()]) == ("live", ["start"])
 
 
-def test_it_stays_short() -> None:
+def test_readme_stays_short() -> None:
     assert len(TEXT.splitlines()) <= 150
 
 
-def test_each_make_target_that_it_names_is_one() -> None:
+def test_each_make_target_in_the_readme_exists() -> None:
     makefile = (ROOT / "Makefile").read_text()
     targets = set(re.findall(r"\bmake ([a-z]+)", TEXT))
     assert {"run", "test"} <= targets

@@ -30,7 +30,7 @@ def test_a_quoted_sentence_is_one_of_the_screen(quote: str) -> None:
     assert quote in shown()
 
 
-def test_troubleshooting_quotes_what_locks_a_button() -> None:
+def test_troubleshooting_quotes_the_sentences_of_locks() -> None:
     section = PAGE.split("## One button is locked\n")[1].split("\n## ")[0]
     rows = [line for line in section.splitlines() if line.startswith("| ")][2:]
     assert len(rows) > 15

@@ -47,7 +47,7 @@ def checked(folder: Path) -> subprocess.CompletedProcess[str]:
     return command.run(*shlex.split(CHECK)[2:], folder=folder, env={})
 
 
-def test_each_command_is_one_that_these_tests_know() -> None:
+def test_each_command_of_the_tutorial_is_tested() -> None:
     assert [
         command for command in COMMANDS if command not in RUN and not command.startswith(PLAYED)
     ] == []
@@ -65,7 +65,7 @@ def test_the_panel_is_good_after_each_step(tmp_path: Path, text: str) -> None:
     assert load_panel(path).title == "My cell"
 
 
-def test_the_check_prints_what_the_tutorial_shows(tmp_path: Path) -> None:
+def test_check_prints_the_output_in_the_tutorial(tmp_path: Path) -> None:
     (tmp_path / "cell1.toml").write_text(STEPS[0])
     good = checked(tmp_path)
     assert (good.returncode, good.stderr) == (0, "")

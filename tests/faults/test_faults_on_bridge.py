@@ -130,7 +130,7 @@ def test_a_frozen_bridge_locks_within_a_second_and_opens_when_it_thaws(
     opened(kiosk)
 
 
-def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
+def test_change_during_a_frozen_bridge_counts_after_it(
     own_bridge: Bridge, own_node: RosNode, kiosk: Server
 ) -> None:
     own_bridge.freeze()
@@ -151,7 +151,7 @@ def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
                 break
 
 
-def test_it_starts_without_a_bridge_and_keeps_trying(
+def test_server_starts_without_a_bridge_and_keeps_connecting(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     late = Bridge(domain + 3)
@@ -196,7 +196,7 @@ def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
 
 
-def test_what_the_robot_says_counts_after_each_of_many_freezes(
+def test_messages_count_after_each_of_many_freezes(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     """A session that Zenoh resumed by itself received nothing here after some freezes."""
@@ -233,7 +233,7 @@ def test_new_publisher_of_a_required_topic_must_publish_again(
     assert not permitted(kiosk)
 
 
-def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
+def test_publisher_replaced_during_a_stall_must_publish_again(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
@@ -262,7 +262,7 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
 
 
 @pytest.mark.parametrize("waiting", [12, 60])
-def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_that_waits(
+def test_false_during_a_stall_locks_though_many_samples_wait_before_it(
     own_bridge: Bridge,
     own_node: RosNode,
     tmp_path: Path,
@@ -299,7 +299,7 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
     until(says_so, "permitted again", every_s=0.2)
 
 
-def test_an_old_latched_value_is_no_fresh_one(
+def test_old_latched_value_does_not_count_as_fresh(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     speaking(own_node)

@@ -76,7 +76,7 @@ def test_a_sentence_is_filled_in() -> None:
     assert render(say("interlock_waiting", topic="/estop")) == "Locked: waiting for /estop."
 
 
-def test_braces_in_what_is_filled_in_are_only_text() -> None:
+def test_braces_in_parameters_are_text() -> None:
     assert render(say("refused", why="{topic}", time="now")) == "Not sent at now: {topic}"
 
 
@@ -102,7 +102,7 @@ def test_a_text_in_a_text_is_rendered_with_it() -> None:
     )
 
 
-def test_texts_that_follow_one_another_are_one() -> None:
+def test_consecutive_texts_are_joined() -> None:
     first, last = say("ready"), say("stopping")
     both = joined([first, "", last])
     assert isinstance(both, Text)
@@ -186,7 +186,7 @@ def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     assert fault.startswith("de.po: ")
 
 
-def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: Path) -> None:
+def test_missing_sentence_of_a_language_is_in_english(tmp_path: Path) -> None:
     shipped = list(files())
     own = {"interlock_waiting": "Gesperrt: warte auf {topic}.", "between_names": "{first} / {last}"}
     catalogue(tmp_path, "qps", own)
@@ -201,7 +201,7 @@ def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: 
     assert list(files()) == shipped
 
 
-def test_a_catalogue_of_one_more_folder_counts_before_the_shipped_one(tmp_path: Path) -> None:
+def test_catalogue_of_a_further_folder_overrides_the_shipped_catalogue(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "~"):  # neither by the order of their names
         folder.mkdir(exist_ok=True)
         catalogue(folder, "de", {"stopping": str(folder)})

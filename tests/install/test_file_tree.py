@@ -86,7 +86,7 @@ def test_the_links_of_a_machine_begin_at_its_root(root: Path, target: str) -> No
 
 @pytest.mark.parametrize("target", LINKS)
 @pytest.mark.parametrize("planted", ["etc", "etc/panel.toml", "etc/.panel.toml.new"])
-def test_nothing_is_written_out_of_a_machine(
+def test_writing_never_leaves_the_root_folder(
     root: Path, outside: Path, planted: str, target: str
 ) -> None:
     leads = target.format(outside=outside)
@@ -98,7 +98,7 @@ def test_nothing_is_written_out_of_a_machine(
     assert FileTree(root).read("/etc/panel.toml") == b"mine"
 
 
-def test_nothing_is_removed_out_of_a_machine(root: Path, outside: Path) -> None:
+def test_removal_never_leaves_the_root_folder(root: Path, outside: Path) -> None:
     (root / "opt").symlink_to(outside.parent)
     (root / "other").symlink_to(outside)
     assert not FileTree(root).remove_tree("/opt/outside")

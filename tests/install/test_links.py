@@ -141,7 +141,7 @@ def test_no_file_of_the_installation_is_replaced(host: Host, mine: Path, name: s
         install(host, mine)
 
 
-def test_what_is_installed_can_be_read_by_the_servers_user(
+def test_installed_files_are_readable_by_the_servers_user(
     host: Host, mine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also from a shell of root's that keeps its files for itself."""

@@ -100,7 +100,7 @@ def test_files_are_written_once_and_taken_back_but_the_users_stay(host: Host, tm
     assert f"kept {PANEL}" in said
 
 
-def test_a_panel_of_the_users_is_kept_by_the_next_run_and_replaced_by_a_new_one(
+def test_users_panel_is_kept_by_the_next_run_and_replaced_by_a_new_panel(
     host: Host, tmp_path: Path
 ) -> None:
     wheel = make_wheel(tmp_path)
@@ -115,7 +115,7 @@ def test_a_panel_of_the_users_is_kept_by_the_next_run_and_replaced_by_a_new_one(
     assert path_on(host, f"{PANEL}.before").read_text() == "# first\n"
 
 
-def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: Path) -> None:
+def test_files_that_the_panel_names_are_installed_with_the_panel(host: Host, tmp_path: Path) -> None:
     package = tmp_path / "install/cell_msgs/share/cell_msgs"
     files = {
         "install/cell_msgs/share/cell_msgs/msg/Jog.msg": "float64 speed\n",
@@ -154,7 +154,7 @@ def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: P
         ('interfaces = ["msgs"]', r'cell1\.toml names "msgs", and .*/msgs is not there'),
     ],
 )
-def test_what_can_not_go_with_the_panel_is_named_before_anything_is_changed(
+def test_file_that_cannot_be_installed_is_named_before_any_change(
     host: Host, tmp_path: Path, line: str, said: str
 ) -> None:
     mine = tmp_path / "cell1.toml"
@@ -216,7 +216,7 @@ def test_the_rule_of_a_touch_screen_is_one_for_udev() -> None:
 
 
 @pytest.mark.parametrize("option", ["panel", "zenoh"])
-def test_a_file_of_the_users_is_never_the_shipped_one(host: Host, tmp_path: Path, option: str) -> None:
+def test_users_file_never_counts_as_the_shipped_file(host: Host, tmp_path: Path, option: str) -> None:
     mine = tmp_path / "mine"
     mine.write_bytes(b"")
     wheel = make_wheel(tmp_path)

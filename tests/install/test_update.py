@@ -117,9 +117,7 @@ def test_a_release_that_comes_up_stays(tmp_path: Path) -> None:
         ("/readyz", "/readyz is not 200 as it was before"),
     ],
 )
-def test_what_does_not_come_up_is_replaced_by_the_release_before(
-    tmp_path: Path, missing: str, why: str
-) -> None:
+def test_release_that_does_not_start_is_rolled_back(tmp_path: Path, missing: str, why: str) -> None:
     machine = Machine(tmp_path, {path: page for path, page in UP.items() if path != missing})
     with pytest.raises(StepFailed, match=why) as raised:
         machine.update()
@@ -144,7 +142,7 @@ def test_a_robot_that_was_off_before_may_be_off_after(tmp_path: Path) -> None:
     assert machine.runs == machine.second
 
 
-def test_it_goes_back_by_hand(tmp_path: Path) -> None:
+def test_rollback_by_command_starts_the_previous_release(tmp_path: Path) -> None:
     machine = Machine(tmp_path, UP)
     machine.update()
     machine.update(back=True)

@@ -113,7 +113,7 @@ def types_of(package: str) -> list[str]:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_ros_reads_and_writes_what_the_codec_does(ros: RosCodec, package: str) -> None:
+def test_codec_and_ros_read_and_write_the_same_bytes(ros: RosCodec, package: str) -> None:
     for type_name in types_of(package):
         samples = Samples(OF_ROBOT.structures, seed=sum(type_name.encode()))
         for edge in EDGES:
@@ -143,7 +143,7 @@ def test_ros_reads_and_writes_long_lists_and_texts_too(
     assert same(to_plain(OF_ROBOT.decode(name, theirs)), plain({**fields, **long}))
 
 
-def test_what_is_built_in_is_what_the_robot_has() -> None:
+def test_built_in_definitions_equal_the_robots() -> None:
     both = BUILT_IN.structures.keys() & set(TYPES)
     assert len(both) > 150
     for type_name in both:

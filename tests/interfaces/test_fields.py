@@ -150,7 +150,7 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list) else to_plain(value)
 
 
-def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
+def test_field_read_at_its_place_equals_the_sent_field(cell: Interfaces) -> None:
     counts = {"key": 0, "beside": 0, "index": 0, "unknown": 0}
     for seed in range(several(250, 600)):
         walker = Walker(cell, seed)
@@ -179,7 +179,7 @@ def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> 
             assert plain(read.get(field)) == plain(value), (name, field)
 
 
-def test_nothing_is_wanted_of_a_message_that_is_judged_all_the_same(cell: Interfaces) -> None:
+def test_reader_without_fields_still_validates_the_message(cell: Interfaces) -> None:
     for seed, name in list(enumerate(cell.structures))[:: several(2, 1)]:
         whole = cell.encode(name, Samples(cell.structures, seed).fields(name))
         reader = cell.field_reader(name, ())

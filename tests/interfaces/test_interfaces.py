@@ -125,7 +125,7 @@ def test_a_big_endian_message_is_read() -> None:
     assert INTERFACES.decode("std_msgs/msg/Int32", b"\0\0\0\0\0\0\1\0").data == 256
 
 
-def test_the_type_hash_is_the_one_that_ros_computes() -> None:
+def test_type_hash_equals_that_of_ros() -> None:
     assert INTERFACES.type_hash(TEXT) == (
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )
@@ -253,7 +253,7 @@ def test_a_fault_names_its_place_in_the_message(
         (SOLID, {}, {"type": 0, "dimensions": [], "polygon": {"points": []}}),
     ],
 )  # fmt: skip
-def test_what_a_message_leaves_out_has_its_default_or_is_zero(
+def test_omitted_field_has_its_default_or_is_zero(
     type_name: str, fields: Mapping[str, Any], whole: Mapping[str, Any]
 ) -> None:
     assert INTERFACES.encode(type_name, fields) == INTERFACES.encode(type_name, whole)

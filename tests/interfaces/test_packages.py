@@ -147,13 +147,13 @@ def test_an_interface_may_be_in_any_folder_of_its_package(make: Make, file: str,
     assert [path for path in package_files(folder) if path.suffix == ".srv"] == [folder / file]
 
 
-def test_of_two_files_of_a_type_the_one_in_the_usual_folder_counts(make: Make) -> None:
+def test_file_in_the_usual_folder_overrides_another_of_its_type(make: Make) -> None:
     files = {"cell_msgs/msg/A.msg": "int8 a", "cell_msgs/test/A.msg": "int8 b"}
     folder = make(files | {"cell_msgs/package.xml": PACKAGE_XML, "other/test/A.msg": "int8 c"})
     assert Interfaces("jazzy", [folder]).field_type("cell_msgs/msg/A", "a") == "int8"
 
 
-def test_a_file_that_is_in_no_package_is_named_with_what_helps(make: Make) -> None:
+def test_file_outside_a_package_is_named_with_the_remedy(make: Make) -> None:
     folder = make({"cell_msgs/arm/Move.srv": "---\n", "cell_msgs/modes/msg/A.msg": "", **CELL})
     cell = Interfaces("jazzy", [folder])
     for ask, name, file in (
@@ -173,7 +173,7 @@ def test_packages_may_need_each_other_in_any_order(make: Make) -> None:
     assert [element.c for element in decoded.b.c] == ["ä🤖", ""]
 
 
-def test_what_the_robot_has_goes_before_what_is_built_in(make: Make) -> None:
+def test_definition_from_files_overrides_the_built_in(make: Make) -> None:
     folder = make({"std_msgs/msg/Bool.msg": "bool data\nbool sure"})
     assert Interfaces("jazzy", [folder]).field_type("std_msgs/msg/Bool", "sure") == "bool"
     assert load_interfaces("jazzy").encode("std_msgs/msg/Bool", {"data": True}) == b"\0\1\0\0\1"
@@ -268,7 +268,7 @@ def test_files_that_do_not_fit_together_are_named(
     assert load_interfaces("jazzy").structures.items() <= every.structures.items()
 
 
-def test_only_what_needs_a_file_with_a_fault_is_left_out_too(make: Make) -> None:
+def test_interfaces_that_need_a_faulty_file_are_left_out(make: Make) -> None:
     files = {
         **CELL,
         "cell_msgs/msg/Wear.msg": "int33 since",  # Tool needs it, and whatever needs that
@@ -315,7 +315,7 @@ def test_a_folder_without_interfaces_is_refused(tmp_path: Path) -> None:
         Interfaces("jazzy", [tmp_path])
 
 
-def test_an_interface_that_is_there_as_idl_only_is_named_with_what_would_be_right(make: Make) -> None:
+def test_interface_with_only_an_idl_file_is_named_with_the_remedy(make: Make) -> None:
     folder = make(
         {
             "cell_msgs/msg/Lamp.msg": "bool on",
@@ -341,7 +341,7 @@ def test_an_interface_that_is_there_as_idl_only_is_named_with_what_would_be_righ
         assert str(caught.value) == f"{why} beside it"
 
 
-def test_what_needs_an_interface_that_is_there_as_idl_only_is_named(make: Make) -> None:
+def test_interface_that_needs_an_idl_only_interface_is_named(make: Make) -> None:
     folder = make({"a/msg/A.msg": "b/B b", "b/msg/B.idl": "module b {};"})
     with pytest.raises(InterfaceError) as caught:
         Interfaces("jazzy", [folder]).require("a/msg/A")
@@ -351,7 +351,7 @@ def test_what_needs_an_interface_that_is_there_as_idl_only_is_named(make: Make) 
     assert str(caught.value).endswith("b/msg/B.idl is not read, as no .idl is: put B.msg beside it")
 
 
-def test_a_folder_with_idl_only_is_refused_with_what_would_be_right(make: Make) -> None:
+def test_folder_with_only_idl_files_is_refused_with_the_remedy(make: Make) -> None:
     folder = make({"b/srv/B.idl": "module b {};"})
     with pytest.raises(InterfaceError, match=r"has no interfaces: .*B\.idl is not read.* put B\.srv"):
         Interfaces("jazzy", [folder])
@@ -387,7 +387,7 @@ def test_a_changed_file_is_read_again(make: Make) -> None:
 
 
 @pytest.mark.parametrize("distro", list(DISTROS))
-def test_what_robots_are_commanded_with_is_built_in(distro: str) -> None:
+def test_common_command_types_are_built_in(distro: str) -> None:
     here = load_interfaces(distro)
     for service in (
         "std_srvs/srv/SetBool",

@@ -339,7 +339,7 @@ def test_a_path_that_leads_nowhere_is_refused(cell: Interfaces, path: str, why: 
         cell.field_type(EVERYTHING, path)
 
 
-def test_a_message_that_was_cut_off_anywhere_is_not_one(cell: Interfaces) -> None:
+def test_truncated_message_is_refused(cell: Interfaces) -> None:
     whole = cell.encode(EVERYTHING, Samples(cell.structures, 3).fields(EVERYTHING))
     for length in range(len(whole) - 3):
         with pytest.raises(DecodeError):

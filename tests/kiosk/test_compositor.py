@@ -164,9 +164,7 @@ def test_no_key_leads_out_of_the_panel(screen: SwayScreen) -> None:
     assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE]
 
 
-def test_what_wakes_a_dark_screen_does_not_reach_the_panel(
-    sway: Callable[..., SwayScreen], tmp_path: Path
-) -> None:
+def test_waking_touch_does_not_reach_the_panel(sway: Callable[..., SwayScreen], tmp_path: Path) -> None:
     config = tmp_path / "kiosk.toml"
     config.write_text("off_after_s = 2\n")
     screen = sway(f"--config={config}")

@@ -29,7 +29,7 @@ def test_the_shipped_file_is_good_with_and_without_its_comments(tmp_path: Path) 
     }
 
 
-def test_what_is_given_goes_before_the_file(tmp_path: Path) -> None:
+def test_options_override_the_configuration_file(tmp_path: Path) -> None:
     path = tmp_path / "kiosk.toml"
     path.write_text("rotate = 90\noff_after_s = 60\n")
     config = read_config(path, rotate=180, browser=None)

@@ -71,7 +71,7 @@ def test_a_page_that_draws_nothing_is_restarted() -> None:
     assert (set(decided[:-1]), decided[-1]) == ({Action.NONE}, Action.RESTART)
 
 
-def test_one_look_that_draws_starts_the_time_anew() -> None:
+def test_one_drawn_frame_restarts_the_timer() -> None:
     judge = Judge()
     undrawn = PageStatus(on_panel=True, ours=True, age_s=0.2, drawn=False)
     looks = [undrawn] * 4 + [LIVE] + [undrawn] * 4
@@ -83,7 +83,7 @@ def test_a_locked_page_stays_while_the_server_is_gone() -> None:
     assert set(actions(SILENT, False, 600)) == {Action.NONE}
 
 
-def test_a_silent_page_is_opened_again_then_the_browser_is_restarted_ever_more_rarely() -> None:
+def test_silent_page_is_reopened_then_the_browser_is_restarted_at_growing_intervals() -> None:
     decided = actions(SILENT, True, 3600)
     acted = [at for at, action in enumerate(decided) if action is not Action.NONE]
     assert acted[0] == SILENT_AFTER_S

@@ -136,7 +136,7 @@ def break_and_press_on(server: Server, node: RosNode, screen: KioskScreen, fault
     return took_s
 
 
-def test_it_waits_for_the_server_in_the_panels_languages(
+def test_kiosk_waits_for_the_server_with_a_page_in_the_panels_languages(
     screens: Callable[..., KioskScreen], servers: Callable[[Server], Server]
 ) -> None:
     port = free_port()

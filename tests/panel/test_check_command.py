@@ -109,7 +109,7 @@ def test_several_panels_are_checked_and_the_worst_one_is_the_status(
     assert main([str(SHIPPED), str(SHIPPED)]) == 0
 
 
-def test_it_says_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_prints_its_usage(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--help"])
     assert ended.value.code == 0

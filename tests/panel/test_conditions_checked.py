@@ -129,7 +129,7 @@ def test_constants_stand_for_their_values_and_are_shown_by_their_names(tmp_path:
         ("max = 1", unmet("2", "1 or less")),
     ],
 )
-def test_a_level_is_shown_by_its_name_where_the_file_names_one(
+def test_level_is_shown_by_its_constants_name(
     tmp_path: Path, condition: str, reason: tuple[str, ...]
 ) -> None:
     conditions = f'field = "level"\n{condition}'

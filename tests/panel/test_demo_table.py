@@ -158,7 +158,7 @@ def test_an_entry_of_a_widget_with_a_fault_is_no_second_fault(tmp_path: Path) ->
     assert fault.place == "page[0].widget[1].type"
 
 
-def test_a_place_with_quotes_has_the_line_of_what_is_around_it() -> None:
+def test_place_with_quotes_has_the_line_of_its_table() -> None:
     place = place_of(("demo", "/a", "ranges", "position[name='b.c']", 0))
     assert place == 'demo."/a".ranges."position[name=\'b.c\']"[0]'
     (located,) = add_locations([Fault(place, "wrong")], '[demo."/a"]\nhz = 1\n', {})

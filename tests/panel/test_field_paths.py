@@ -70,7 +70,7 @@ def test_a_path_is_read_as_it_is_written(path: str, steps: list[Any], outside: s
     ["a[b=]", "a[b=c d]", "a[b='c]", "a[b=c'd]", "a[=c]", "a[B=c]", "a[b=c].", ".a", "a..b", "a[b=c]d",
      "a[b = c]", "a[b==c]", "a[1", "a[b='c'd']", ""],
 )  # fmt: skip
-def test_what_is_written_otherwise_is_no_path(path: str) -> None:
+def test_malformed_path_is_refused(path: str) -> None:
     with pytest.raises(InterfaceError, match="is not a field: it must be like"):
         path_steps(path)
 
@@ -92,7 +92,7 @@ def test_what_is_written_otherwise_is_no_path(path: str) -> None:
         ("action_msgs/msg/GoalStatusArray", "status_list[status=STATUS_EXECUTING].goal_info", None),
     ],
 )
-def test_the_type_of_what_a_key_chooses(type_name: str, path: str, kind: str | None) -> None:
+def test_type_of_an_element_chosen_by_key(type_name: str, path: str, kind: str | None) -> None:
     assert JAZZY.field_type(type_name, path) == (kind or "action_msgs/msg/GoalInfo")
 
 

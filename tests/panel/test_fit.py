@@ -47,7 +47,7 @@ def test_only_pages_that_must_fit_are_judged_and_only_with_screens() -> None:
     assert not said(panel(["800x480"], {"widget": keys(20)}, fit=False))
 
 
-def test_a_page_with_a_template_of_its_own_is_left_to_a_look_in_a_browser() -> None:
+def test_page_with_its_own_template_is_not_judged_for_fit() -> None:
     crowded = panel(["800x480"], {"widget": keys(20)})
     own = crowded.pages[0].model_copy(update={"template": "plan.html"})
     theirs = crowded.model_copy(update={"pages": (own,)})

@@ -60,7 +60,7 @@ def test_a_hold_has_a_rate_and_its_topic_is_published(tmp_path: Path) -> None:
     assert panel.qos("/cmd_vel") == hold.qos
 
 
-def test_what_is_left_out_of_a_hold_is_zero(tmp_path: Path) -> None:
+def test_omitted_fields_of_a_hold_are_zero(tmp_path: Path) -> None:
     assert loaded(tmp_path, SPEED, {**JOG, "message": {"linear": {"x": "{speed}"}}, "release": {}})
     assert loaded(tmp_path, {**FLAGS, "message": {"x_offset": 1}, "release": {}})
 

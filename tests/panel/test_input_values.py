@@ -120,7 +120,7 @@ TAKES: Mapping[str, Mapping[str, Any]] = {
         (LIGHT, None, "input_not_a_boolean", "null"),
     ],
 )
-def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
+def test_invalid_input_is_refused_with_label_and_limits(
     table: Mapping[str, Any], entered: Any, code: str, shown: str | None
 ) -> None:
     with pytest.raises(InputError) as caught:
@@ -200,7 +200,7 @@ def test_a_value_within_a_billionth_of_a_step_is_on_it_and_is_sent_as_it_is() ->
             count.check_value(entered)
 
 
-def test_of_whole_numbers_none_counts_as_its_neighbour() -> None:
+def test_whole_numbers_are_compared_exactly() -> None:
     large = input_of(
         {"id": "n", "kind": "number", "label": "N", "min": 0, "max": 10**13, "step": 10**10}
     )

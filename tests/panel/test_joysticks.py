@@ -32,7 +32,7 @@ def test_a_twist_needs_no_message(tmp_path: Path, type_name: str) -> None:
     assert stop.get("twist", stop) == {"linear": {"x": 0.0}, "angular": {"z": 0.0}}
 
 
-def test_a_message_of_its_own_stops_with_zeros_or_with_its_release(tmp_path: Path) -> None:
+def test_joystick_with_its_own_message_stops_with_zeros_or_its_release(tmp_path: Path) -> None:
     (stick,) = loaded(tmp_path, STICK | POINT).widgets()
     assert isinstance(stick, Joystick)
     assert stick.stopping() == {"x": 0.0, "y": 0.0}
@@ -71,5 +71,5 @@ def test_an_input_may_not_have_an_axis_name(tmp_path: Path) -> None:
     assert "is the axis" in str(raised.value)
 
 
-def test_it_needs_an_interlock(tmp_path: Path) -> None:
+def test_joystick_needs_an_interlock(tmp_path: Path) -> None:
     assert fault(tmp_path, without(STICK, "interlock"))[0] == "interlock"

@@ -16,7 +16,7 @@ from tests.support.builders import FakeTransport, panel_of, robot_there, sending
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_kind_is_the_one_that_its_class_names(kind: str) -> None:
+def test_kind_has_the_name_in_its_class(kind: str) -> None:
     assert KINDS[kind].model.model_json_schema()["properties"]["kind"]["const"] == kind
 
 

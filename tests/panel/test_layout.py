@@ -184,7 +184,7 @@ def test_a_fault_is_named_with_its_place(
     assert words in reported[place]
 
 
-def test_an_icon_of_a_page_is_one_that_is_shipped(tmp_path: Path) -> None:
+def test_icon_of_a_page_must_be_shipped(tmp_path: Path) -> None:
     content = tables()
     content["page"][0]["icon"] = "factry"
     assert faults(tmp_path, content) == {
@@ -199,7 +199,7 @@ def test_three_keys_fill_the_frame(tmp_path: Path) -> None:
     assert place == "frame.widget"
 
 
-def test_what_is_wrong_in_a_group_and_in_the_frame_is_reported_together(tmp_path: Path) -> None:
+def test_faults_in_groups_and_in_the_frame_are_reported_together(tmp_path: Path) -> None:
     """The rest is checked beside stand-ins of what is no widget at all."""
     content = tables(
         {"columns": "three", "widget": [{**HEARD, "kind": "redout"}, {**FREE, "type": "x/msg/Y"}]},

@@ -233,7 +233,7 @@ def shows_at(number: int) -> set[int]:
 
 
 @pytest.mark.parametrize("numbers", apart(KEYS), ids=shown)
-def test_what_is_left_out_is_one_fault_at_most(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
+def test_omitted_line_is_at_most_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     left = list(numbers)
     for fault in faults_of(with_lines(dict.fromkeys(numbers, "#"))):
         line = next((n for n in left if in_words(fault).line in shows_at(n)), None)
@@ -269,7 +269,7 @@ def test_a_mistake_is_one_fault_in_words(faults_of: FaultsOf, mistake: Mapping[s
     assert fault.line == line, str(fault)
 
 
-def test_it_is_not_toml(faults_of: FaultsOf) -> None:
+def test_invalid_toml_is_one_fault_with_its_line(faults_of: FaultsOf) -> None:
     for old, new, further in (
         ('title = "Robot cell 1"', "title = Robot cell 1", 0),
         ('label = "Speed"', 'label = "Speed', 0),
@@ -299,7 +299,7 @@ DAMAGE: Final = st.one_of(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-def test_whatever_is_wrong_is_reported_in_words(
+def test_random_damage_is_reported_in_words(
     faults_of: FaultsOf, damages: list[tuple[Any, ...]]
 ) -> None:
     lines = list(LINES)

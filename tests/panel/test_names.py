@@ -71,7 +71,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "cell.toml"
 
 
-def test_a_name_may_be_outside_of_the_namespace_wherever_there_is_one(path: Path) -> None:
+def test_name_outside_the_namespace_is_allowed_in_every_place(path: Path) -> None:
     path.write_text(PANEL)
     load_panel(path)
 

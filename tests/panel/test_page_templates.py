@@ -167,7 +167,7 @@ def test_a_page_has_groups_or_a_template(write: Write) -> None:
     assert fault.message.startswith("a page with a template has no groups")
 
 
-def test_what_is_never_placed_is_a_note(write: Write) -> None:
+def test_widget_that_is_never_placed_is_a_note(write: Write) -> None:
     notes = check_panel(write('{{ widget("heard") }}')).notes
     assert [note.message for note in notes] == [
         'plan.html never places "speed": no one sees what is not placed'
@@ -211,7 +211,7 @@ def test_a_template_that_takes_too_much_is_stopped_and_named_with_its_line(
     assert re.search(TOO_MUCH, fault.message), fault.message
 
 
-def test_an_expression_without_a_line_of_its_own_is_stopped(write: Write) -> None:
+def test_endless_template_expression_is_stopped(write: Write) -> None:
     fault = the_fault(write(BOTH + "{% autoescape 9**(9**9) %}{% endautoescape %}"))
     assert fault.message == "plan.html: line 2: it takes more than 1 s in one expression"
 
@@ -219,7 +219,7 @@ def test_an_expression_without_a_line_of_its_own_is_stopped(write: Write) -> Non
 @pytest.mark.parametrize(
     "template", ['{{ widget("speed")|upper }}', '{% set w = widget("speed") %}{{ w }}{{ w }}']
 )
-def test_what_places_a_widget_is_placed_once_as_it_is(write: Write, template: str) -> None:
+def test_altered_widget_output_in_a_template_is_a_fault(write: Write, template: str) -> None:
     fault = the_fault(write(template))
     assert "what widget() and picture() give is placed once, as it is" in fault.message
 

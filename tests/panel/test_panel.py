@@ -122,7 +122,7 @@ def test_the_operators_log_is_kept_and_required_unless_the_file_says_otherwise(l
     assert load(tables(log={"required": False, "days": 30})).log.required is False
 
 
-def test_what_is_loaded_can_not_be_changed(load: Load) -> None:
+def test_loaded_panel_is_immutable(load: Load) -> None:
     panel = load(tables())
     with pytest.raises(ValidationError, match="frozen"):
         panel.title = "Other"
@@ -136,7 +136,7 @@ def test_a_namespace_is_written_one_way(load: Load, written: str, namespace: str
     assert load(tables(namespace=written)).namespace == namespace
 
 
-def test_what_the_panel_listens_to_and_publishes(load: Load) -> None:
+def test_panel_lists_its_subscriptions_and_publications(load: Load) -> None:
     panel = load(tables())
     assert panel.subscriptions() == {"/operation_enabled": "std_msgs/msg/Bool", "/heard": TEXT}
     assert panel.publications() == {"/free": TEXT, "/guarded": TEXT}
@@ -535,7 +535,7 @@ def test_a_faulty_input_makes_no_fault_where_it_is_used(load: Load) -> None:
     assert list(faults(load, tables(page=[page]))) == ["page[0].widget[0].max"]
 
 
-def test_an_input_of_another_page_is_no_input_of_this_one(load: Load) -> None:
+def test_input_of_another_page_is_unknown_here(load: Load) -> None:
     pages = [
         {"id": "one", "title": "One", "widget": [MESSAGE]},
         {"id": "two", "title": "Two", "widget": [FREE]},
@@ -752,7 +752,7 @@ def test_an_interface_file_that_the_panel_does_not_need_may_have_a_fault(
         ([PARAMETER], "rcl_interfaces/msg/ParameterEvent"),
     ],
 )
-def test_what_the_kiosk_itself_needs_must_be_usable(
+def test_types_that_the_server_needs_must_be_usable(
     load: Load, tmp_path: Path, widgets: list[Table], name: str
 ) -> None:
     interface(tmp_path)

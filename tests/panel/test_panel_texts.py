@@ -63,7 +63,7 @@ def test_every_text_is_found_with_its_place(tmp_path: Path) -> None:
     assert len(places) == TEXT.count("ja = ")
 
 
-def test_who_reads_none_of_the_languages_reads_the_panels_own(tmp_path: Path) -> None:
+def test_reader_of_another_language_gets_the_panels_language(tmp_path: Path) -> None:
     panel = load(tmp_path, 'mode = "demo"', 'mode = "demo"\nlanguage = "ja"')
     assert [render(panel.title, language) for language in ("fr", "en")] == ["セル1", "Cell 1"]
     assert str(panel.title) == "セル1"

@@ -82,7 +82,7 @@ def test_a_place_has_its_id_and_its_line(place: str, where: str) -> None:
     assert str(fault) == (f"{where}: is wrong" if where else "is wrong")
 
 
-def test_what_is_known_already_stays() -> None:
+def test_known_line_is_not_replaced() -> None:
     (note,) = add_locations([Note("page[0]", "is long", id="mine", line=7)], TEXT, TABLES)
     assert str(note) == 'note: page[0] "mine", line 7: is long'
 
@@ -99,7 +99,7 @@ def test_an_id_is_no_longer_than_an_id_may_be() -> None:
     assert id_at("interlock[0]", {"interlock": [{"id": "x" * 1000}]}) == "x" * 64
 
 
-def test_what_is_nested_too_deep_is_reported_without_lines() -> None:
+def test_too_deeply_nested_place_is_reported_without_lines() -> None:
     text = "a = " + "[" * 3000 + "]" * 3000
     (fault,) = add_locations([Fault("a", "is wrong")], text, {})
     assert fault.line == 0

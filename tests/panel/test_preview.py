@@ -29,7 +29,7 @@ COVARIANT = "geometry_msgs/msg/PoseWithCovariance"
         ({"a": "{"}, ['a: "{"']),
     ],
 )  # fmt: skip
-def test_a_message_is_written_as_ros_prints_one(fields: dict[str, Any], lines: list[str]) -> None:
+def test_message_is_written_as_ros_prints_messages(fields: dict[str, Any], lines: list[str]) -> None:
     assert list(message_lines(fields, {"n": "N", "m": "M", ".a.b": "inside"})) == lines
 
 

@@ -90,7 +90,7 @@ def test_a_list_can_not_stand_in_a_text() -> None:
     ("where", "value"),
     [("x", "{a}"), ("x.y", "{a}"), ("z[1].w", "{b}"), ("z[7]", [1, {"w": "{b}"}]), ("", None)],
 )
-def test_what_stands_at_a_field_is_found(where: str, value: Any) -> None:
+def test_value_at_a_field_of_a_template_is_found(where: str, value: Any) -> None:
     template = {"x": "{a}", "z": [1, {"w": "{b}"}]}
     assert value_at(template, where) == (template if value is None else value)
 

@@ -101,7 +101,7 @@ def test_a_field_counts_once_and_for_each_robot() -> None:
     assert taken(panel_of(TREND, robot=robots)) == 3 * taken(single)
 
 
-def test_the_check_says_what_a_trend_takes() -> None:
+def test_check_reports_the_memory_of_a_trend() -> None:
     pens = [{**PEN, "topic": f"/t{n}"} for n in range(4)]
     panel = panel_of({**TREND, "pen": pens, "disk": True})
     notes = [note.message for note in find_notes(panel, INTERFACES) if ".widget" in note.place]

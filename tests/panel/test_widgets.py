@@ -308,7 +308,7 @@ def test_a_topics_qos_is_found_by_its_name() -> None:
     assert panel.qos("/heard").wire_qos.transient_local
 
 
-def test_what_depends_on_a_reported_fault_is_not_judged() -> None:
+def test_faults_that_follow_from_a_reported_fault_are_not_reported() -> None:
     panel = panel_of(MESSAGE, std("Float64", "{message}"))
     assert list(find_faults(panel, INTERFACES, {"message"})) == []
     assert [type(f) for f in find_faults(panel, INTERFACES, {"other"})] == [Fault]
@@ -427,7 +427,7 @@ TIMES: Final = {
         ("float64", {"format": "time", "scale": 1e-9}, ""),
     ],
 )
-def test_a_time_has_formats_of_its_own(kind: str, more: dict[str, Any], key: str) -> None:
+def test_time_has_its_own_formats(kind: str, more: dict[str, Any], key: str) -> None:
     type_name, field = TIMES[kind]
     reported = faults({**HEARD, "type": type_name, "field": field, **more})
     assert [text.partition(": ")[0] for text in reported] == (

@@ -24,7 +24,7 @@ def test_a_token_is_random_and_long() -> None:
     assert all(TOKEN.fullmatch(token) for token in tokens)
 
 
-def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> None:
+def test_public_id_differs_from_the_token_and_is_stable() -> None:
     first = Clients().identify(token(1), "192.0.2.7")
     again = Clients().identify(token(1), "192.0.2.7")
     assert first.id == again.id == public_id(token(1))

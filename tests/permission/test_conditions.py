@@ -112,7 +112,7 @@ def test_without_comparisons_the_value_must_be_true(value: bool, shown: str) -> 
         ({"one_of": [1, 6, 7]}, "1 bar, 6 bar or 7 bar", True),
     ],
 )
-def test_each_comparison_says_what_the_value_must_be(
+def test_reason_of_each_comparison_names_the_required_value(
     robot: RobotState, keys: Table, wanted: str, met: bool
 ) -> None:
     assert texts(state_of(air(**{"min": None, **keys}), robot)) == ("6 bar", wanted, met)

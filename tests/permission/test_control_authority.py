@@ -103,7 +103,7 @@ def test_holder_of_control_may_press_and_others_see_the_holder(held: Room) -> No
         assert english(verdict.reason) == "Panel 1 (192.0.2.1) has control of Robot 1."
 
 
-def test_one_robot_without_a_name_is_the_robot() -> None:
+def test_unnamed_robot_is_called_the_robot() -> None:
     room = Room(robot="")
     room.control.take(CELL)
     assert (
@@ -160,7 +160,7 @@ def test_without_local_the_panel_at_the_cell_asks_like_others() -> None:
 # Asking.
 
 
-def test_what_is_free_is_not_asked_for_but_taken(room: Room) -> None:
+def test_free_control_is_taken_without_a_request(room: Room) -> None:
     assert room.control.ask(BOB) == ""
     assert room.control.holder == BOB
 
@@ -188,7 +188,7 @@ def test_requester_of_control_may_not_press(requested: Room) -> None:
     assert not requested.may(BOB)
 
 
-def test_one_asks_at_a_time(requested: Room) -> None:
+def test_only_one_client_requests_control_at_a_time(requested: Room) -> None:
     assert requested.control.ask(BOB) == ""
     assert requested.control.ask(CY) == "control_already_requested"
     assert requested.control.requester == BOB
@@ -366,7 +366,7 @@ def test_a_page_with_scripts_is_lost_as_fast_after_a_page_load(held: Room) -> No
 # The panel at the cell takes what is free with its first page.
 
 
-def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) -> None:
+def test_first_page_at_the_cell_takes_free_control(room: Room) -> None:
     room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert room.may(CELL)
     room.control.keepalive(CELL, False)
@@ -382,7 +382,7 @@ def test_no_other_page_takes_anything(room: Room, who: Principal, opened_by_pers
     assert room.control.holder is None
 
 
-def test_no_page_takes_what_another_has(held: Room) -> None:
+def test_page_load_never_takes_control_from_a_holder(held: Room) -> None:
     held.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
     assert held.control.holder == ANN
 
@@ -393,7 +393,7 @@ def test_no_page_takes_where_local_is_off() -> None:
     assert room.control.holder is None
 
 
-def test_what_was_given_up_is_taken_by_a_button_only(room: Room) -> None:
+def test_released_control_is_taken_by_the_button_only(room: Room) -> None:
     room.control.take(CELL)
     room.control.release(CELL)
     room.control.loaded(CELL, FORM_LIFE_S, opened_by_person=True)
@@ -413,7 +413,7 @@ def test_every_role_is_in_the_view(room: Room) -> None:
     assert [room.role(client) for client in everybody] == ["asked", "asking", "held", "over", "held"]
 
 
-def test_the_log_says_every_change_with_who_it_was(requested: Room) -> None:
+def test_each_change_of_control_is_logged_with_its_client(requested: Room) -> None:
     requested.control.give(ANN, BOB.client.id)
     requested.control.take(CELL)
     requested.now += LIFE_S
@@ -487,12 +487,12 @@ def panel_with(folder: Path, table: str) -> Panel:
     return load_panel(path)
 
 
-def test_it_is_off_where_a_panel_does_not_ask_for_it(tmp_path: Path) -> None:
+def test_control_is_off_by_default(tmp_path: Path) -> None:
     assert panel_with(tmp_path, "").control.required is False
     assert panel_with(tmp_path, "[control]\nrequired = false").control.required is False
 
 
-def test_one_line_requires_it(tmp_path: Path) -> None:
+def test_one_key_requires_control(tmp_path: Path) -> None:
     rules = panel_with(tmp_path, "[control]\nrequired = true").control
     assert (rules.required, rules.takeover_after_s, rules.local) == (True, 30.0, True)
 
@@ -513,7 +513,7 @@ def test_one_line_requires_it(tmp_path: Path) -> None:
         ("[control]\nrequired = true\nlocl = true", 'control.locl: unknown key; did you mean "local"?'),
     ],
 )
-def test_what_is_wrong_with_the_table_is_reported_with_all_else(
+def test_faults_of_the_control_table_are_reported_with_all_others(
     tmp_path: Path, table: str, fault: str
 ) -> None:
     with pytest.raises(PanelError) as caught:

@@ -120,7 +120,7 @@ def test_a_robot_that_says_true_permits(robot: RobotState) -> None:
     assert verdict_of(robot) == Verdict(True)
 
 
-def test_nothing_is_permitted_before_the_robot_said_so() -> None:
+def test_unknown_permission_locks() -> None:
     verdict = verdict_of(robot_there(small_panel()))
     assert verdict == locked("interlock_waiting", topic=ENABLED, wanted=BOOL)
 

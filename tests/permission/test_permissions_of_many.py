@@ -50,7 +50,7 @@ def buttons(count: int) -> list[dict[str, Any]]:
     control=some.sampled_from([PERMITTED, CONTROL]),
     later=some.sampled_from([0.0, 5.0]),
 )
-def test_each_verdict_and_what_is_shown_is_that_of_the_button_alone(
+def test_verdict_of_grouped_buttons_equals_the_verdict_of_each_alone(
     permitted: bool | None,
     wrong_type: set[int],
     ending: bool,

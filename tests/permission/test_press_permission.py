@@ -72,7 +72,7 @@ def test_the_first_that_locks_is_reported() -> None:
     assert permission(question(interlocks=[PERMITTED])) is PERMITTED
 
 
-def test_when_time_alone_would_change_it_is_the_soonest_of_all() -> None:
+def test_verdict_changes_at_the_soonest_deadline_of_all_interlocks() -> None:
     soon, later = Verdict(True, until=NOW + 1), Verdict(True, until=NOW + 2)
     assert permission(question(interlocks=[later, soon])).until == NOW + 1
     assert permission(question()).until == math.inf

@@ -81,7 +81,7 @@ def test_the_order_of_the_file_says_which_is_reported_first() -> None:
     assert verdict_of(robot, panel).reasons == [NO_DOORS, FORBIDS]
 
 
-def test_the_first_that_grows_old_ends_it() -> None:
+def test_first_stale_interlock_ends_the_permission() -> None:
     panel = cell()
     robot = robot_there(panel)
     robot.settled_at = NOW - 10
@@ -104,7 +104,7 @@ def test_without_a_way_that_is_the_only_reason() -> None:
     assert verdict_of(robot, panel).reasons == [say("link_unreachable")]
 
 
-def test_what_is_against_the_command_itself_is_reported_first() -> None:
+def test_reason_of_the_command_itself_is_reported_first() -> None:
     panel = cell()
     robot = robot_there(panel)
     endpoint(robot, "MS", "/guarded", BOOL)
@@ -165,7 +165,7 @@ def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
     )
 
 
-def test_a_press_is_refused_by_the_second_one() -> None:
+def test_press_is_refused_by_a_second_interlock() -> None:
     bench = PressBench(cell())
     closes(bench.robot, False)
     receipt = bench.press("guarded")
@@ -174,7 +174,7 @@ def test_a_press_is_refused_by_the_second_one() -> None:
     assert bench.press("guarded", press_id="p2").outcome == "published"
 
 
-def test_a_hold_ends_by_the_second_one() -> None:
+def test_second_interlock_ends_a_hold() -> None:
     bench = HoldBench(panel=cell(SPEED, {**JOG, "interlock": BOTH}))
     closes(bench.robot)
     bench.begun()

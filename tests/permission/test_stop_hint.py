@@ -37,14 +37,14 @@ def robot() -> RobotState:
     return robot_there(panel_of(STOP, START))
 
 
-def test_a_locked_stop_button_says_what_to_use_instead(robot: RobotState) -> None:
+def test_locked_stop_button_names_the_emergency_stop(robot: RobotState) -> None:
     permits(robot, False)
     plain = reason("start", robot, stop_hint=HINT)
     assert HINT not in plain
     assert reason("stop", robot, stop_hint=HINT) == f"{plain} {HINT}"
 
 
-def test_without_the_key_it_is_the_emergency_stop(robot: RobotState) -> None:
+def test_stop_hint_defaults_to_the_emergency_stop(robot: RobotState) -> None:
     robot.link_up = False
     assert reason("stop", robot).endswith("Use the emergency stop of the cell.")
 
@@ -54,7 +54,7 @@ def test_a_free_stop_button_says_nothing(robot: RobotState) -> None:
     assert build_view(panel_of(STOP, START), robot, NOW).view["widgets"]["stop"]["reason"] is None
 
 
-def test_the_receipt_of_a_refused_stop_says_it_too(robot: RobotState) -> None:
+def test_receipt_of_a_refused_stop_has_the_hint(robot: RobotState) -> None:
     permits(robot, False)
     presses = presses_of(panel_of(MESSAGE, STOP, START, stop_hint=HINT), robot, FakeTransport())
     inputs = {"message": "now"}
@@ -65,7 +65,7 @@ def test_the_receipt_of_a_refused_stop_says_it_too(robot: RobotState) -> None:
     assert HINT not in str(english(start.reason))
 
 
-def test_a_view_that_failed_says_it_at_the_stop_button_only(robot: RobotState) -> None:
+def test_failed_view_shows_the_hint_at_the_stop_button_only(robot: RobotState) -> None:
     panel = panel_of(STOP, START, stop_hint=HINT)
     view = lock_all(panel, build_view(panel, robot, NOW), say("view_failed")).view
     reasons = {name: str(english(view["widgets"][name]["reason"])) for name in ("stop", "start")}

@@ -25,7 +25,7 @@ def test_a_listening_socket_is_found_and_no_other() -> None:
     assert listen_sockets.listener_names() == before
 
 
-def test_who_waits_for_it_is_notified_when_it_listens() -> None:
+def test_waiter_is_notified_when_the_server_listens() -> None:
     async def work() -> None:
         waiting = asyncio.create_task(listen_sockets.wait_for_listener(listen_sockets.listener_names()))
         await asyncio.sleep(0)
@@ -36,7 +36,7 @@ def test_who_waits_for_it_is_notified_when_it_listens() -> None:
     asyncio.run(work())
 
 
-def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() -> None:
+def test_only_new_listening_sockets_get_the_send_buffer_limit() -> None:
     async def work() -> None:
         with socket.create_server(("127.0.0.1", 0)) as old:
             wide = accepted(old)

@@ -58,7 +58,7 @@ class EndingProcess:
 
 
 @pytest.mark.parametrize(("by", "later"), [(TERM, TERM), (INT, TERM), (HUP, HUP), (HUP, TERM)])
-def test_who_listened_is_notified_after_it_and_once(
+def test_former_signal_handler_is_called_once_after_shutdown(
     heard: list[int], by: signal.Signals, later: signal.Signals
 ) -> None:
     async def run() -> None:
@@ -88,7 +88,7 @@ def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard
     assert heard == [INT, INT]
 
 
-def test_what_fails_in_it_is_logged_and_stops_nothing_else(
+def test_error_in_the_shutdown_callback_is_logged_and_shutdown_continues(
     heard: list[int], caplog: pytest.LogCaptureFixture
 ) -> None:
     failed = asyncio.Event()

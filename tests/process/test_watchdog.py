@@ -93,7 +93,7 @@ def listener(tmp_path: Path) -> Iterator[Listener]:
 
 
 @pytest.mark.real_time
-def test_it_says_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: str) -> None:
+def test_watchdog_reports_ready_status_and_stopping(address: str) -> None:
     manager = Listener(address)
     port = free_port()
     command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(port)]
@@ -203,5 +203,5 @@ def test_a_state_is_one_line() -> None:
     assert len(status_line("x" * 10_000)) < 4096
 
 
-def test_nothing_runs_without_a_service_manager() -> None:
+def test_watchdog_does_not_run_without_a_service_manager() -> None:
     asyncio.run(asyncio.wait_for(Watchdog(ServiceManager({}), lambda: (), lambda: "").run(), 1))

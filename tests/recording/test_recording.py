@@ -50,7 +50,7 @@ def messages(folder: Path, topic: str) -> list[Message]:
 # The ring.
 
 
-def test_a_ring_keeps_what_is_young_enough() -> None:
+def test_ring_keeps_samples_within_its_age() -> None:
     ring = RingBuffer(10.0, MB)
     for at in (0.0, 5.0, 9.0, 12.0):
         ring.add(to_buffered("heard", sample(at)))
@@ -71,14 +71,14 @@ def test_a_ring_holds_no_more_bytes_than_it_may_in_a_flood() -> None:
 FLOOD = bytes(10 * MB)
 
 
-def test_what_is_larger_than_the_ring_does_not_drive_out_the_rest() -> None:
+def test_sample_larger_than_the_ring_displaces_no_other() -> None:
     ring = RingBuffer(10.0, MB)
     ring.add(to_buffered("heard", sample(1.0)))
     ring.add(to_buffered("heard", sample(2.0, FLOOD)))
     assert [buffered.sample.at for buffered in ring.recent(2.0)] == [1.0]
 
 
-def test_small_samples_count_with_what_they_cost() -> None:
+def test_small_samples_count_with_their_overhead() -> None:
     ring = RingBuffer(10.0, MB)
     for _ in range(10_000):
         ring.add(to_buffered("heard", sample(1.0, b"1234")))
@@ -137,12 +137,12 @@ def test_a_definition_is_written_as_ros2msg_asks_for() -> None:
 # Files and their folder.
 
 
-def test_names_sort_by_time_and_say_whose_and_what() -> None:
+def test_file_names_sort_by_time_and_name_robot_and_widget() -> None:
     assert recording_name(1_700_000_000.5, "r1", "drive") == "20231114T221320.500Z-r1-drive"
     assert recording_name(1_700_000_000.5, "", "drive") == "20231114T221320.500Z-drive"
 
 
-def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path) -> None:
+def test_recording_of_a_killed_process_is_finished_at_the_next_start(tmp_path: Path) -> None:
     left_by_a_killed_process(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a" + UNFINISHED]
     RecordingFolder(tmp_path, 100 * MB).open()
@@ -169,7 +169,7 @@ def test_an_empty_half_is_removed(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_another_process_still_writes_is_left_alone(tmp_path: Path) -> None:
+def test_recording_that_another_process_writes_is_left_alone(tmp_path: Path) -> None:
     file = McapFile(tmp_path, "a", {})
     file.add(CHANNEL, PAYLOAD, 1, 1)
     RecordingFolder(tmp_path, 100 * MB).open()
@@ -423,7 +423,7 @@ def test_a_disk_that_stands_still_costs_no_memory_and_no_time(run: Callable[...,
 # The panel file.
 
 
-def test_the_panel_file_says_what_is_recorded(tmp_path: Path) -> None:
+def test_panel_file_selects_the_recorded_topics(tmp_path: Path) -> None:
     path = tmp_path / "panel.toml"
     shipped = (ROOT / "app/panel.toml").read_text()
     path.write_text(

@@ -126,7 +126,7 @@ def test_without_a_hash_that_can_be_compared_nothing_locks(robot: RobotState, th
     assert topic_mismatch("MS", heard, robot) is None
 
 
-def test_the_details_name_hashes_and_what_can_not_be_compared(robot: RobotState) -> None:
+def test_details_name_hashes_and_types_that_cannot_be_compared(robot: RobotState) -> None:
     announce(robot, ENABLED, BOOL, "")
     announce(robot, "/heard", TEXT, OTHER)
     assert is_unhashed(robot.graph, "MP", robot.key(ENABLED))

@@ -105,14 +105,14 @@ def test_a_counterpart_of_another_type_is_reported(
         ("MP", OTHER_KIOSK, "MS"),
     ],
 )
-def test_who_shares_no_route_with_the_panel_may_have_another_type(
+def test_publisher_without_a_common_route_may_have_another_type(
     graph: LiveGraph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply_token(topic_token(zid, role, "a", TEXT), True)
     assert graph.mismatched_type(panel_role, "a", BOOL) is None
 
 
-def test_one_of_several_publishers_with_another_type_is_enough(graph: LiveGraph) -> None:
+def test_one_publisher_with_another_type_is_a_mismatch(graph: LiveGraph) -> None:
     graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
     graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), True)
     assert graph.mismatched_type("MS", "a", BOOL) == TEXT
@@ -154,7 +154,7 @@ def test_a_bridge_that_answers_is_not_silent(graph: LiveGraph) -> None:
     assert not graph.has_silent_peer
 
 
-def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: LiveGraph) -> None:
+def test_one_unresponsive_bridge_of_two_locks(graph: LiveGraph) -> None:
     graph.apply_token(bridge_token("b2"), True)
     graph.update_versions({"b2": '"v1"'})
     assert graph.has_silent_peer
@@ -210,9 +210,7 @@ def test_a_publishers_durability_is_known(graph: LiveGraph, latched: bool) -> No
 
 
 @pytest.mark.parametrize(("zid", "role"), [(BRIDGE, "MS"), (OTHER_KIOSK, "MP")])
-def test_who_is_no_publisher_of_the_robots_has_no_durability(
-    graph: LiveGraph, zid: str, role: TopicRole
-) -> None:
+def test_token_of_another_source_has_no_durability(graph: LiveGraph, zid: str, role: TopicRole) -> None:
     graph.apply_token(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
     assert graph.is_transient_local("a") is None
 
@@ -301,7 +299,7 @@ def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Liv
     assert graph.peers == {BRIDGE}
 
 
-def test_of_nodes_that_came_and_went_nothing_is_kept(graph: LiveGraph) -> None:
+def test_removed_nodes_leave_no_state(graph: LiveGraph) -> None:
     def sizes() -> dict[str, int]:
         return {name: len(part) for name, part in vars(graph).items() if isinstance(part, Sized)}
 

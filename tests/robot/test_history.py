@@ -66,7 +66,7 @@ def test_no_peak_is_lost_at_any_zoom(
 
 
 @given(samples)
-def test_what_is_added_to_columns_is_in_those_that_are_asked_for_next(
+def test_added_samples_are_in_the_next_columns(
     steps: list[tuple[float, float]],
 ) -> None:
     """Who follows a history and asks for the newest columns only, has the same as who asks for all."""
@@ -87,7 +87,7 @@ def test_what_is_added_to_columns_is_in_those_that_are_asked_for_next(
     ]
 
 
-def test_one_sample_out_of_a_day_is_seen_in_every_window() -> None:
+def test_single_peak_of_a_day_shows_in_every_window() -> None:
     """A single peak of 10 ms in a day of 2 Hz."""
     history = FieldHistory(DAY, MAX_AGE)
     for number in range(round(DAY * 2)):
@@ -145,7 +145,7 @@ def test_no_line_is_drawn_over_a_silence(silence: float) -> None:
 
 
 @pytest.mark.parametrize("gap", ["nan", "interrupted"])
-def test_no_line_is_drawn_over_what_is_unknown(gap: str) -> None:
+def test_no_line_is_drawn_over_a_gap(gap: str) -> None:
     history = FieldHistory(DAY, MAX_AGE)
     for number in range(20):
         if number == 10:
@@ -197,7 +197,7 @@ def places(columns: list[Column], width: float) -> list[float]:
 
 
 @pytest.mark.parametrize("jump", [-7_200.0, 7_200.0])
-def test_what_was_recorded_goes_with_a_clock_that_is_set(jump: float) -> None:
+def test_history_moves_with_a_clock_that_is_set(jump: float) -> None:
     """A kiosk without a battery for its clock gets the time by the network some minutes later."""
     whole, field = history_of(START)
     for number in range(10):
@@ -217,7 +217,7 @@ def test_a_clock_that_drifts_moves_nothing() -> None:
     assert whole.shift == 0.0
 
 
-def test_what_is_from_earlier_runs_keeps_its_time() -> None:
+def test_samples_of_earlier_runs_keep_their_time() -> None:
     whole, field = history_of(START)
     field.levels[0].put_before(buckets(START - 20, START - 10))
     field.add(whole.time(1_001.0), 3.0)

@@ -62,7 +62,7 @@ def test_a_message_of_another_node_does_not_lock() -> None:
         assert cell.shown(at)["text"] == "0.25"
 
 
-def test_each_entry_has_an_age_of_its_own() -> None:
+def test_each_keyed_entry_has_its_own_age() -> None:
     cell = Cell()
     cell.says(NOW, lift=0.25)
     for number in range(10):
@@ -81,7 +81,7 @@ def test_without_an_age_an_entry_that_newer_messages_lack_is_missing() -> None:
     assert (cell.code(NOW), cell.shown(NOW)["state"]) == ("interlock_field_missing", "missing")
 
 
-def test_what_was_never_received_is_missing_though_other_parts_are() -> None:
+def test_key_never_received_is_missing_though_others_are_known() -> None:
     cell = Cell()
     cell.says(NOW, finger=0.1)
     assert cell.code(NOW) == "interlock_field_missing"

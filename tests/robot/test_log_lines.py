@@ -99,7 +99,7 @@ def test_colours_of_a_terminal_are_no_text() -> None:
     assert shown == ["[WARN] hot 1", "x" * (LONGEST_TEXT - 2) + " 2"]
 
 
-def test_what_is_no_line_is_passed_over_and_text_can_not_hide() -> None:
+def test_invalid_log_message_is_skipped_and_control_characters_show() -> None:
     payloads = [b"\0\1\0\0nonsense", line(2, text="a\u202eb")]
     ((number, log_line),) = find(filled(payloads)).lines
     assert (number, log_line.text) == (2, "a\\u202eb 2")
@@ -114,7 +114,7 @@ def test_a_severity_has_its_word(level: int, word: str) -> None:
     assert log_line.level == word
 
 
-def test_nothing_is_decoded_until_somebody_reads(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_log_lines_are_decoded_when_read(monkeypatch: pytest.MonkeyPatch) -> None:
     decoded: list[bytes] = []
     lines = filled([line(n) for n in range(1, 101)])
     real = INTERFACES.decode

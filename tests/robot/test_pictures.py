@@ -107,7 +107,7 @@ def test_a_raw_picture_has_its_colours(encoding: str, pixel: bytes, colour: tupl
         ("mono8", 1, 100_000, bytes(100_000), "camera_pixels"),
     ],
 )
-def test_what_is_wrong_with_a_raw_picture_is_said(
+def test_fault_of_a_raw_picture_is_named(
     encoding: str, width: int, height: int, data: bytes, code: str
 ) -> None:
     with pytest.raises(NoPicture) as error:

@@ -49,7 +49,7 @@ def test_the_first_value_of_a_latched_publisher_is_never_fresh(
     assert interlock_verdict(PANEL.interlocks[0], robot, JOINED + late_s).code == "interlock_waiting"
 
 
-def test_a_latched_publisher_that_is_periodic_opens_with_what_it_says_next(robot: RobotState) -> None:
+def test_periodic_latched_publisher_unlocks_with_its_next_message(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
     first = JOINED + 10.0
     assert [says(robot, first + s) for s in (0.0, 0.01, 0.5, REPLAY_S, REPLAY_S + 0.5)] == [
@@ -61,7 +61,7 @@ def test_a_latched_publisher_that_is_periodic_opens_with_what_it_says_next(robot
     ]
 
 
-def test_a_slow_one_opens_with_its_second_value(robot: RobotState) -> None:
+def test_slow_publisher_unlocks_with_its_second_message(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
     assert [says(robot, JOINED + 10.0), says(robot, JOINED + 40.0)] == [False, True]
 
@@ -80,7 +80,7 @@ def test_a_publisher_that_is_not_known_yet_may_be_latched(robot: RobotState) -> 
     assert not interlock_verdict(PANEL.interlocks[0], robot, JOINED + 5.2).permitted
 
 
-def test_what_came_before_the_graph_was_joined_is_not_the_first(robot: RobotState) -> None:
+def test_message_before_joining_the_graph_does_not_count_as_first(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
     robot.settled_at = math.inf
     assert not says(robot, JOINED - 5.0)
@@ -108,7 +108,7 @@ def test_after_each_loss_and_each_new_publisher_the_next_is_the_first(event: str
     assert robot.replayed.known_since(KEY) == math.inf
 
 
-def test_what_was_said_as_a_publisher_appeared_is_the_first() -> None:
+def test_message_at_a_publishers_appearance_counts_as_first() -> None:
     replayed = ReplayedMessages()
     for at in (1.0, 5.0):
         replayed.record_message(KEY, at, 0.0, False)
@@ -123,7 +123,7 @@ def test_cached_sample_is_never_fresh(robot: RobotState) -> None:
     assert says(robot, JOINED + 30.0)
 
 
-def test_the_inbox_says_what_came_from_a_cache() -> None:
+def test_inbox_marks_samples_from_a_cache() -> None:
     inbox = Inbox(lambda _: None)
     inbox.put_cached(KEY, TRUE, None)
     assert inbox.drain().samples[KEY].cached

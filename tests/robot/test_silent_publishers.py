@@ -57,7 +57,7 @@ def test_a_publisher_that_appears_and_says_nothing_is_silent(known: SilentPublis
     assert not silent(known)
 
 
-def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -> None:
+def test_publisher_that_left_without_a_message_still_counts_as_silent(known: SilentPublishers) -> None:
     known.record_message(KEY, BRIDGE, 1, 0.0)
     known.add_publisher(PUBLISHER, 2, 10.0)
     known.remove_publisher(PUBLISHER, 3)
@@ -82,7 +82,7 @@ def test_a_message_just_before_its_publisher_appears_is_its_own(
     assert silent(known) is is_silent
 
 
-def test_a_message_is_one_publishers_own(known: SilentPublishers) -> None:
+def test_message_counts_for_its_own_publisher_only(known: SilentPublishers) -> None:
     known.record_message(KEY, BRIDGE, 1, 10.0)
     known.add_publisher(PUBLISHER, 2, 10.05)
     known.remove_publisher(PUBLISHER, 3)
@@ -90,7 +90,7 @@ def test_a_message_is_one_publishers_own(known: SilentPublishers) -> None:
     assert silent(known)
 
 
-def test_a_message_of_one_that_was_there_is_not_the_next_ones(known: SilentPublishers) -> None:
+def test_message_of_an_earlier_publisher_does_not_count_for_the_next(known: SilentPublishers) -> None:
     known.add_publisher(PUBLISHER, 1, 10.0)
     known.record_message(KEY, BRIDGE, 2, 10.1)
     known.remove_publisher(PUBLISHER, 3)
@@ -125,7 +125,7 @@ def test_a_bridge_that_goes_leaves_its_doubt_to_the_next_message(known: SilentPu
     assert not silent(known, OTHER)
 
 
-def test_other_topics_and_what_is_no_publisher_are_passed_over(known: SilentPublishers) -> None:
+def test_other_topics_and_subscribers_are_ignored(known: SilentPublishers) -> None:
     known.add_publisher(Endpoint(BRIDGE, "MP", "heard", BOOL), 1, 10.0)
     known.add_publisher(Endpoint(BRIDGE, "MS", KEY, BOOL), 2, 10.0)
     known.add_publisher(Endpoint(BRIDGE), 3, 10.0)
@@ -273,7 +273,9 @@ def test_a_message_within_the_joining_window_is_that_of_the_only_publisher(
 
 
 @pytest.mark.parametrize("end", ["publisher", "bridge"])
-def test_a_publisher_that_ended_is_not_the_only_one(known: SilentPublishers, end: str) -> None:
+def test_ended_publisher_does_not_count_as_the_only_publisher(
+    known: SilentPublishers, end: str
+) -> None:
     known.record_message(KEY, BRIDGE, 1, 10.0)
     known.add_publisher(PUBLISHER, 2, 12.0)
     if end == "publisher":
@@ -284,7 +286,7 @@ def test_a_publisher_that_ended_is_not_the_only_one(known: SilentPublishers, end
     assert silent(known)
 
 
-def test_a_second_appearance_has_no_message_of_its_own(known: SilentPublishers) -> None:
+def test_publishers_second_appearance_needs_a_new_message(known: SilentPublishers) -> None:
     known.record_message(KEY, BRIDGE, 1, 10.0)
     known.add_publisher(PUBLISHER, 2, 12.0)
     known.add_publisher(PUBLISHER, 4, 12.1, lost_before=3)

@@ -203,13 +203,13 @@ def test_a_cut_before_anything_was_heard_leaves_waiting(robot: RobotState) -> No
     assert robot.reading("/heard").status == "waiting"
 
 
-def test_what_was_unreadable_before_the_cut_has_no_message(robot: RobotState) -> None:
+def test_unreadable_sample_before_the_cut_has_no_message(robot: RobotState) -> None:
     broken(robot)
     robot.mark_peer_lost(BRIDGE, 2)
     assert (robot.reading("/heard").status, robot.reading("/heard").fields) == ("cut", None)
 
 
-def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
+def test_log_lines_of_several_robots_begin_with_the_robots_name(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     panel = small_panel()

@@ -108,7 +108,7 @@ def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(test())
 
 
-def test_until_it_is_read_it_permits_nothing_and_then_as_it_says() -> None:
+def test_large_message_permits_only_after_complete_decoding() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(0)
@@ -126,7 +126,7 @@ def test_until_it_is_read_it_permits_nothing_and_then_as_it_says() -> None:
     run(test)
 
 
-def test_what_is_small_is_read_at_once_though_something_large_is_read() -> None:
+def test_small_message_is_decoded_while_a_large_one_is_in_progress() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(0, "/heard")
@@ -165,7 +165,7 @@ def test_a_small_message_behind_a_large_one_is_the_newest() -> None:
     run(test)
 
 
-def test_a_readout_shows_what_was_said_before_until_the_newest_is_read() -> None:
+def test_readout_shows_the_previous_value_while_the_newest_is_decoded() -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(0, "/heard")
@@ -209,7 +209,7 @@ def test_of_parts_of_a_list_so_many_are_read_and_then_the_newest() -> None:
     run(test)
 
 
-def test_of_a_lossless_topic_each_is_read_in_its_order() -> None:
+def test_messages_of_a_lossless_topic_are_decoded_in_order() -> None:
     async def test() -> None:
         place = f"status[{COUNT - 1}].level"
         cell = Cell(MESSAGE, {**FREE, "confirm": {**CONFIRM, "field": place}}, path=place)
@@ -229,7 +229,7 @@ def test_of_a_lossless_topic_each_is_read_in_its_order() -> None:
 
 
 @pytest.mark.parametrize("how", ["cut", "lose", "doubt"])
-def test_what_was_being_read_when_it_stopped_to_count_never_counts(how: str) -> None:
+def test_message_in_decoding_at_a_cut_never_counts(how: str) -> None:
     async def test() -> None:
         cell = Cell()
         cell.says(0)
@@ -310,7 +310,7 @@ def test_an_answer_of_any_size_is_read_while_all_else_goes_on(kind: str) -> None
     run(test)
 
 
-def test_what_is_no_answer_says_so_and_keeps_no_other_waiting() -> None:
+def test_invalid_reply_is_reported_and_delays_no_other() -> None:
     large = diagnostics(1_000_000)
     reader = INTERFACES.field_reader(large.type, [large.path])
 

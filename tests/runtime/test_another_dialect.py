@@ -285,7 +285,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(
     asyncio.run(scene())
 
 
-def test_commands_and_the_doctor_read_what_is_on_a_robot_without_a_bridge(
+def test_commands_and_doctor_read_a_robot_without_a_bridge(
     peer: tuple[str, zenoh.Session],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

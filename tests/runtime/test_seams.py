@@ -105,7 +105,7 @@ class Page:
         return self._view
 
 
-def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCaptureFixture) -> None:
+def test_error_at_a_sample_does_not_keep_locks_from_closing(caplog: pytest.LogCaptureFixture) -> None:
     panel = panel_of(COUNT)
     robot = robot_there(panel)
     permits(robot)
@@ -131,7 +131,7 @@ def test_a_permission_that_blinked_is_shown_in_between() -> None:
     assert robot.reading(ENABLED).value("data") is True
 
 
-def test_of_what_a_permission_said_too_fast_to_be_kept_nothing_is_taken_for_true() -> None:
+def test_permission_that_overran_the_inbox_locks_before_its_newest_value() -> None:
     panel = small_panel()
     robot = robot_there(panel)
     permits(robot)
@@ -164,7 +164,7 @@ def test_a_permission_that_is_said_again_is_not_urgent() -> None:
     assert robot.reading(ENABLED).value("data") is True
 
 
-def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
+def test_unreadable_permission_sample_is_urgent() -> None:
     panel = small_panel()
     robot = robot_there(panel)
     permits(robot)
@@ -275,7 +275,7 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
     assert len(renewals) == 4
 
 
-def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -> None:
+def test_publisher_replaced_between_turns_must_publish_again() -> None:
     panel = small_panel({"require_publisher": True})
     robot = robot_there(panel)
     interlock = panel.interlocks[0]
@@ -338,7 +338,7 @@ def test_replacing_the_session_ends_holds_first(
     asyncio.run(scene())
 
 
-def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
+def test_ending_session_sends_no_more_messages() -> None:
     async def pressed() -> None:
         session = session_of(small_panel(), "tcp/127.0.0.1:1")
         permits(session.robot)

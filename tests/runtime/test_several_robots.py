@@ -70,7 +70,7 @@ def permitted(server: Server) -> bool:
     return bool(server.widget("operation1")["enabled"])
 
 
-def test_ten_robots_hear_each_what_was_pressed_for_it(ten: Server) -> None:
+def test_each_of_ten_robots_gets_its_own_presses(ten: Server) -> None:
     robots = [ten.robot(f"r{number + 1}") for number in range(MANY)]
     for number, robot in enumerate(robots):
         robot = robot.by(("post", "socket")[number % 2])
@@ -95,7 +95,7 @@ def test_a_page_without_a_robot_leads_to_the_first(ten: Server, path: str) -> No
     assert (answer.status_code, answer.headers["location"]) == (303, f"/robots/r1{path}")
 
 
-def test_one_robot_with_a_path_of_its_own_is_not_called_several(
+def test_single_robot_with_its_own_path_is_not_shown_as_several(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(Server(ROOT, KIOSK_PANEL=str(panel_file(tmp_path, entry(1)))))
@@ -104,7 +104,7 @@ def test_one_robot_with_a_path_of_its_own_is_not_called_several(
     assert error == "this panel has a robot with a path of its own: begin with /robots/r1/"
 
 
-def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
+def test_press_without_a_robots_name_is_refused(ten: Server) -> None:
     answer = ten.press("operation", "whose?")
     assert answer.status_code == 404
     assert "several robots: begin with /robots/r1/" in answer.json()["error"]
@@ -210,7 +210,7 @@ def test_a_frozen_bridge_of_one_robot_locks_that_robot_only(
     assert robots[0].widget("operation1")["enabled"]
 
 
-def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
+def test_one_bridge_may_carry_robots_with_different_namespaces(
     bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     for topic in ("/robot1/operation", "/robot2/operation"):
@@ -245,7 +245,7 @@ def test_a_bridge_with_another_namespace_is_not_this_robots(
         other.end()
 
 
-def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> None:
+def test_faults_of_robot_tables_are_reported(tmp_path: Path) -> None:
     other = 'id = "r{n}"\nname = "{name}"\nnamespace = "{namespace}"'
     path = panel_file(
         tmp_path,

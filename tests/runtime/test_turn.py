@@ -195,7 +195,7 @@ def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pyte
     run(scene())
 
 
-def test_what_changes_while_a_turn_runs_is_shown_by_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_change_during_a_turn_is_shown_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """As when a hold ends: it reports so, and the turn that ended it shows it."""
 
     async def scene() -> None:

@@ -75,7 +75,7 @@ def pages(text: str) -> dict[str, list[str]]:
         (["/home", "/home"], ["Home", "/home"]),
     ],
 )
-def test_labels_that_are_alike_carry_what_differs(names: list[str], labels: list[str]) -> None:
+def test_equal_labels_get_the_part_that_differs(names: list[str], labels: list[str]) -> None:
     assert own_labels([("Home", name) for name in names]) == labels
     assert own_labels([("Home", names[0]), ("Speed", names[1])]) == ["Home", "Speed"]
 
@@ -87,7 +87,7 @@ ARMS: dict[str, Any] = {
 }
 
 
-def test_a_control_depends_on_the_permission_of_its_own_namespace() -> None:
+def test_control_uses_the_interlock_of_its_namespace() -> None:
     text = text_of(controls=True, **ARMS)
     by_id = widgets(text)
     assert {name: by_id[name]["interlock"] for name in ("left_home", "right_home")} == {
@@ -102,7 +102,7 @@ def test_a_control_depends_on_the_permission_of_its_own_namespace() -> None:
     assert '# topic = "/light"' in text
 
 
-def test_a_permission_around_the_namespace_counts_where_it_has_none_itself() -> None:
+def test_interlock_of_an_outer_namespace_counts_without_an_own_interlock() -> None:
     own = published("/left/enabled", BOOL, "/left/io")
     text = text_of(
         controls=True,
@@ -124,7 +124,7 @@ def test_a_permission_around_the_namespace_counts_where_it_has_none_itself() -> 
     }
 
 
-def test_a_single_namespace_of_permissions_counts_for_controls_without_one() -> None:
+def test_controls_without_a_namespace_use_the_only_namespaces_interlock() -> None:
     text = text_of(controls=True, topics=[published("/safety/ok_enabled", BOOL), heard("/start", BOOL)])
     assert widgets(text)["start"]["interlock"] == "safety_ok_enabled"
 
@@ -172,7 +172,7 @@ def test_pages_are_by_namespace_then_node_and_none_has_too_many() -> None:
     assert sum(map(len, by_title.values())) == len(topics)
 
 
-def test_small_namespaces_share_the_page_of_the_one_around_them() -> None:
+def test_small_namespaces_share_the_page_of_their_outer_namespace() -> None:
     topics = [published("/left/enabled", BOOL)]
     topics += [
         published(f"/left/joint_{n}/{part}", BOOL) for n in range(1, 7) for part in ("hot", "jam", "on")
@@ -213,7 +213,7 @@ def test_widget_without_room_is_named() -> None:
         ("/pose", "geometry_msgs/msg/Pose", "/pose (geometry_msgs/msg/Pose): no field of it is a"),
     ],
 )
-def test_what_a_panel_can_not_show_is_named_with_the_reason(
+def test_topic_that_cannot_be_shown_is_named_with_the_reason(
     name: str, type_name: str, why: str
 ) -> None:
     text = text_of(topics=[published(name, type_name)])

@@ -129,7 +129,7 @@ def robots(draw: Callable[..., Any]) -> Known:
 
 
 @given(robots(), some.booleans())
-def test_what_is_made_of_any_robot_passes_check(known: Known, live: bool) -> None:
+def test_scaffold_of_any_robot_passes_check(known: Known, live: bool) -> None:
     draft, faults = checked_draft(
         partial(make_draft, known, INTERFACES, Draft(title="Cell"), live),
         partial(faults_of_text, folder=Path()),

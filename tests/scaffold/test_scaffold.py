@@ -100,7 +100,7 @@ CELL: Mapping[str, Any] = {
 
 
 @pytest.mark.parametrize("controls", [False, True])
-def test_what_is_made_is_a_good_panel(tmp_path: Path, controls: bool) -> None:
+def test_scaffold_is_a_valid_panel(tmp_path: Path, controls: bool) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(text_of(controls, **CELL))
     assert bool(check_panel(path).panel.commands) is controls
@@ -112,7 +112,7 @@ def test_a_robot_with_nothing_is_a_good_panel_too(tmp_path: Path) -> None:
     check_panel(path)
 
 
-def test_no_control_is_live_until_it_is_asked_for() -> None:
+def test_controls_are_comments_unless_requested() -> None:
     text = text_of(**CELL)
     assert {widget["kind"] for widget in widgets(text).values()} <= {
         "indicator",
@@ -167,7 +167,7 @@ def test_interlock_candidates_are_bools_that_permit() -> None:
     ]
 
 
-def test_an_interlock_has_one_publisher_where_the_robot_has_one() -> None:
+def test_interlock_requires_one_publisher_if_the_robot_has_one_publisher() -> None:
     interlocks = tomllib.loads(text_of(**CELL))["interlock"]
     assert {interlock["publishers"] for interlock in interlocks} == {"one"}
     twice = replace(
@@ -192,7 +192,7 @@ def test_a_bool_of_a_fault_is_a_red_lamp() -> None:
     }
 
 
-def test_what_is_shown_of_the_usual_types() -> None:
+def test_usual_types_have_suitable_displays() -> None:
     by_id = widgets(text_of(**CELL))
     assert by_id["arm_joint_states"]["joint"] == [
         {"name": "j1", "label": "J1", "min": -180, "max": 180},
@@ -246,7 +246,7 @@ def test_topic_without_a_widget_is_named() -> None:
 @pytest.mark.parametrize(
     "name", ["sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan", "nav_msgs/msg/OccupancyGrid"]
 )
-def test_what_is_for_programs_is_no_gauge(name: str) -> None:
+def test_numbers_for_programs_are_no_gauges(name: str) -> None:
     text = text_of(topics=[published("/x", name)])
     assert widgets(text) == {}
     assert f"# - /x ({name})" in text
@@ -260,7 +260,7 @@ def test_what_is_for_programs_is_no_gauge(name: str) -> None:
         lambda topic: SurveyedTopic(name="/clock", key="clock", publishers=topic.publishers),
     ],
 )
-def test_what_is_not_for_a_panel_is_left_out(change: Callable[[SurveyedTopic], SurveyedTopic]) -> None:
+def test_unusable_topics_are_left_out(change: Callable[[SurveyedTopic], SurveyedTopic]) -> None:
     assert widgets(text_of(topics=[change(published("/y", "std_msgs/msg/Int32"))])) == {}
 
 
@@ -286,7 +286,7 @@ def test_a_topic_that_the_bridge_holds_back_is_a_remark() -> None:
     assert "# - /x: `allow` or `deny` in the bridge's configuration holds it back" in text
 
 
-def test_what_the_bridge_has_lost_is_a_remark_of_its_own() -> None:
+def test_topics_that_the_bridge_lost_have_their_own_remark() -> None:
     held = SurveyedTopic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)
     text = text_of(topics=[held], lost=["/x", "/home", "/plc/get_parameters", "/rosout/_hidden"])
     remarks = [line for line in text.splitlines() if line.startswith("# - ")]
@@ -340,7 +340,7 @@ def test_a_value_of_any_size_leaves_the_rest_of_the_panel(value: float) -> None:
 
 
 @pytest.mark.parametrize("controls", [False, True])
-def test_what_a_panel_file_can_not_have_is_left_out_with_the_reason(controls: bool) -> None:
+def test_name_that_a_panel_file_cannot_have_is_left_out_with_the_reason(controls: bool) -> None:
     long = f"/{'x' * 300}"
     joints = {"/joints": SimpleNamespace(name=["j1\x07"], position=[0.0])}
     text = text_of(

@@ -97,7 +97,7 @@ def test_a_value_is_put_where_its_path_says(type_name: str, path: str, value: An
     assert INTERFACES.field_reader(type_name, [path]).read(payload).get(path) == value
 
 
-def test_what_is_put_changes_no_other_message() -> None:
+def test_changing_a_field_changes_no_other_message() -> None:
     message = plausible(JOINTS, INTERFACES)
     fields = message(Moment(0.0, NOON_NS))
     put(fields, JOINTS, "position[0]", 99.0, STRUCTURES)
@@ -112,7 +112,7 @@ def test_signals_stay_within_their_limits() -> None:
     assert (min(clipped), max(clipped)) == (0, 255)
 
 
-def test_the_first_of_several_values_is_the_usual_one() -> None:
+def test_first_constant_is_the_usual_value() -> None:
     shown = [cycle(("ok", "warm", "hot"))(t) for t in range(64)]
     assert set(shown) == {"ok", "warm", "hot"}
     assert shown.count("ok") == 48

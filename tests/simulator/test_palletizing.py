@@ -130,7 +130,7 @@ def test_the_same_seed_and_clock_give_the_same_hour() -> None:
     assert hour(3) == hour(3) != hour(4)
 
 
-def test_one_late_step_is_the_same_as_many(cell: PalletizingCell) -> None:
+def test_one_late_step_equals_many_small_steps(cell: PalletizingCell) -> None:
     late = PalletizingCell()
     pass_time(cell, 4)
     late.step(cell.t)

@@ -114,7 +114,7 @@ def test_states_are_there_for_late_subscribers(robot: Stepped) -> None:
     assert published["/air_pressure"].qos == Qos()
 
 
-def test_what_stays_is_repeated_each_second_and_a_change_is_told_at_once(robot: Stepped) -> None:
+def test_unchanged_state_is_published_each_second_and_a_change_at_once(robot: Stepped) -> None:
     times = [at for at, _ in robot.run(9).timed("/cell/state")]
     assert len(times) == pytest.approx(10, abs=1)
     robot.hear("/cell/stop")

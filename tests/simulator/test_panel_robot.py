@@ -54,7 +54,7 @@ def readout(topic: str, type_name: str, field: str = "data", **more: str) -> str
     )
 
 
-def test_a_number_moves_smoothly_within_what_its_unit_says(loaded: Loaded) -> None:
+def test_number_moves_smoothly_within_its_units_range(loaded: Loaded) -> None:
     robot = Stepped(loaded(readout("/t", "std_msgs/msg/Float32", unit='"°C"'))).run(60)
     values = robot.values("/t")
     assert len(values) == pytest.approx(60 * 5, abs=2)
@@ -309,7 +309,7 @@ type = "std_srvs/srv/Trigger"
 """
 
 
-def test_what_several_robots_share_is_simulated_once(loaded: Loaded) -> None:
+def test_shared_topics_of_several_robots_are_simulated_once(loaded: Loaded) -> None:
     with Simulator(ANY_PORT, robots_of(loaded(SHARED)), INTERFACES) as played:
         tokens = [token for robot in played.robots for token in robot.tokens("z")]
     names = [token.split("/")[4] for token in tokens if "/MP/" in token or "/SS/" in token]
@@ -373,7 +373,7 @@ def test_services_of_any_type_succeed(loaded: Loaded) -> None:
     assert robot.robot.serve("/home", b"") is None
 
 
-def test_the_demo_table_sets_what_a_service_says(loaded: Loaded) -> None:
+def test_demo_table_sets_the_response_of_a_service(loaded: Loaded) -> None:
     table = '[demo."/home"]\nresponse = { success = false, message = "the door is open" }\n'
     answer = Stepped(loaded(CALLS + table)).run(1).call("/home")
     assert (answer.success, answer.message) == (False, "the door is open")
@@ -466,7 +466,7 @@ def set_to(robot: Stepped, name: str, kind: int, field: str, value: Any) -> str:
         ("other", 1, "bool_value", True, "not declared"),
     ],
 )
-def test_parameters_are_held_and_checked_by_what_the_panel_knows(
+def test_simulated_parameters_have_the_panels_limits_and_options(
     loaded: Loaded, name: str, kind: int, field: str, value: Any, reason: str
 ) -> None:
     robot = Stepped(loaded(PARAMETERS)).run(1)
@@ -530,13 +530,13 @@ def test_a_silent_server_or_subscriber_is_not_there(loaded: Loaded) -> None:
     assert "/arm/get_parameters" not in nodes
 
 
-def test_the_qos_is_what_the_panel_says(loaded: Loaded) -> None:
+def test_simulated_qos_is_the_panels_qos(loaded: Loaded) -> None:
     qos = '{ reliability = "best_effort", durability = "transient_local", depth = 3 }'
     robot = PanelRobot(loaded(readout("/x", "std_msgs/msg/Bool", qos=qos, max_age_s="0.3")))
     assert robot.publishes["/x"].qos == Qos(False, True, 3)
 
 
-def test_what_may_not_be_old_comes_often_enough(loaded: Loaded) -> None:
+def test_topic_with_max_age_is_published_often_enough(loaded: Loaded) -> None:
     robot = Stepped(loaded(readout("/x", "std_msgs/msg/Bool", max_age_s="0.5"))).run(10)
     times = [at for at, _ in robot.timed("/x")]
     assert max(b - a for a, b in itertools.pairwise(times)) < 0.5
@@ -551,7 +551,7 @@ def test_names_of_the_reference_system_with_other_types_are_the_panels(loaded: L
     assert robot.call("/light").message == "done"
 
 
-def test_the_reference_system_is_as_it_was() -> None:
+def test_reference_system_behaves_as_described() -> None:
     robot = Stepped(load_panel(REFERENCE)).run(1)
     assert "/last_heard" not in robot.said
     robot.hear("/operation1", data="hello")

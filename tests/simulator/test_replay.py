@@ -221,7 +221,7 @@ def test_messages_that_a_folder_names_and_its_files_lack_are_noted(
 
 @pytest.mark.parametrize("kept", [1, 8, 100, 200, -1, -9, -50])
 @pytest.mark.parametrize("in_folder", [False, True])
-def test_a_file_that_is_cut_off_is_named_with_what_helps(
+def test_truncated_recording_is_named_with_the_remedy(
     tmp_path: Path, kept: int, in_folder: bool
 ) -> None:
     path = folder_of_rosbag2(tmp_path, mcap=True) if in_folder else mcap_file(tmp_path)
@@ -250,7 +250,7 @@ def test_the_rate_is_how_many_times_as_fast(tmp_path: Path, opened: Opened) -> N
     assert [t for t, *_ in stepped(fast, [0, 0.05, 0.1, 0.2, 0.3])] == [0, 0.05, 0.1, 0.3]
 
 
-def test_it_ends_once_or_begins_again_after_a_pause(tmp_path: Path, opened: Opened) -> None:
+def test_replay_ends_or_repeats_after_a_pause(tmp_path: Path, opened: Opened) -> None:
     path, ended = mcap_file(tmp_path), []
     once = ReplayedRobot(opened(path), ended=lambda: ended.append("once"))
     assert len(stepped(once, [0, 1, 1 + PAUSE_S])) == len(MESSAGES)
@@ -261,7 +261,9 @@ def test_it_ends_once_or_begins_again_after_a_pause(tmp_path: Path, opened: Open
     assert "loop" not in ended
 
 
-def test_what_is_no_ros_topic_is_left_out_and_named(tmp_path: Path, opened: Opened) -> None:
+def test_recorded_topic_that_is_not_of_ros_is_left_out_and_named(
+    tmp_path: Path, opened: Opened
+) -> None:
     recording = opened(mcap_file(tmp_path, also_json=True))
     assert set(recording.topics) == set(TOPICS)
     assert len(list(recording.messages())) == len(MESSAGES)
@@ -280,7 +282,7 @@ def test_what_is_no_ros_topic_is_left_out_and_named(tmp_path: Path, opened: Open
         ("empty.mcap", b"", "can't be read"),
     ],
 )
-def test_what_can_not_be_replayed_is_named(
+def test_recording_that_cannot_be_replayed_is_named(
     tmp_path: Path, name: str, content: bytes | None, words: str
 ) -> None:
     path = tmp_path / name
@@ -303,7 +305,7 @@ def test_a_folder_without_metadata_and_a_file_without_messages_are_named(tmp_pat
         Recording(path)
 
 
-def test_what_a_panel_misses_in_a_recording_is_named(tmp_path: Path, opened: Opened) -> None:
+def test_topics_missing_in_a_recording_are_named(tmp_path: Path, opened: Opened) -> None:
     panel = load_panel(ROOT / "docs/examples/palletizer.toml")
     lacks = list(missing(panel, opened(mcap_file(tmp_path)).topics))
     assert "the recording has no /boxes (std_msgs/msg/UInt32), which the panel listens to" in lacks
@@ -347,7 +349,7 @@ def test_a_zenoh_session_receives_the_bytes(made: Made, tmp_path: Path) -> None:
         assert simulator.end() == 0, simulator.text
 
 
-def test_a_panel_shows_what_was_recorded(tmp_path: Path, servers: Callable[[Server], Server]) -> None:
+def test_panel_shows_the_recorded_values(tmp_path: Path, servers: Callable[[Server], Server]) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     simulator = replaying(mcap_file(tmp_path), endpoint, "--loop")
     try:
@@ -360,7 +362,7 @@ def test_a_panel_shows_what_was_recorded(tmp_path: Path, servers: Callable[[Serv
         assert simulator.end() == 0, simulator.text
 
 
-def test_it_ends_with_the_recording(tmp_path: Path) -> None:
+def test_replay_command_ends_with_the_recording(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     simulator = replaying(sqlite_file(tmp_path), endpoint)
     try:

@@ -22,7 +22,7 @@ from app.simulator.robot import (
 from tests.support.parts import ROOT, Server, until
 
 
-def test_it_permits_and_forbids_in_turns_and_says_so_once_a_second() -> None:
+def test_demo_robot_alternates_its_permission_and_publishes_it_each_second() -> None:
     robot = DemoRobot()
     assert robot.step(100.0) == [("/operation_enabled", {"data": True})]
     assert robot.step(100.0 + REPEAT_S / 2) == []
@@ -38,7 +38,7 @@ def test_demo_robot_echoes_each_message_once() -> None:
     assert robot.step(0.1) == []
 
 
-def test_its_services_answer_and_refuse_with_words() -> None:
+def test_demo_robots_services_succeed_or_refuse_with_a_message() -> None:
     robot = DemoRobot()
     robot.step(0.0)
     assert robot.serve("/light", SimpleNamespace(data=True))["message"] == "the light is on"
@@ -91,7 +91,7 @@ def values_of(service: str, *names: str) -> Any:
     return answer
 
 
-def test_its_parameters_are_described_and_answered_as_rclcpp_does() -> None:
+def test_demo_robots_parameters_are_described_as_by_rclcpp() -> None:
     speed, serial = values_of("describe_parameters", "speed", "serial")
     assert speed["floating_point_range"] == [{"from_value": 0.0, "to_value": 500.0, "step": 10.0}]
     assert (speed["read_only"], serial["read_only"]) == (False, True)
@@ -111,7 +111,7 @@ def test_its_parameters_are_described_and_answered_as_rclcpp_does() -> None:
         ("nothing", 1, "bool_value", True, "parameter 'nothing' is not declared"),
     ],
 )
-def test_its_parameters_are_set_or_refused_with_words(
+def test_demo_robots_parameters_are_set_or_refused_with_a_reason(
     name: str, kind: int, field: str, value: Any, reason: str
 ) -> None:
     robot = DemoRobot()

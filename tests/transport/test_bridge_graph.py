@@ -50,7 +50,7 @@ def read(**more: Any) -> RobotGraph:
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/o n", {"topic_name": "rt/o n", "type_name": BOOL}),
     ],
 )
-def test_what_is_no_topic_of_ros_is_left_out(key: str, answer: Any) -> None:
+def test_topic_that_is_not_of_ros_is_left_out(key: str, answer: Any) -> None:
     assert entity_of(key, answer) is None
     assert (
         ros_graph(GraphAnswers(versions={"a": "v1"}, entities=[(key, answer)])).robots[0].topics == ()
@@ -98,7 +98,7 @@ def test_a_robot_that_has_tokens_only() -> None:
     assert str(on.publishers[0].qos) == "reliable, transient local, depth 1"
 
 
-def test_services_and_who_serves_them() -> None:
+def test_services_have_their_servers() -> None:
     robot = read(
         tokens=[
             "@/a/@ros2_lv",
@@ -122,7 +122,7 @@ def test_services_and_who_serves_them() -> None:
 @pytest.mark.parametrize(
     ("role", "name", "part"), [("SS", "/reset", ""), ("AS", "/walk", "/_action/send_goal")]
 )
-def test_a_server_has_the_hashes_of_what_it_exchanges(role: str, name: str, part: str) -> None:
+def test_server_has_the_hashes_of_its_messages(role: str, name: str, part: str) -> None:
     type_hash = f"RIHS01_{'1' * 64}"
     place = f"rq{name}{part}Request"
     answer = {

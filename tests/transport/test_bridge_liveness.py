@@ -61,7 +61,7 @@ def test_no_answer_is_silence_after_its_limit() -> None:
     assert silence.silent
 
 
-def test_nothing_was_asked_is_no_silence() -> None:
+def test_bridge_without_a_query_is_not_silent() -> None:
     """A server that stood still has not asked in the meantime."""
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
@@ -69,7 +69,7 @@ def test_nothing_was_asked_is_no_silence() -> None:
     assert not silence.silent
 
 
-def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
+def test_silence_ends_with_timely_replies_to_later_queries() -> None:
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     for n in range(20):
@@ -178,7 +178,7 @@ def test_silence_is_reported_and_its_end() -> None:
     run(test)
 
 
-def test_another_bridge_is_not_the_silent_one() -> None:
+def test_reply_of_another_bridge_does_not_end_the_silence() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         line.answers = False
         await until(lambda: not robot.is_responding)

@@ -108,7 +108,7 @@ def test_published_message_is_never_dropped_for_its_stamp(inbox: Inbox) -> None:
         assert inbox.drain().samples["permit"].payload == b"%d" % time
 
 
-def test_what_a_cache_has_counts_until_its_source_publishes(inbox: Inbox) -> None:
+def test_cached_sample_counts_until_its_source_publishes(inbox: Inbox) -> None:
     inbox.put_cached("heard", b"cached", Sent(9.0))
     assert inbox.drain().samples["heard"].payload == b"cached"
     inbox.put("heard", b"new", Sent(2.0))
@@ -118,7 +118,7 @@ def test_what_a_cache_has_counts_until_its_source_publishes(inbox: Inbox) -> Non
     assert inbox.drain().samples["heard"].payload == b"of another bridge"
 
 
-def test_what_a_cache_has_without_a_stamp_counts_before_anything_is_published(inbox: Inbox) -> None:
+def test_cached_sample_without_a_stamp_counts_before_any_publication(inbox: Inbox) -> None:
     inbox.put_cached("heard", b"cached", None)
     assert inbox.drain().samples["heard"].payload == b"cached"
     inbox.put("heard", b"new", None)
@@ -146,7 +146,7 @@ def test_of_a_lossless_topic_each_change_in_between_is_kept(inbox: Inbox) -> Non
     assert sample.skipped_payloads[-1].at <= sample.at
 
 
-def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) -> None:
+def test_overflow_of_changes_is_reported(inbox: Inbox) -> None:
     for number in range(UNSEEN_MOST + 1):
         inbox.put("permit", b"%d" % number, None)
     assert not inbox.drain().samples["permit"].overrun
@@ -176,7 +176,7 @@ def test_of_a_recorded_topic_every_sample_is_kept_in_order(inbox: Inbox) -> None
     assert list(inbox.drain().kept) == []
 
 
-def test_what_is_kept_of_recorded_topics_is_bounded_by_its_number_and_its_bytes(inbox: Inbox) -> None:
+def test_recorded_samples_are_bounded_in_number_and_bytes(inbox: Inbox) -> None:
     for number in range(KEPT_MOST + 10):
         inbox.put("taped", b"%d" % number, None)
     kept = list(inbox.drain().kept)
@@ -187,7 +187,7 @@ def test_what_is_kept_of_recorded_topics_is_bounded_by_its_number_and_its_bytes(
     assert len(list(inbox.drain().kept)) == 4
 
 
-def test_of_a_session_that_was_nothing_comes_in(inbox: Inbox) -> None:
+def test_samples_of_a_closed_session_are_dropped(inbox: Inbox) -> None:
     old = inbox.guarded(lambda said: inbox.put("heard", said, None))
     inbox.put("heard", b"", None)
     inbox.transport("z", True)

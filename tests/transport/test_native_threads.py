@@ -27,7 +27,7 @@ while not link.drain().samples:
 """
 
 
-def test_an_attached_thread_keeps_what_is_its_own(peer: tuple[str, zenoh.Session]) -> None:
+def test_attached_thread_keeps_its_state(peer: tuple[str, zenoh.Session]) -> None:
     endpoint, there = peer
     own = threading.local()
     kept: dict[int, list[bool]] = {}

@@ -73,7 +73,7 @@ def test_an_answer_is_not_older_than_that() -> None:
 
 
 @pytest.mark.real_time
-def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_no_other() -> None:
+def test_missing_reply_takes_a_second_and_a_leaving_waiter_stops_no_other() -> None:
     async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
         bridges.asleep = True
         began = asyncio.get_running_loop().time()

@@ -107,7 +107,7 @@ def test_a_link_says_where_it_connects(connect: str, endpoints: tuple[str, ...])
     link.close()
 
 
-def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
+def test_session_is_renewed_while_samples_arrive(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     """A token that ended under the link's lock, while Zenoh called back, stopped the process."""
@@ -204,7 +204,7 @@ async def send_query(link: ZenohSession) -> None:
     link.query("b", b"", 0.1).cancel()
 
 
-def test_nothing_is_left_of_the_sessions_that_were(linked: Linked) -> None:
+def test_closed_sessions_leave_no_objects(linked: Linked) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
     link = linked(declared(["a"], ["b"]))
 
@@ -219,9 +219,7 @@ def test_nothing_is_left_of_the_sessions_that_were(linked: Linked) -> None:
     until(lambda: files() <= before, f"no more files than {before}")
 
 
-def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
-    peer: tuple[str, zenoh.Session], linked: Linked
-) -> None:
+def test_new_session_declares_tokens_again(peer: tuple[str, zenoh.Session], linked: Linked) -> None:
     _, session = peer
     link = linked(declared([], []))
     link.declare_tokens(tokens(link.zid, 1))
@@ -296,7 +294,7 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
     assert heard == [b"true", *(b"false%d" % n for n in range(25))]
 
 
-def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_it_heard(
+def test_late_link_gets_the_last_cached_value_and_no_older_sample(
     peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
     _, session = peer

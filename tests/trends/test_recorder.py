@@ -86,7 +86,7 @@ def test_several_fields_of_a_topic_are_read_together() -> None:
 
 
 @pytest.mark.parametrize("cut", ["link", "bridge", "another bridge", "unreadable", "nan"])
-def test_what_is_not_known_is_a_gap(cut: str) -> None:
+def test_unknown_value_is_a_gap(cut: str) -> None:
     async def work() -> None:
         cell = Recorded(panel_of(TREND))
         cell.says(1.0)
@@ -124,7 +124,9 @@ def test_a_flood_is_decoded_in_slices() -> None:
     run(work())
 
 
-def test_what_waits_has_an_end_and_what_was_left_out_is_a_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waiting_samples_are_bounded_and_dropped_samples_are_a_gap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     async def work() -> None:
         cell = Recorded(panel_of(TREND))
         for number in range(15):
@@ -138,7 +140,7 @@ def test_what_waits_has_an_end_and_what_was_left_out_is_a_gap(monkeypatch: pytes
     run(work())
 
 
-def test_what_is_old_goes_while_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_samples_are_removed_while_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     async def work() -> None:
         cell = Recorded(panel_of(TREND))
         for number in range(2_000):
@@ -151,7 +153,7 @@ def test_what_is_old_goes_while_recording(monkeypatch: pytest.MonkeyPatch) -> No
     run(work())
 
 
-def test_at_the_end_what_waits_is_decoded() -> None:
+def test_waiting_samples_are_decoded_at_shutdown() -> None:
     async def work() -> None:
         cell = Recorded(panel_of(TREND))
         cell.says(1.0)

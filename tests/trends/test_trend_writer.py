@@ -78,7 +78,7 @@ def killed_while_writing(folder: Path, copy: Path) -> Path:
 
 
 @pytest.mark.parametrize("torn", [1, 100, 4_000, 4_100])
-def test_a_torn_end_is_dropped_and_what_was_before_it_stays(tmp_path: Path, torn: int) -> None:
+def test_torn_end_is_dropped_and_earlier_samples_stay(tmp_path: Path, torn: int) -> None:
     wal = killed_while_writing(tmp_path / "a", tmp_path / "b")
     wal.write_bytes(wal.read_bytes()[:-torn])
     file = TrendFile(tmp_path / "b")
@@ -158,7 +158,7 @@ def test_restart_finds_the_stored_history(tmp_path: Path) -> None:
     run(work())
 
 
-def test_what_grows_is_written_while_it_grows(tmp_path: Path) -> None:
+def test_growing_bucket_is_written_while_it_grows(tmp_path: Path) -> None:
     """A kill takes what is newer than the last transaction, whatever bucket it is in."""
 
     async def work() -> None:
@@ -176,7 +176,7 @@ def test_what_grows_is_written_while_it_grows(tmp_path: Path) -> None:
     run(work())
 
 
-def test_a_damaged_file_is_kept_beside_a_new_one(
+def test_damaged_file_is_kept_beside_a_new_file(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def work() -> None:

@@ -81,7 +81,7 @@ def test_the_guide_adds_files_and_rows() -> None:
     ]
 
 
-def test_what_a_new_kind_shows_is_in_events_in_the_snapshot_and_on_the_page(kiosk: Server) -> None:
+def test_values_of_a_new_kind_are_in_events_snapshot_and_page(kiosk: Server) -> None:
     shown = "one\ntwo\nthree (/operation1)"
     with kiosk.stream() as stream:
         _, data, _ = stream.next("snapshot")

@@ -25,7 +25,7 @@ def subscribed() -> tuple[RobotState, Camera, CameraTopicState]:
     return robot, widget, received
 
 
-def test_nothing_is_known_while_no_page_shows_it() -> None:
+def test_camera_is_unknown_while_no_page_shows_it() -> None:
     robot, widget, _ = subscribed()
     robot.camera_topics.clear()
     assert shown(robot, widget, RECEIVED) == ("waiting", "camera_waiting", float("inf"))

@@ -205,7 +205,7 @@ def test_a_lamp_of_a_bool_or_a_text() -> None:
         ),
     ],
 )
-def test_a_lamp_that_is_not_known_now_has_no_colour_and_a_shape_of_its_own(
+def test_unknown_lamp_has_no_colour_and_its_own_shape(
     more: dict[str, Any], state: str, text: str, shape: str, note: str
 ) -> None:
     fields = more.pop("fields", {"data": 2})

@@ -95,7 +95,7 @@ def test_limits_are_in_the_unit_that_is_shown() -> None:
         (math.nan, NOW, "unreadable", "—", "the value is not a number (NaN)"),
     ],
 )
-def test_what_is_not_known_now_has_no_level(
+def test_unknown_gauge_has_no_level(
     value: float | None, now: float, state: str, text: str, note: str
 ) -> None:
     view = shown(value, now=now)

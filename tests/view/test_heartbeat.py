@@ -33,7 +33,7 @@ class Beating:
         await self.woken.wait()
 
 
-def test_it_says_the_time_and_has_no_id() -> None:
+def test_heartbeat_has_the_time_and_no_id() -> None:
     before = clock.server_now()
     ((name, data, event_id),) = events_in(beat().decode())
     beats = json.loads(data)

@@ -97,7 +97,7 @@ def test_old_joints_have_no_level() -> None:
     assert (view["joint_values"], view["joint_levels"]) == (["+180.0", "+500.0"], ["", ""])
 
 
-def test_nothing_was_received() -> None:
+def test_joints_without_a_message_wait() -> None:
     panel = panel_of(JOINTS)
     view = english(build_view(panel, robot_there(panel), NOW).view["widgets"]["arm"])
     assert (view["state"], view["note"]) == ("waiting", "waiting for /joint_states")

@@ -148,7 +148,7 @@ def test_a_value_that_is_waited_for_locks_by_the_node() -> None:
     assert link["node"]["state"] == "ok"
 
 
-def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
+def test_lock_by_the_robot_is_no_fault_of_a_link() -> None:
     panel = cell()
     robot = robot_there(panel)
     endpoint(robot, "MP", ENABLED, BOOL)
@@ -185,7 +185,7 @@ def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
     assert {lamp["reason"] for lamp in view["link"].values()} == {""}
 
 
-def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
+def test_lock_by_the_log_is_no_fault_of_a_link() -> None:
     panel = cell()
     link = links_of(panel, robot_there(panel), log_lock="The disk is full.")
     assert {lamp["locks"] for lamp in link.values()} == {LOCKS_NOTHING}
@@ -226,7 +226,7 @@ def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
     assert links_of(panel, robot, NOW + 2)["node"]["text"] == say("link_node_silent")
 
 
-def test_the_node_is_not_blamed_for_what_its_bridge_or_a_type_keeps_back() -> None:
+def test_node_is_not_faulted_for_its_bridge_or_a_type() -> None:
     panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
     permits(robot)
@@ -304,7 +304,7 @@ def test_a_qos_that_does_not_match_is_the_nodes() -> None:
     assert link["node"]["reason"] == say("qos_robot_best_effort", topic=ENABLED)
 
 
-def test_what_the_bridge_does_not_pass_on_is_the_bridges() -> None:
+def test_unforwarded_topic_is_a_fault_of_the_bridge() -> None:
     panel = cell()
     verdicts = {"free": PERMITTED, "guarded": Verdict(False, "topic_not_forwarded", "Not passed on.")}
     link, until = link_statuses(panel, robot_there(panel), PERMITTED, verdicts, NOW)

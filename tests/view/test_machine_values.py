@@ -50,9 +50,7 @@ def until(panel: Panel, robot: RobotState, now: float) -> float:
     return build_view(panel, robot, now).displays[STATE_ID]
 
 
-def test_before_the_robot_reports_its_state_there_is_no_colour_and_no_word_of_it(
-    panel: Panel, robot: RobotState
-) -> None:
+def test_unreported_machine_state_has_no_colour_and_no_word(panel: Panel, robot: RobotState) -> None:
     attributes = shown(panel, robot)
     assert (attributes["state"], attributes["shape"], attributes["colour"]) == (
         "waiting", "waiting", "none",
@@ -60,9 +58,7 @@ def test_before_the_robot_reports_its_state_there_is_no_colour_and_no_word_of_it
     assert attributes["detail0"] == "Order —"
 
 
-def test_the_state_and_what_stands_beside_it_are_those_of_the_robot(
-    panel: Panel, robot: RobotState
-) -> None:
+def test_machine_state_and_its_details_are_the_robots(panel: Panel, robot: RobotState) -> None:
     reports(robot, "FAULT")
     says(robot, "/cell/order", "4711")
     attributes = shown(panel, robot)
@@ -70,9 +66,7 @@ def test_the_state_and_what_stands_beside_it_are_those_of_the_robot(
     assert (attributes["detail0"], attributes["detail1"]) == ("Order 4711", "")
 
 
-def test_how_long_it_has_lasted_is_known_from_the_first_change_on(
-    panel: Panel, robot: RobotState
-) -> None:
+def test_duration_of_the_state_is_known_from_the_first_change(panel: Panel, robot: RobotState) -> None:
     reports(robot, "RUNNING")
     assert shown(panel, robot, NOW + 5)["since"] == ""
     reports(robot, "FAULT", at=NOW + 10, seq=2)
@@ -84,9 +78,7 @@ def test_how_long_it_has_lasted_is_known_from_the_first_change_on(
     assert until(panel, robot, NOW + 100) == pytest.approx(NOW + 130)
 
 
-def test_after_a_cut_it_is_not_known_how_long_the_state_has_lasted(
-    panel: Panel, robot: RobotState
-) -> None:
+def test_duration_of_the_state_is_unknown_after_a_cut(panel: Panel, robot: RobotState) -> None:
     for seq, word in enumerate(("RUNNING", "FAULT"), 1):
         reports(robot, word, seq=seq)
     assert shown(panel, robot)["since"] == "for 0 s"

@@ -88,7 +88,7 @@ def test_the_words_of_a_list_of_bools_are_those_of_any_language() -> None:
         assert check_value(doors, known, text) == (True, False)
 
 
-def test_a_robots_name_is_in_the_language_of_who_reads_it() -> None:
+def test_robots_name_is_in_the_readers_language() -> None:
     panel = panel_of(
         FREE,
         robot=[{"id": "left", "name": {"en": "Left arm", "de": "Linker Arm"}, "namespace": "/left"}],

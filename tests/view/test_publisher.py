@@ -194,7 +194,7 @@ def test_no_text_of_the_robots_breaks_the_stream(
         assert len(sent.decode().splitlines()) == sent.count(b"\n")
 
 
-def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
+def test_complete_events_are_encoded_once_for_all_streams(
     publisher: ViewPublisher, robot: RobotState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     views = [publisher.view]
@@ -220,7 +220,7 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
     assert len(encoded) == 5  # the permission and the links once, the widgets for each
 
 
-def test_each_language_has_events_of_its_own_encoded_once(
+def test_events_of_each_language_are_encoded_once(
     publisher: ViewPublisher, robot: RobotState, tmp_path: Path
 ) -> None:
     (tmp_path / "de.po").write_text('msgid "locks_nothing"\nmsgstr "Sperrt nichts."\n')

@@ -133,7 +133,7 @@ def test_every_stamp_has_a_text(sec: int, nanosec: int, style: str) -> None:
     assert shown(STAMPED, fields, field="stamp", format=style)[0]
 
 
-def test_the_edges_of_what_is_written_are_dates() -> None:
+def test_first_and_last_possible_times_are_dates() -> None:
     for at, year in ((EARLIEST, "1000"), (LATEST, "9999")):
         assert render(time_text("time", at, WALL)[0], "de").split()[0].endswith(year)
     for beyond in (EARLIEST - 1, LATEST + 1):

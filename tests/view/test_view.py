@@ -163,7 +163,7 @@ def test_the_lights_show_how_far_the_way_goes(
         ("MP", "/other", False),
     ],
 )
-def test_a_node_is_one_that_the_panel_talks_with(
+def test_only_nodes_that_the_panel_uses_count_as_the_node(
     robot: RobotState, role: Any, topic: str, present: bool
 ) -> None:
     endpoint(robot, role, topic, BOOL)
@@ -225,7 +225,7 @@ def test_a_readout_of_a_topic_of_another_type_says_so(robot: RobotState) -> None
     assert str(shown["note"]).startswith("/heard is std_msgs/msg/Bool on the robot")
 
 
-def test_what_was_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> None:
+def test_value_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> None:
     robot.update("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.mark_peer_lost(BRIDGE, 2)
     assert heard(robot)[0]["state"] == "waiting"
@@ -298,7 +298,7 @@ def test_a_view_that_time_does_not_change_needs_no_timer(robot: RobotState) -> N
     assert build_view(PANEL, robot, NOW).until == math.inf
 
 
-def test_joining_shows_again_when_it_is_over(robot: RobotState) -> None:
+def test_view_is_due_when_joining_ends(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
     assert build_view(PANEL, robot, NOW).until == NOW + 1
 

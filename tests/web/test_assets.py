@@ -54,7 +54,7 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
     [((), False), (("publish", "hold", "readout", "indicator"), False)]
     + [((kind,), True) for kind in ("text", "number", "slider", "select", "toggle", "parameter")],
 )
-def test_the_stylesheet_has_what_the_panels_widgets_need(
+def test_stylesheet_has_the_rules_of_the_panels_widgets(
     static: Path, templates: Path, kinds: tuple[str, ...], needed: bool
 ) -> None:
     sent = loaded(static, templates, 0.25, *kinds).files["kiosk.css"].content.decode()

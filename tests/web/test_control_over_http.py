@@ -249,7 +249,7 @@ def test_a_form_is_read_as_that_of_a_press_is(client: Callable[..., Client], bod
     assert answer.status_code == 422
 
 
-def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Client]) -> None:
+def test_act_touched_long_ago_is_refused(client: Callable[..., Client]) -> None:
     """A server that stood still takes in later what was touched in the meantime."""
     late = client()
     long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
@@ -424,7 +424,7 @@ def test_unknown_control_act_is_refused_with_a_reason(client: Callable[..., Clie
     assert ann.http.get("/control/take").status_code == 405
 
 
-def test_forms_lead_back_to_their_page_with_what_was_refused(client: Callable[..., Client]) -> None:
+def test_refused_form_returns_to_its_page_with_the_reason(client: Callable[..., Client]) -> None:
     ann, bob = client("192.0.2.1"), client("192.0.2.2")
     done = ann.http.post("/control/take", data={"to": "", "page": "operation"})
     assert (done.status_code, done.headers["location"]) == (303, "/pages/operation")

@@ -55,7 +55,7 @@ def test_a_choice_is_kept_and_goes_back_to_its_page(kiosk: Server) -> None:
     assert {"kiosk_theme=contrast", f"max-age={KEPT_S}", "path=/", "samesite=strict"} <= kept
 
 
-def test_what_is_no_choice_is_ignored_and_the_others_are_kept(kiosk: Server) -> None:
+def test_invalid_choice_is_ignored_and_others_are_kept(kiosk: Server) -> None:
     form = {"theme": "neon", "text_size": "large", "font": "Comic", "hand": ""}
     answer = kiosk.http.post("/display", data=form)
     assert answer.status_code == 303
@@ -78,7 +78,7 @@ def test_what_is_no_choice_is_ignored_and_the_others_are_kept(kiosk: Server) -> 
         ("/pages/../log", "/"),
     ],
 )
-def test_it_leads_to_no_page_but_the_panels_own(kiosk: Server, page: str, goes_to: str) -> None:
+def test_form_redirects_to_the_panels_pages_only(kiosk: Server, page: str, goes_to: str) -> None:
     answer = kiosk.http.post("/display", data={"page": page, "hand": "left"})
     assert (answer.status_code, answer.headers["location"]) == (303, goes_to)
 
@@ -95,7 +95,7 @@ def test_invalid_form_is_refused(kiosk: Server) -> None:
     assert kiosk.http.post("/display", content=b"\xff=1").status_code == 422
 
 
-def test_the_menu_shows_what_is_chosen(kiosk: Server) -> None:
+def test_menu_shows_the_chosen_values(kiosk: Server) -> None:
     html = kiosk.http.get("/pages/operation", headers={"cookie": "kiosk_hand=left"}).text
     pressed = re.findall(r'<button name="(\w+)" value="(\w+)" aria-pressed="true">', html)
     assert pressed == [

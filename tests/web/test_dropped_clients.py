@@ -168,7 +168,7 @@ def test_a_broken_frame_closes_the_socket_and_is_not_logged(
 NO_REQUESTS: Final = (b"\x16\x03\x01\x02\x00\x01", b"GET /\xff HTTP/1.1\r\n\r\n", b"a b c\r\n\r\n")
 
 
-def test_what_is_no_request_and_no_text_is_one_line_each(cell: Server) -> None:
+def test_invalid_request_and_invalid_text_are_one_log_line_each(cell: Server) -> None:
     def act() -> None:
         for data in NO_REQUESTS * 10:
             with connected(cell) as client:

@@ -105,7 +105,7 @@ def run(work: Callable[[], Awaitable[None]]) -> None:
     asyncio.run(whole())
 
 
-def test_it_begins_with_a_snapshot_and_a_beat_and_goes_on_with_changes() -> None:
+def test_stream_begins_with_a_snapshot_and_a_heartbeat_then_changes() -> None:
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (client, _):
@@ -175,7 +175,7 @@ def test_a_browser_that_goes_leaves_nothing_behind() -> None:
     run(work)
 
 
-def test_the_end_of_the_board_ends_it() -> None:
+def test_end_of_the_publisher_ends_the_stream() -> None:
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (client, task):
@@ -202,7 +202,7 @@ def test_failed_stream_ends_and_is_logged(monkeypatch: pytest.MonkeyPatch) -> No
     run(work)
 
 
-def test_its_body_goes_past_the_layers_and_its_begin_through_them() -> None:
+def test_streams_body_bypasses_the_middleware_and_its_head_passes_it() -> None:
     async def work() -> None:
         bench = Bench()
         client = Client()

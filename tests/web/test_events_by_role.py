@@ -78,7 +78,7 @@ class Room:
         return client
 
 
-def test_the_server_locks_for_who_has_no_control_and_unlocks_with_it() -> None:
+def test_client_without_control_is_locked_and_unlocked_with_control() -> None:
     async def work() -> None:
         room = Room()
         async with AsyncExitStack() as until:

@@ -28,7 +28,7 @@ def test_every_widget_kind_is_in_the_gallery() -> None:
     assert {example.kind for example in EXAMPLES} == set(KINDS)
 
 
-def test_roles_states_shapes_and_colours_are_in_it() -> None:
+def test_gallery_has_all_roles_states_shapes_and_colours() -> None:
     """What a role, a lamp or a display may be has an example."""
     assert {example.table.get("role", "neutral") for example in EXAMPLES} | {"hold"} == {
         *get_args(KeyRole)
@@ -44,7 +44,7 @@ def test_roles_states_shapes_and_colours_are_in_it() -> None:
         }
 
 
-def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
+def test_gallery_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     plain = server.http.get("/gallery")
     assert plain.status_code == 200
     assert len(re.findall("data-widget=", plain.text)) == len(EXAMPLES)
@@ -55,7 +55,7 @@ def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     assert 'href="?theme=contrast&amp;text_size=large&amp;hand=right&amp;sounds=off"' in large
 
 
-def test_it_reads_in_the_language_of_the_cookie(server: Server) -> None:
+def test_gallery_is_in_the_language_of_the_cookie(server: Server) -> None:
     """What an operator would read does; the names of the states are a developer's."""
     lock = {
         "en": "Close guard door 1",

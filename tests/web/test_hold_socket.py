@@ -179,7 +179,7 @@ def test_hold_can_be_released_before_the_first_response(demo: Server) -> None:
         assert said["code"] == "hold_released"
 
 
-def test_who_lets_go_before_a_hold_begins_gets_the_answer_that_it_did_not(demo: Server) -> None:
+def test_release_before_a_hold_begins_is_answered_with_not_started(demo: Server) -> None:
     with opened(demo) as socket:
         socket.say(do="end", why="released")
         said = socket.hear()
@@ -266,7 +266,7 @@ def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
 
 
 @pytest.mark.real_time
-def test_who_lets_go_while_the_entry_is_written_holds_nothing(prompt: Server) -> None:
+def test_release_while_the_entry_is_written_starts_no_hold(prompt: Server) -> None:
     """The disk takes the entry only after the finger was lifted."""
     for _ in range(TRIES):
         with opened(prompt) as socket:

@@ -38,7 +38,7 @@ def test_widgets_stand_where_the_template_places_them(server: Server, folder: Pa
     assert server.http.get(picture[1]).text == (folder / "pictures/cell.svg").read_text()
 
 
-def test_its_styles_are_the_last_of_the_stylesheet(server: Server, folder: Path) -> None:
+def test_styles_of_a_page_template_are_last_in_the_stylesheet(server: Server, folder: Path) -> None:
     sheet = re.search('href="(/static/[^"]+/kiosk.css)"', server.http.get("/").text)
     assert sheet is not None
     assert server.http.get(sheet[1]).text.endswith((folder / "plan.css").read_text())

@@ -129,7 +129,7 @@ def test_a_form_is_read_in_the_language_of_its_page(kiosk: Server) -> None:
     assert refused.status_code == 422
 
 
-def test_what_is_asked_without_scripts_has_the_readers_sign(kiosk: Server) -> None:
+def test_confirmation_without_scripts_has_the_readers_decimal_sign(kiosk: Server) -> None:
     html = kiosk.http.post("/widgets/asked", data={"limit": "0,5"}, headers=read_by("de")).text
     assert "<dt>Grenze</dt><dd>0,5</dd>" in html
     assert '<button class="yes">Erst fragen</button>' in html
@@ -172,7 +172,7 @@ def test_a_choice_in_the_menu_is_kept(kiosk: Server) -> None:
     assert "set-cookie" not in unknown.headers
 
 
-def test_what_no_person_reads_has_the_panels_own_language(kiosk: Server) -> None:
+def test_machine_readable_texts_are_in_the_panels_language(kiosk: Server) -> None:
     german = {"accept-language": "de"}
     assert "Zelle" not in kiosk.http.get("/metrics", headers=german).text
     assert "Zelle" not in kiosk.http.get("/openapi.json", headers=german).text

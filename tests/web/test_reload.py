@@ -118,7 +118,7 @@ def checkout(tmp_path: Path) -> Iterator[Checkout]:
     mine.server.end(signal.SIGINT)
 
 
-def test_an_open_browser_shows_what_is_saved_or_its_fault(checkout: Checkout, page: Page) -> None:
+def test_open_browser_shows_the_saved_panel_or_its_fault(checkout: Checkout, page: Page) -> None:
     page.goto(checkout.server.url)
     check_panels_fault(checkout, page)
     checkout.edit(PANEL, *reversed(FAULT))

@@ -188,7 +188,7 @@ def test_every_answer_has_the_security_headers(host: str) -> None:
 
 
 @pytest.mark.parametrize("media_type", ["text/css", "text/javascript", "text/event-stream"])
-def test_what_is_no_document_has_those_that_are_not_about_documents(media_type: str) -> None:
+def test_responses_that_are_not_documents_have_the_general_security_headers(media_type: str) -> None:
     headers = answer_to("GET", "/", OWN, PlainTextResponse("in", media_type=media_type)).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["cross-origin-resource-policy"] == "same-origin"
@@ -222,7 +222,7 @@ def test_an_origin_that_is_none_is_refused(origin: str) -> None:
 
 
 @pytest.mark.parametrize("host", ["[::1", "[::1]evil.com", "localhost:80@evil", "localhost:"])
-def test_what_only_begins_like_a_name_of_the_panel_is_refused(host: str) -> None:
+def test_host_that_only_begins_like_an_allowed_name_is_refused(host: str) -> None:
     assert not let_in("GET", "/", {"host": host})
 
 

@@ -60,7 +60,7 @@ def test_demo_mode_shows_its_banner_on_every_page(demo: Server) -> None:
     assert demo.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
 
 
-def test_the_demo_robot_answers_with_what_it_heard(demo: Server) -> None:
+def test_demo_robot_publishes_the_text_that_it_received(demo: Server) -> None:
     assert demo.press("operation", "hello <b>").json()["outcome"] == "published"
     until(lambda: "hello <b>" in demo.widget("last_heard")["text"], "it is shown")
     html = demo.http.get("/").text
@@ -115,7 +115,7 @@ def test_the_same_id_is_the_same_press_whatever_way_it_comes(demo: Server) -> No
     assert demo.process.count("press one-press of") == 1
 
 
-def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -> None:
+def test_version_seen_before_a_restart_does_not_count(demo: Server, way: str) -> None:
     demo, own_id = demo.by(way), f"old-page-{way}"
     refused = demo.press("operation", "from an old page", seen="deadbeef-7", id=own_id)
     again = demo.press("operation", "from an old page", seen="deadbeef-7", id=own_id)
@@ -219,7 +219,7 @@ def test_a_large_body_is_refused(demo: Server) -> None:
         assert press_socket.closed() == 1009
 
 
-def test_it_listens_on_one_address_of_this_machine_alone(demo: Server) -> None:
+def test_server_listens_on_loopback_only(demo: Server) -> None:
     socket.create_connection(("127.0.0.1", demo.port)).close()
     for other in ("127.0.0.2", "::1"):
         with pytest.raises(OSError, match=r"refused|assign"):
@@ -331,7 +331,7 @@ def test_silent_peer_does_not_delay_shutdown(tmp_path: Path) -> None:
         taken.close()
 
 
-def test_it_leaves_what_stands_still_at_its_end_and_says_where() -> None:
+def test_shutdown_abandons_hung_threads_and_logs_where() -> None:
     mine = Server(ROOT, app="tests.support.apps.standing:app")
     assert mine.end(signal.SIGTERM, timeout_s=ENOUGH_S) == 1
     assert "Timeout (0:00:05)!" in mine.process.text
@@ -393,7 +393,7 @@ def test_head_request_of_a_stream_ends_at_once(demo: Server, path: str) -> None:
     assert "Traceback" not in demo.process.text
 
 
-def test_what_only_takes_posts_or_gets_says_so(demo: Server) -> None:
+def test_wrong_method_gets_405_with_the_allowed_methods(demo: Server) -> None:
     for method, path, allowed in (("HEAD", "/widgets/operation", "POST"), ("POST", "/", "GET, HEAD")):
         answer = demo.http.request(method, path)
         assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
@@ -443,7 +443,7 @@ def test_a_wrong_setting_is_named() -> None:
     assert 'KIOSK_MODE is "simulated"' in done.stderr
 
 
-def test_the_demo_robot_as_a_program_of_its_own_can_not_be_mistaken(
+def test_separate_demo_robot_is_marked_as_simulated(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"

@@ -261,13 +261,13 @@ def test_silent_connections_give_way_to_their_own_client(hasty: Server, address:
                 assert client.recv(65_536).startswith(b"HTTP/1.1 200 ")
 
 
-def test_it_takes_the_files_that_it_may(servers: Callable[[Server], Server]) -> None:
+def test_server_raises_its_file_limit(servers: Callable[[Server], Server]) -> None:
     mine = servers(Server(ROOT, before=["prlimit", "--nofile=300:8000"]))
     limits = Path(f"/proc/{mine.process.pid}/limits").read_text()
     assert re.search(rf"Max open files\s+{FILES_WANTED}\s+8000\s", limits)
 
 
-def test_what_is_tighter_stays() -> None:
+def test_tighter_file_limit_stays() -> None:
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
         raise AssertionError("it is not called")
 
@@ -336,7 +336,7 @@ def test_a_named_proxy_is_believed(servers: Callable[[Server], Server]) -> None:
         ("127.0.0.1", "", "127.0.0.1"),
     ],
 )
-def test_what_a_proxy_says_is_at_the_cell_only_where_the_proxy_is(
+def test_client_behind_a_proxy_is_at_the_cell_only_if_the_proxy_is(
     peer: str, forwarded: str, client: str
 ) -> None:
     addresses: list[str] = []
@@ -379,7 +379,7 @@ def test_a_port_in_use_is_one_sentence(plain: Server, tmp_path: Path) -> None:
     assert f"can't listen on 127.0.0.1 port {plain.port}: another program does, perhaps" in said
 
 
-def test_the_start_says_what_it_uses_and_where_it_is(servers: Callable[[Server], Server]) -> None:
+def test_start_logs_the_used_files_and_the_address(servers: Callable[[Server], Server]) -> None:
     panel = REFERENCE
     mine = servers(Server(ROOT, KIOSK_MODE="live"))
     until(

@@ -35,7 +35,7 @@ class Handled:
         return asyncio.ensure_future(self.turns(scope, nothing, unsent))
 
 
-def test_presses_and_the_kiosk_go_before_what_others_read() -> None:
+def test_presses_and_the_kiosk_are_served_before_other_readers() -> None:
     async def serve() -> list[str]:
         handled = Handled()
         other = "192.0.2.1"

@@ -31,11 +31,11 @@ from tests.support.builders import INTERFACES
         ([], None),
     ],
 )
-def test_the_period_is_known_of_what_is_regular(arrivals: list[float], period_s: float | None) -> None:
+def test_period_is_known_of_regular_topics_only(arrivals: list[float], period_s: float | None) -> None:
     assert Heard(arrivals=arrivals).period_s == (period_s and pytest.approx(period_s))
 
 
-def test_of_a_latched_topic_one_message_is_enough() -> None:
+def test_one_message_is_enough_for_a_latched_topic() -> None:
     assert Heard(message=True).is_enough(latched=True)
     assert not Heard(message=True, arrivals=[1.0]).is_enough(latched=False)
     assert Heard(message=True, arrivals=[1.0, 2.0, 3.0]).is_enough(latched=False)

@@ -75,16 +75,16 @@ def test_a_graph_that_is_whole_is_read_once_more() -> None:
     ],
     ids=["no topic", "another topic comes", "none is passed on yet", "one is not passed on yet"],
 )
-def test_what_is_still_to_come_is_waited_for(early: GraphSnapshot) -> None:
+def test_incomplete_graph_is_waited_for(early: GraphSnapshot) -> None:
     assert settled(early, WHOLE)[0] == WHOLE
 
 
-def test_what_the_bridges_file_holds_back_is_not_waited_for() -> None:
+def test_denied_topics_are_not_waited_for() -> None:
     graph = graph_of(topic("/a"), topic("/b", announced=False), deny={"publishers": "/b"})
     assert settled(graph) == (graph, 1)
 
 
-def test_what_never_comes_is_waited_for_no_longer_than_told() -> None:
+def test_wait_for_a_missing_endpoint_ends_at_the_limit() -> None:
     graph = graph_of(topic("/a", announced=False))
     assert settled(graph, within_s=0.02)[0] == graph
 
