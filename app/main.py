@@ -43,8 +43,8 @@ from app.web.proxies import Proxies
 from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
 from app.web.root_path import RootPath, root_path_of
-from app.web.routes import audit_log as log_routes
 from app.web.routes import (
+    alarms,
     control,
     description,
     display,
@@ -60,6 +60,7 @@ from app.web.routes import (
     static,
     trends,
 )
+from app.web.routes import audit_log as log_routes
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, urls
@@ -124,7 +125,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    for routes in (*ROBOT_ROUTES, static, health, display, description):
+    for routes in (*ROBOT_ROUTES, alarms, static, health, display, description):
         app.include_router(routes.router)
     if dev:
         _add_gallery(app)

@@ -40,17 +40,17 @@ Act = Callable[[AlarmStatus, Definition], ActResult]
 
 
 class AlarmEngine:
-    """`robots` are by their ids, "" for the only one without an id. `on_transitions` is called with the
-    transitions of an evaluation or an act."""
+    """Its robots are added one by one. `on_transitions` is called with the transitions of an evaluation
+    or an act."""
 
     def __init__(
         self,
         panel: Panel,
-        robots: Mapping[str, RobotState],
         clock: Callable[[], Moment],
         on_transitions: Callable[[Sequence[Transition]], None],
     ) -> None:
-        self._robots = robots
+        self._panel = panel
+        self._robots: dict[str, RobotState] = {}
         self._clock = clock
         self._on_transitions = on_transitions
         self._began_at = clock().monotonic
@@ -58,13 +58,17 @@ class AlarmEngine:
         self._waiting: dict[str, None] = {}  # ids of alarms to be evaluated, in order
         self._timers: list[tuple[float, str]] = []  # a heap; an alarm's own `due` is what counts
         self._by_topic: dict[tuple[str, str], list[str]] = {}
-        self._by_robot: dict[str, list[str]] = {robot: [] for robot in robots}
+        self._by_robot: dict[str, list[str]] = {}
         self._sources: dict[tuple[str, str], Definition] = {}  # (robot, alarm's id) → of its entries
         self._entries: dict[tuple[str, str], list[AlarmInstance]] = {}  # by the same
         self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
         self._refused = 0  # entries beyond `MAX_ENTRIES`
         self.alarms: dict[str, AlarmInstance] = {}
-        for definition in define(panel, tuple(robots)):
+
+    def add_robot(self, robot_id: str, robot: RobotState) -> None:
+        """Adds the alarms of a robot by its id, "" for the only one without an id."""
+        self._robots[robot_id], self._by_robot[robot_id] = robot, []
+        for definition in define(self._panel, robot_id):
             self._add(definition)
 
     def _add(self, definition: Definition) -> None:
@@ -75,8 +79,8 @@ class AlarmEngine:
             return
         self._keep(definition)
         if alarm.topic is not None:
-            key = self._robots[robot].key(alarm.topic)
-            self._by_topic.setdefault((robot, key), []).append(definition.id)
+            for key in self._robots[robot].possible_keys(alarm.topic):
+                self._by_topic.setdefault((robot, key), []).append(definition.id)
 
     def _keep(self, definition: Definition) -> AlarmInstance:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
@@ -110,8 +114,8 @@ class AlarmEngine:
         """The link to a robot, or its graph, has changed."""
         self._waiting.update(dict.fromkeys(self._by_robot[robot]))
 
-    def evaluate(self) -> None:
-        """Evaluates the alarms that wait, and those whose time has come."""
+    def evaluate(self, most: int = MAX_EVALUATED) -> None:
+        """Evaluates the alarms that wait, and those whose time has come: `most` of them."""
         now = self._clock()
         while self._timers and self._timers[0][0] <= now.monotonic:
             at, alarm_id = heapq.heappop(self._timers)
@@ -122,7 +126,7 @@ class AlarmEngine:
                 self._waiting[alarm_id] = None
             else:
                 self._set_timer(alarm)
-        turn = [alarm_id for alarm_id, _ in zip(self._waiting, range(MAX_EVALUATED), strict=False)]
+        turn = [alarm_id for alarm_id, _ in zip(self._waiting, range(most), strict=False)]
         for alarm_id in turn:
             del self._waiting[alarm_id]
         self._emit([t for alarm_id in turn for t in self._evaluated(self.alarms[alarm_id], now)])
@@ -166,7 +170,8 @@ class AlarmEngine:
         definition, before = alarm.definition, alarm.status
         reading = self._read(alarm, now.monotonic)
         status = expire(before, definition.rules, now)
-        levels, alarm.conditions = _levels(alarm, reading, now.monotonic)
+        levels, conditions = _levels(alarm, reading, now.monotonic)
+        alarm.set_conditions(conditions)
         for level in levels:
             status = update_level(status, definition.rules, level, now)
         alarm.status, alarm.value = status, reading.value if reading.is_known else alarm.value
@@ -223,7 +228,7 @@ class AlarmEngine:
             alarm = self.alarms.get(alarm_id) or self._restored_entry(alarm_id, record)
             if alarm is None:
                 missing.append(alarm_id)
-            else:
+            elif not alarm.status.occurrence:  # else it was raised before the disk was read
                 alarm.restore(status_in(record, now))
                 self._waiting[alarm_id] = None
         return missing

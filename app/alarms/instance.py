@@ -1,7 +1,7 @@
 """An alarm of one robot: its definition, and what is known of it now."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -32,12 +32,11 @@ class Definition:
         return replace(self, id=f"{self.id}:{entry.name}", rules=rules)
 
 
-def define(panel: Panel, robots: Sequence[str]) -> Iterator[Definition]:
-    """The definitions of all alarms of all robots."""
-    for robot in robots:
-        for alarm in panel.alarms:
-            if alarm.is_for(robot or None):
-                yield _define(alarm, robot)
+def define(panel: Panel, robot: str) -> Iterator[Definition]:
+    """The definitions of all alarms of a robot."""
+    for alarm in panel.alarms:
+        if alarm.is_for(robot or None):
+            yield _define(alarm, robot)
 
 
 def _define(alarm: Alarm, robot: str) -> Definition:
@@ -57,14 +56,15 @@ def _define(alarm: Alarm, robot: str) -> Definition:
 
 @dataclass(slots=True)
 class AlarmInstance:
-    """`value` is the last one of its field. `entry` is what the robot published, for diagnostics and
-    lists, and `heard_at` when. `due` is when time alone changes it, and
-    `timer` when the engine looks at that. All in monotonic seconds."""
+    """`value` is the last one of its field, `limit` the last limit that it exceeded. `entry` is what
+    the robot published, for diagnostics and lists, and `heard_at` when. `due` is when time alone
+    changes it, and `timer` when the engine looks at that. All in monotonic seconds."""
 
     definition: Definition
     status: AlarmStatus = NORMAL
     conditions: tuple[DelayedCondition, ...] = field(init=False)
     value: float | None = None
+    limit: float | None = None
     entry: AlarmEntry | None = None
     heard_at: float = -math.inf
     due: float = math.inf
@@ -72,6 +72,15 @@ class AlarmInstance:
 
     def __post_init__(self) -> None:
         self.conditions = (DelayedCondition(),) * len(self.definition.thresholds)
+
+    def set_conditions(self, conditions: tuple[DelayedCondition, ...]) -> None:
+        """Sets the conditions of its limits, and the limit of the highest level among those that are
+        exceeded."""
+        self.conditions = conditions
+        pairs = zip(self.definition.thresholds, conditions, strict=True)
+        exceeded = [limit for limit, condition in pairs if limit is not None and condition.active]
+        if exceeded:
+            self.limit = max(exceeded, key=self.level_of).value
 
     def restore(self, status: AlarmStatus) -> None:
         """Takes over the status of an earlier run, with what counted as met then."""

@@ -14,7 +14,7 @@ from app.i18n import Text, TextLike, text_in
 
 def record_of(alarm: AlarmInstance, now: Moment) -> str:
     """The JSON of an alarm: its status with times of the wall clock, and what the robot published."""
-    status, entry = alarm.status, alarm.entry
+    status, entry, described = alarm.status, alarm.entry, alarm.definition.alarm
     record: dict[str, Any] = {
         "state": status.state,
         "level": status.level,
@@ -26,16 +26,31 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
         "out_of_service": _taken_out(status.out_of_service, now),
         "suppressed_since": _wall(status.suppressed_since),
         "value": alarm.value if alarm.value is not None and abs(alarm.value) < 1e300 else None,
+        "about": {
+            "text": _as_json(alarm.text),
+            "action": _as_json(described.action or ""),
+            "group": _as_json(described.group or ""),
+            "priority": alarm.priority,
+            "unit": _as_json(described.unit),
+        },
     }
     if entry is not None:
         record["entry"] = {
             "name": entry.name,
             "level": entry.level,
-            "text": json.dumps(entry.text.as_json()) if isinstance(entry.text, Text) else entry.text,
-            "is_sentence": isinstance(entry.text, Text),
+            "text": _as_json(entry.text),
             "priorities": entry.priorities,
         }
     return json.dumps(record, ensure_ascii=False)
+
+
+def _as_json(text: TextLike) -> Any:
+    return text.as_json() if isinstance(text, Text) else text
+
+
+def text_of(value: Any) -> TextLike:
+    """A text in a record; ValueError if it is not one."""
+    return text_in(json.dumps(value)) if isinstance(value, dict) else str(value)
 
 
 def status_in(record: str, now: Moment) -> AlarmStatus:
@@ -60,7 +75,7 @@ def entry_in(record: str) -> AlarmEntry | None:
     values = json.loads(record).get("entry")
     if values is None:
         return None
-    text: TextLike = text_in(values["text"]) if values["is_sentence"] else values["text"]
+    text = text_of(values["text"])
     return AlarmEntry(values["name"], int(values["level"]), text, tuple(values["priorities"]))
 
 

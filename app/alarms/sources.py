@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from app.alarms.delays import Limit
 from app.panel.alarm import Alarm, SourceKind
@@ -31,6 +31,7 @@ class SourceReading(NamedTuple):
 
 
 UNKNOWN: Final = SourceReading()
+CATCHING_UP: Final = "link_catching_up"  # for a moment, after the event loop stalled
 
 
 def read_source(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
@@ -42,7 +43,7 @@ def read_source(alarm: Alarm, robot: RobotState, now: float, began_at: float) ->
 
 def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
     link = link_verdict(robot, now)
-    if alarm.topic is None or not link.permitted:
+    if alarm.topic is None or not (link.permitted or link.code == CATCHING_UP):
         return SourceReading(until=link.until)
     reading = robot.reading(alarm.topic).of_field(alarm.field, kept_s(alarm.max_age_s))
     value = reading.value(alarm.field) if reading.status in ("message", "reading") else None
@@ -71,3 +72,17 @@ READERS: Final[Mapping[SourceKind, Callable[[Alarm, RobotState, float, float], S
     "stale": _read_age,
     "lost": _read_loss,
 }
+
+
+def link_state(robot: RobotState, now: float) -> tuple[Any, ...]:
+    """What the readings of all alarms of a robot depend on: if it differs, each may have changed."""
+    graph = robot.graph
+    link = link_verdict(robot, now).code
+    is_permitted = link in ("permitted", CATCHING_UP)
+    return (
+        robot.link_up,
+        robot.is_responding,
+        graph.has_silent_peer,
+        frozenset(graph.peers),
+        "" if is_permitted else link,
+    )

@@ -4,8 +4,10 @@ A commit is on the disk when `write` returns: the database has a write-ahead log
 each commit. A write that was torn is not in it, as SQLite checks its sums.
 """
 
+import math
 import sqlite3
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -34,6 +36,47 @@ class HistoryRow(NamedTuple):
     actor: str
     record: str
     seq: int = 0
+
+
+class HistoryFilter(NamedTuple):
+    """Transitions before a `seq`, from `since` on and before `until` (seconds since the epoch), with a
+    text in the alarm's id, text or group."""
+
+    before: int = 2**62
+    since: float = -math.inf
+    until: float = math.inf
+    text: str = ""
+
+
+ALL: Final = HistoryFilter()
+
+
+def read_history(path: Path, wanted: HistoryFilter = ALL, limit: int = MAX_PAGE) -> list[HistoryRow]:
+    """The same as `AlarmStore.history` while another thread writes; nothing without a file.
+    sqlite3.Error if it can't be read."""
+    if not path.exists():
+        return []
+    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True, timeout=5.0)) as db:
+        return _history(db, wanted, limit)
+
+
+def _history(db: sqlite3.Connection, wanted: HistoryFilter, limit: int) -> list[HistoryRow]:
+    pattern = wanted.text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
+    rows = db.execute(
+        "SELECT at, id, state, occurrence, act, actor, record, seq FROM history WHERE seq < ?"
+        " AND at >= ? AND at < ? AND (? = ''"
+        " OR id || char(10) || coalesce(json_extract(record, '$.about'), '') LIKE ? ESCAPE '!')"
+        " ORDER BY seq DESC LIMIT ?",
+        (
+            wanted.before,
+            wanted.since,
+            wanted.until,
+            wanted.text,
+            f"%{pattern}%",
+            min(limit, MAX_PAGE),
+        ),
+    )
+    return [HistoryRow(*row) for row in rows]
 
 
 class AlarmStore:
@@ -74,14 +117,9 @@ class AlarmStore:
         """The records of the alarms that stand, by their ids."""
         return dict(self._db.execute("SELECT id, record FROM standing"))
 
-    def history(self, before: int | None = None, limit: int = MAX_PAGE) -> list[HistoryRow]:
-        """The newest transitions first, of those before a `seq`."""
-        rows = self._db.execute(
-            "SELECT at, id, state, occurrence, act, actor, record, seq FROM history"
-            " WHERE seq < ? ORDER BY seq DESC LIMIT ?",
-            (2**62 if before is None else before, min(limit, MAX_PAGE)),
-        )
-        return [HistoryRow(*row) for row in rows]
+    def history(self, wanted: HistoryFilter = ALL, limit: int = MAX_PAGE) -> list[HistoryRow]:
+        """The newest transitions of a filter first."""
+        return _history(self._db, wanted, limit)
 
     def remove_old(self, now: float) -> int:
         """Removes transitions that are too old, or too many for the size; returns how many. Alarms that

@@ -51,6 +51,9 @@ class ActGuard(Protocol):
     def act_verdict(self, at: float | None) -> Verdict:
         """Whether the server permits an act on which the operator touched the screen at `at`."""
 
+    def control_verdict(self, who: Principal) -> Verdict:
+        """Whether the client has control."""
+
 
 @dataclass(frozen=True, slots=True)
 class Applied:
@@ -81,6 +84,12 @@ class Act(Generic[Subject, Result]):
 def server_permits(guard: ActGuard, request: ActRequest) -> Verdict:
     """The permission of most acts: refused at shutdown, without a log, and if it is too late."""
     return guard.act_verdict(request.at)
+
+
+def server_and_control_permit(guard: ActGuard, request: ActRequest) -> Verdict:
+    """The permission of acts for which the client needs control."""
+    verdict = server_permits(guard, request)
+    return verdict if not verdict.permitted else guard.control_verdict(request.who)
 
 
 def always(guard: ActGuard, request: ActRequest) -> Verdict:
@@ -162,6 +171,11 @@ class ActRunner(Generic[Subject]):
         """The receipt of an earlier act, for pages without scripts."""
         made = self._made.get(act_id)
         return made[1].result() if made and made[1].done() and not made[1].cancelled() else None
+
+    def request(self, act_id: str) -> ActRequest | None:
+        """The request of an earlier act."""
+        made = self._made.get(act_id)
+        return made[0] if made else None
 
     def limited(self, request: ActRequest, act_id: str, reason: Text) -> ActReceipt:
         """The receipt of an act over the rate limit. The client may repeat it later with the same

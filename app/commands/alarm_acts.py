@@ -23,7 +23,7 @@ from app.alarms.status import (
     shelve,
     unshelve,
 )
-from app.commands.acts import Act, ActRequest, Applied, server_permits
+from app.commands.acts import Act, ActRequest, Applied, server_and_control_permit
 from app.errors import InputError
 from app.i18n import Text, TextLike, say
 
@@ -95,21 +95,25 @@ def _entry(code: str) -> Callable[[AlarmChange], Text]:
 
 
 ALARM_ACTS: Final[Mapping[str, Act[AlarmEngine, AlarmChange]]] = {
-    "acknowledge": Act(server_permits, _changes(_acknowledge), _entry("log_done_acknowledge")),
-    "shelve": Act(server_permits, _changes(_shelve), _entry("log_done_shelve")),
+    "acknowledge": Act(
+        server_and_control_permit, _changes(_acknowledge), _entry("log_done_acknowledge")
+    ),
+    "shelve": Act(server_and_control_permit, _changes(_shelve), _entry("log_done_shelve")),
     "unshelve": Act(
-        server_permits,
+        server_and_control_permit,
         _changes(lambda status, definition, _, now: unshelve(status, definition.rules, now)),
         _entry("log_done_unshelve"),
     ),
-    "out_of_service": Act(server_permits, _changes(_remove), _entry("log_done_out_of_service")),
+    "out_of_service": Act(
+        server_and_control_permit, _changes(_remove), _entry("log_done_out_of_service")
+    ),
     "in_service": Act(
-        server_permits,
+        server_and_control_permit,
         _changes(lambda status, definition, _, now: return_to_service(status, definition.rules, now)),
         _entry("log_done_in_service"),
     ),
     "reset": Act(
-        server_permits,
+        server_and_control_permit,
         _changes(lambda status, definition, _, __: reset(status, definition.rules)),
         _entry("log_done_reset"),
     ),

@@ -78,6 +78,11 @@ class PressGuard:
         why = "" if at is None else self.late(at)
         return Verdict(False, "late", why) if why else PERMITTED
 
+    def control_verdict(self, who: Principal) -> Verdict:
+        """Whether a client has control, or needs none; an act keeps it."""
+        self._control.touch(who)
+        return self._control.verdict(who)
+
     def late(self, at: float) -> TextLike:
         """Why a touch at this time (in the server's time) is too old or in the future, else ""."""
         age = clock.server_now() - at

@@ -80,7 +80,9 @@ LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
 Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
 Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
 
-NOT_RAISED: Final = "this version checks alarms, but does not raise them: do not rely on them yet"
+NOT_RAISED: Final = (
+    "this version checks nodes, diagnostics, lists and inhibits, but does not use them yet"
+)
 
 
 class AlarmList(Description):

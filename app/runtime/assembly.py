@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from app.audit import Limits, NullLog, OperatorLog
 from app.panel import Panel
-from app.panel.alarm import NOT_RAISED
 from app.panel.model import RobotEntry
 from app.panel.widgets.trend import trends_of
 from app.runtime.fleet import Fleet
@@ -86,15 +85,15 @@ async def open_fleet(
                 recordings.start()
             if trends is not None:
                 await trends.start()
+            await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)))
             await fleet.start()
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
-            if panel.alarms:
-                log.warning("the panel file has alarms: %s", NOT_RAISED)
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet
         finally:
             await fleet.stop()
+            await fleet.alarms.stop()
             if trends is not None:
                 await trends.stop()
             if recordings is not None:

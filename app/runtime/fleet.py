@@ -14,6 +14,7 @@ from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
+from app.runtime.alarms import Alarms
 from app.runtime.robot_access import ROBOT_ACCESS
 from app.runtime.robot_session import RobotSession
 from app.runtime.wiring import ServerParts, wire_session
@@ -44,7 +45,10 @@ class Fleet:
         self.panel = panel
         self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
-        server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated, root_path)
+        self.alarms = Alarms(panel)
+        server = ServerParts(
+            panel, revision, operators_log, recordings, Slices(), simulated, root_path, self.alarms
+        )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]
             self._sessions[entry.id if entry else None] = wire_session(

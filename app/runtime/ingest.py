@@ -27,8 +27,9 @@ Change = Literal["", "soon", "now"]
 @dataclass(slots=True)
 class Updates:
     """The changes of a turn. `urgent`: a permission or the graph has changed; `values`: the keys of
-    topics with a new message; `other`: another change that can wait for the next frame. `readings` are
-    messages (topic's key, reading) that may confirm a command.
+    topics with a new message that are only shown, `topics` those of all; `other`: another change that
+    can wait for the next frame. `readings` are messages (topic's key, reading) that may confirm a
+    command.
 
     `graph`: tokens have changed; `peer_appeared`: there was no peer before. `peers_found` and
     `peers_lost` are zids.
@@ -37,6 +38,7 @@ class Updates:
     urgent: bool = False
     other: bool = False
     values: set[str] = field(default_factory=set)
+    topics: set[str] = field(default_factory=set)
     readings: list[tuple[str, Reading]] = field(default_factory=list)
     graph: bool = False
     peer_appeared: bool = False
@@ -46,7 +48,7 @@ class Updates:
     def step(self) -> "Updates":
         """The update for an intermediate permission. Each reading is returned once."""
         readings, self.readings = self.readings, []
-        return Updates(urgent=True, readings=readings)
+        return Updates(urgent=True, topics=set(self.topics), readings=readings)
 
 
 class SampleListener(Protocol):
@@ -100,6 +102,7 @@ class Ingest:
             changes.samples.items(), key=lambda arrived: arrived[0] not in self._interlocks
         )
         for key, sample in ordered:
+            updates.topics.add(key)
             if sample.overrun and key in self._interlocks:
                 self._robot.invalidate(key)
                 yield updates.step()
@@ -120,7 +123,9 @@ class Ingest:
 
     def late_reading(self, key: str, reading: Reading) -> Updates:
         """The update for a message that took more than one turn to decode."""
-        return Updates(urgent=key in self._interlocks, values={key}, readings=[(key, reading)])
+        return Updates(
+            urgent=key in self._interlocks, values={key}, topics={key}, readings=[(key, reading)]
+        )
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Ingests a sample; returns whether it changed a permission."""

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from app.alarms.engine import AlarmEngine
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActRunner
 from app.commands.dispatch import Dispatcher
@@ -59,6 +60,7 @@ class RobotSession:
     operators_log: Log
     control: ControlAuthority
     control_acts: ActRunner[ControlAuthority]
+    alarm_acts: ActRunner[AlarmEngine]
     press_guard: PressGuard
     press_log: PressLog
     refresher: ViewRefresher

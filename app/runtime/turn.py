@@ -1,4 +1,5 @@
-"""One turn of a robot's session: inbox → robot's state → control → holds → confirmations → view.
+"""One turn of a robot's session: inbox → robot's state → control → alarms → holds → confirmations →
+view.
 
 Only this module defines the order. Holds and confirmations do not depend on the view: a slow or failing
 view never delays the end of a hold.
@@ -9,16 +10,20 @@ import logging
 import math
 from collections.abc import Iterable
 from contextlib import suppress
+from typing import Final
 
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import Reading
 from app.ros_logging import RobotLog
+from app.runtime.alarms import RobotAlarms
 from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_commands import RobotCommands
 from app.transport.peer import Peer, RobotContext
 from app.view.refresh import ViewRefresher
 
 log = logging.getLogger("kiosk")
+
+LATEST_S: Final = 0.04  # until data that waits for a frame is ingested, also where frames are rare
 
 
 class Turn:
@@ -32,6 +37,7 @@ class Turn:
         ingest: Ingest,
         commands: RobotCommands,
         refresher: ViewRefresher,
+        alarms: RobotAlarms,
     ) -> None:
         self._link = context.link
         self._robot = context.robot
@@ -41,6 +47,7 @@ class Turn:
         self._ingest = ingest
         self._commands = commands
         self._refresher = refresher
+        self._alarms = alarms
         self._log = RobotLog(log, self._robot.name)
         self._loop = asyncio.get_running_loop()
         self._frame: asyncio.TimerHandle | None = None  # the turn that is scheduled for the next frame
@@ -66,7 +73,8 @@ class Turn:
         if self._refresher.due <= self._loop.time():
             self.run()
         elif self._frame is None:
-            self._frame = self._loop.call_at(self._refresher.due, self.run)
+            latest = self._loop.time() + LATEST_S
+            self._frame = self._loop.call_at(min(self._refresher.due, latest), self.run)
 
     def run(self) -> None:
         """Runs a turn with everything that has arrived so far."""
@@ -125,11 +133,12 @@ class Turn:
             self._schedule_control()
 
     def _apply(self, updates: Updates) -> None:
-        """Updates holds, then confirmations, then the view, from the robot's current state."""
+        """Updates alarms, holds, confirmations, then the view, from the robot's current state."""
         if updates.graph:
             self._peer.lost(updates.peers_lost)
             self._peer.appeared(updates.peers_found)
             self.on_graph_change(updates.peer_appeared)
+        self._alarms.update(updates.topics)
         self._commands.holds.judge()
         for key, reading in updates.readings:
             self._confirm(key, reading)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
+from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.press_guard import PressGuard
 from app.interfaces import load_interfaces
@@ -20,6 +21,7 @@ from app.robot.log_lines import LogListener
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
+from app.runtime.alarms import Alarms
 from app.runtime.frames import Frames
 from app.runtime.ingest import Ingest
 from app.runtime.renewal import Renewal
@@ -54,6 +56,7 @@ class ServerParts:
     slices: Slices | None = None
     simulated: bool = False
     root_path: str = ""
+    alarms: Alarms | None = None
 
 
 def wire_session(
@@ -75,7 +78,10 @@ def wire_session(
         log_line=RobotLog(log, robot.name).info,
         on_hand_over=signals.handed_over.emit,
     )
-    sources = ViewSources(control, operators_log, others, server.recordings, server.simulated)
+    alarms = server.alarms or Alarms(panel)
+    sources = ViewSources(
+        control, operators_log, others, server.recordings, server.simulated, alarms.view
+    )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
     press_guard = PressGuard(
@@ -93,6 +99,7 @@ def wire_session(
         commands.sample_handlers,
         [robot.table_entries, LogListener(robot.log_lines), *recorders],
     )
+    robot_alarms = alarms.add_robot(entry.id if entry else "", robot, refresher.refresh_alarms)
     own_line = partial(_show_own_line, robot, refresher)
     session = RobotSession(
         context=context,
@@ -101,13 +108,14 @@ def wire_session(
         operators_log=operators_log,
         control=control,
         control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
+        alarm_acts=ActRunner("alarm", ALARM_ACTS, alarms.engine, act_context),
         press_guard=press_guard,
         press_log=press_log,
         refresher=refresher,
         peer=peer,
         commands=commands,
         ingest=ingest,
-        turn=Turn(context, peer, control, ingest, commands, refresher),
+        turn=Turn(context, peer, control, ingest, commands, refresher, robot_alarms),
         frames=Frames(context, partial(peer.on_graph_change, False)),
         renewal=Renewal(link, robot),
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),

@@ -21,7 +21,7 @@ from app.permission.control_authority_view import Role
 from app.view.audience import EVERYONE, Audience
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
-from app.view.sections import PERMISSION_EVENT, Events, difference
+from app.view.sections import CHANGES, PERMISSION_EVENT, Events, difference
 from app.view.view import View, for_audience
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
@@ -156,7 +156,7 @@ class ViewPublisher:
             events = self._latest_events if latest else difference(view, self.for_audience(audience))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, audience.language)
-                if name in ("update", "updates")
+                if name in CHANGES
                 else self._shared_event(name, data, audience.language)
                 for name, data in self._shown(events, page).items()
             )

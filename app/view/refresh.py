@@ -7,10 +7,11 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from app.alarms.shown import NO_ALARMS, AlarmsView
 from app.audit.press_record import Log
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
@@ -52,6 +53,10 @@ class NoOtherRobots:
     def show_but(self, robot: RobotState) -> None: ...
 
 
+def no_alarms() -> AlarmsView:
+    return NO_ALARMS
+
+
 class Recorded(Protocol):
     """The part of the recorder that a view needs."""
 
@@ -69,6 +74,7 @@ class ViewSources:
     others: OtherRobots
     recordings: Recorded | None = None
     simulated: bool = False
+    alarms: Callable[[], AlarmsView] = no_alarms
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -82,6 +88,7 @@ class ViewSources:
             control=self.control.view(),
             control_lock=self.control.lock,
             control_until=self.control.until,
+            alarms=self.alarms(),
         )
 
 
@@ -135,6 +142,10 @@ class ViewRefresher:
         self._updated_keys.update(keys)
         self._schedule(self.due)
 
+    def refresh_alarms(self) -> None:
+        """Shows the alarms now: they do not wait for a frame."""
+        self._frame()
+
     @property
     def due(self) -> float:
         """When (monotonic seconds) the next frame may be shown."""
@@ -176,6 +187,7 @@ class ViewRefresher:
             self._rebuild()
         else:
             self._current = update_displays(self._current, self._stale(now), self._robot, now)
+            self._current.view["alarms"] = self._sources.alarms()
 
     def _stale(self, now: float) -> list[DisplayWidget]:
         """The displays that a sample or time has changed."""

@@ -6,6 +6,8 @@ from typing import Any, Final, Literal, NamedTuple
 Events = dict[str, Mapping[str, Any]]  # event name → its data, in the order of sending
 
 NOTHING: Final[Mapping[str, Any]] = {}
+# Events with what has changed since the last one that a stream sent, not with whole sections.
+CHANGES: Final = frozenset({"update", "updates", "alarms"})
 PERMISSION_EVENT: Final = "-enabled-updated"  # appended to an interlock's id; for programs
 
 
@@ -55,6 +57,16 @@ def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in new.items() if key not in old or old[key] != value}
 
 
+def _alarms(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
+    """One event with everything but of the rows only those that differ, null for one that is gone."""
+    if old == new:
+        return {}
+    before, after = old["rows"], new["rows"]
+    gone = dict.fromkeys(alarm_id for alarm_id in before if alarm_id not in after)
+    changed = {alarm_id: row for alarm_id, row in after.items() if before.get(alarm_id) != row}
+    return {name: {**new, "rows": gone | changed}}
+
+
 SECTIONS: Final = (
     Section("interlocks", _interlocks, on_page=False),
     Section("widgets", _widgets),
@@ -65,6 +77,7 @@ SECTIONS: Final = (
     Section(
         "control", whole, "sections/control.html", lambda control: control["required"], place="header"
     ),
+    Section("alarms", _alarms, on_page=False),
 )
 
 

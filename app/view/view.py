@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple, TypedDict
 
+from app.alarms.shown import NO_ALARMS, AlarmsView
 from app.i18n import Text, TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
@@ -52,6 +53,7 @@ class View(TypedDict):
     state: RobotWord
     robots: dict[str, Lamp]
     control: ControlView
+    alarms: AlarmsView
 
 
 class ViewWithDeadlines(NamedTuple):
@@ -89,6 +91,7 @@ class ViewContext(NamedTuple):
     control: ControlView = NO_CONTROL
     control_lock: Verdict = PERMITTED
     control_until: float = math.inf
+    alarms: AlarmsView = NO_ALARMS
 
 
 ALONE: Final = ViewContext()  # one robot, its log is written, and control is not required
@@ -118,6 +121,7 @@ def build_view(
         state=robot_word(passable),
         robots=dict(context.robots),
         control=context.control,
+        alarms=context.alarms,
     )
     untils = {w.id: widgets[w.id][1] for w in panel.displays}
     others = (at for name, (_, at) in widgets.items() if name not in untils)

@@ -93,10 +93,10 @@ class Cell:
         self.transitions: list[Transition] = []
         self.engine = AlarmEngine(
             self.panel,
-            {"": self.robot},
             lambda: Moment(self.now, self.now),
             self.receive,
         )
+        self.engine.add_robot("", self.robot)
         self.engine.evaluate()
 
     def receive(self, transitions: Sequence[Transition]) -> None:

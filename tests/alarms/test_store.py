@@ -10,7 +10,7 @@ import pytest
 from app.alarms.records import record_of, status_in
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, Override, TakenOut
-from app.alarms.store import AlarmStore, HistoryRow
+from app.alarms.store import AlarmStore, HistoryFilter, HistoryRow
 from tests.alarms.test_engine import AIR, DELAYED, HEALTH, WARN, Cell
 from tests.support.form import several
 from tests.support.parts import ROOT
@@ -47,7 +47,7 @@ def test_written_alarms_are_read_after_reopening(tmp_path: Path) -> None:
     store = open_store(tmp_path / "alarms.sqlite")
     assert store.standing() == {"air2": "two"}
     assert [(r.seq, r.id) for r in store.history()] == [(3, "air3"), (2, "air2"), (1, "air1")]
-    assert [r.id for r in store.history(before=3, limit=1)] == ["air2"]
+    assert [r.id for r in store.history(HistoryFilter(before=3), 1)] == ["air2"]
 
 
 def test_a_clock_that_is_set_back_keeps_the_order(tmp_path: Path) -> None:

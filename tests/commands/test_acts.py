@@ -67,10 +67,13 @@ ACTS: Final[Mapping[str, Act[Counters, Count]]] = {
 
 class Guard:
     def __init__(self) -> None:
-        self.verdict = PERMITTED
+        self.verdict = self.control = PERMITTED
 
     def act_verdict(self, at: float | None) -> Verdict:
         return self.verdict
+
+    def control_verdict(self, who: Principal) -> Verdict:
+        return self.control
 
 
 class Log(NullLog):

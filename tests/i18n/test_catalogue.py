@@ -30,6 +30,7 @@ PREFIXES = (
     "log_page_",
     "log_outcome_",
     "log_page_control_",
+    "log_page_alarm_",
     "state_",
 )  # of codes that are put together
 SENTENCES = sentences(ENGLISH)

@@ -26,9 +26,10 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
 
 
 def _alarm_notes(panel: Panel) -> Iterator[Note]:
-    """Alarms, which nothing raises yet."""
-    if panel.alarms:
-        yield Note("alarm[0]", NOT_RAISED)
+    """Alarms whose source is not read yet, or that don't lock yet."""
+    for i, alarm in enumerate(panel.alarms):
+        if alarm.source in ("node", "diagnostics", "list") or alarm.inhibits:
+            yield Note(f"alarm[{i}]", NOT_RAISED)
 
 
 def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:

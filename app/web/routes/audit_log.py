@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from starlette.types import Message, Receive, Scope, Send
 
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
+from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
 from app.errors import InputError, LogError, NotFound
 from app.i18n import Text, TextLike, say
@@ -47,6 +48,7 @@ CONTROL_ACTIONS: Final = (
     *(f"control_{act}" for act in CONTROL_ACTS),
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
+ALARM_ACTIONS: Final = tuple(f"alarm_{act}" for act in ALARM_ACTS)
 TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
 START: Final = "http.response.start"
 BODY: Final = "http.response.body"
@@ -139,7 +141,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         robots={str(robot.name): robot.name for robot in panel.robots},
-        acts={action: word(action) for action in CONTROL_ACTIONS},
+        acts={action: word(action) for action in (*CONTROL_ACTIONS, *ALARM_ACTIONS)},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
         banner=state.banner,

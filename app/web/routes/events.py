@@ -34,7 +34,7 @@ MEDIA_TYPE: Final = "text/event-stream"
     "/events",
     response_class=Response,
     responses=errors(403, 404, 422) | {200: {"content": {MEDIA_TYPE: {"schema": TEXT}}}},
-    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
+    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, alarms, link, beat, …",
 )
 async def events(
     request: Request,

@@ -1,0 +1,135 @@
+"""The alarms that pages show: the rows in their order, and how many there are of each kind."""
+
+import math
+from bisect import bisect_left, insort
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from typing import Final, TypedDict
+
+from app.alarms.rows import AlarmRow
+from app.i18n import TextLike
+
+MAX_ROWS: Final = 500  # that are listed; the others are counted
+PRIORITIES: Final = (1, 2, 3, 4)
+# EEMUA 191: more than so many raises in so many seconds is a flood.
+FLOOD_RAISES: Final = 10
+FLOOD_S: Final = 600.0
+
+
+class PriorityCount(TypedDict):
+    standing: int
+    unacknowledged: int
+
+
+class AlarmsView(TypedDict):
+    """The section `alarms` of a view. `line` is the newest unacknowledged alarm of the highest
+    priority. `standing` counts the alarms that are not normal; `unacknowledged` and `unknown` are of
+    these. The shelved, suppressed and those out of service are counted apart. `rows` has the first
+    `MAX_ROWS` by their ids, and `more` is how many follow. `fault`: why they are not kept on the disk,
+    "" if they are."""
+
+    line: AlarmRow | None
+    standing: int
+    unacknowledged: int
+    unknown: int
+    priorities: Mapping[str, PriorityCount]
+    shelved: int
+    suppressed: int
+    out_of_service: int
+    flood: bool
+    fault: TextLike
+    more: int
+    rows: Mapping[str, AlarmRow]
+
+
+NO_ALARMS: Final = AlarmsView(
+    line=None,
+    standing=0,
+    unacknowledged=0,
+    unknown=0,
+    priorities={str(priority): PriorityCount(standing=0, unacknowledged=0) for priority in PRIORITIES},
+    shelved=0,
+    suppressed=0,
+    out_of_service=0,
+    flood=False,
+    fault="",
+    more=0,
+    rows={},
+)
+
+
+class ShownAlarms:
+    """The rows by their ids; a change costs no walk over all of them."""
+
+    def __init__(self) -> None:
+        self.rows: dict[str, AlarmRow] = {}
+        self._order: list[tuple[tuple[float, ...], str]] = []
+        self._counts: Counter[str] = Counter()
+        self._raised: deque[float] = deque(maxlen=FLOOD_RAISES + 1)
+
+    def update(self, alarm_id: str, row: AlarmRow | None) -> None:
+        """Shows a row in place of the alarm's last one; None for an alarm that is not listed."""
+        before = self.rows.pop(alarm_id, None)
+        if before is not None:
+            del self._order[bisect_left(self._order, _key(before))]
+            self._counts.subtract(_counted(before))
+        if row is not None:
+            self.rows[alarm_id] = row
+            insort(self._order, _key(row))
+            self._counts.update(_counted(row))
+
+    def count_raise(self, now: float) -> None:
+        """An alarm was raised at `now` (monotonic seconds)."""
+        self._raised.append(now)
+
+    def flood_ends_at(self) -> float:
+        """Until when there are more raises than an operator can follow; -inf if there are not."""
+        return self._raised[0] + FLOOD_S if len(self._raised) > FLOOD_RAISES else -math.inf
+
+    def listed(self) -> Iterator[AlarmRow]:
+        """All rows, the most urgent first."""
+        return (self.rows[alarm_id] for _, alarm_id in self._order)
+
+    def view(self, now: float, fault: TextLike = "") -> AlarmsView:
+        """The section at `now` (monotonic seconds)."""
+        rows = {row["id"]: row for row in islice(self.listed(), MAX_ROWS)}
+        first = next(iter(rows.values()), None)
+        counts = self._counts
+        return AlarmsView(
+            line=first if first and not (first["acknowledged"] or first["order"][0]) else None,
+            standing=counts["standing"],
+            unacknowledged=counts["unacknowledged"],
+            unknown=counts["unknown"],
+            priorities={
+                str(priority): PriorityCount(
+                    standing=counts[f"standing {priority}"],
+                    unacknowledged=counts[f"unacknowledged {priority}"],
+                )
+                for priority in PRIORITIES
+            },
+            shelved=counts["shelved"],
+            suppressed=counts["suppressed"],
+            out_of_service=counts["out_of_service"],
+            flood=now < self.flood_ends_at(),
+            fault=fault,
+            more=len(self.rows) - len(rows),
+            rows=rows,
+        )
+
+
+def _key(row: AlarmRow) -> tuple[tuple[float, ...], str]:
+    return tuple(row["order"]), row["id"]
+
+
+def _counted(row: AlarmRow) -> Iterator[str]:
+    """The names under which a row is counted."""
+    if row["order"][0]:
+        yield row["state"]
+        return
+    names = ["standing", *([] if row["acknowledged"] else ["unacknowledged"])]
+    for name in names:
+        yield name
+        yield f"{name} {row['priority']}"
+    if row["state"] == "unknown":
+        yield "unknown"

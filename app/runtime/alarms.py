@@ -1,0 +1,294 @@
+"""Runs the alarms of all robots: evaluates them in each turn and when their time has come, writes each
+change to the disk, and shows it when it is there."""
+
+import asyncio
+import logging
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from app.alarms.disk import AlarmDisk, Change, DiskEvents
+from app.alarms.engine import AlarmEngine, Transition
+from app.alarms.records import record_of
+from app.alarms.rows import AlarmRow, row_of, state_of
+from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms
+from app.alarms.sources import link_state
+from app.alarms.status import Moment
+from app.alarms.store import HistoryFilter, HistoryRow
+from app.i18n import TextLike
+from app.panel.model import Panel
+from app.robot.state import RobotState
+
+log = logging.getLogger("kiosk.alarms")
+
+AT_ONCE: Final = 25  # alarms that are evaluated in one turn: 2 ms if all are raised
+SHOW_EVERY_S: Final = 0.05
+# A change is shown when it is on the disk, or after this time: no slow disk hides an alarm.
+SHOWN_WITHIN_S: Final = 0.5
+LOAD_TIMEOUT_S: Final = 5.0  # the panel starts without earlier alarms if the disk takes longer
+
+
+class _Pending(NamedTuple):
+    """A change that is not on the disk yet: `since` in monotonic seconds."""
+
+    seq: int
+    id: str
+    row: AlarmRow | None
+    since: float
+
+
+def now() -> Moment:
+    return Moment(time.monotonic(), time.time())
+
+
+class Alarms:
+    """The alarms of one server, from `start` to `stop`; before it, none is raised. Used on the event
+    loop only."""
+
+    def __init__(self, panel: Panel) -> None:
+        self._panel = panel
+        self.engine = AlarmEngine(panel, now, self._receive)
+        self.raised = 0  # since the start
+        self._loop = asyncio.get_running_loop()
+        self._disk: AlarmDisk | None = None
+        self._loaded: asyncio.Future[None] = self._loop.create_future()
+        self._pending: deque[_Pending] = deque()
+        self._written_to = 0  # the number of the last change that is on the disk
+        self._seq = 0
+        self._overrun: dict[str, None] = {}  # ids of alarms of which a change found no room
+        self._fault: TextLike = ""
+        self._shown = ShownAlarms()
+        self._view: AlarmsView | None = NO_ALARMS  # None: to be made
+        self._listeners: list[Callable[[], None]] = []
+        self._show_timer: asyncio.TimerHandle | None = None
+        self._shown_at = -math.inf
+        self._slow_timer: asyncio.TimerHandle | None = None
+        self._due_timer: asyncio.TimerHandle | None = None
+        self._due = math.inf
+        self._waiters: list[tuple[int, asyncio.Future[None]]] = []
+        self._stopped = False
+
+    def add_robot(
+        self, robot_id: str, robot: RobotState, on_shown: Callable[[], None]
+    ) -> "RobotAlarms":
+        """Adds a robot; `on_shown` is called when `view` has changed."""
+        self.engine.add_robot(robot_id, robot)
+        self._listeners.append(on_shown)
+        return RobotAlarms(self, robot_id, robot)
+
+    async def start(self, folder: Path) -> None:
+        """Loads the alarms that stood when the server ended, from a folder. Does nothing for a panel
+        without alarms."""
+        if not self._panel.alarms:
+            return
+        events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)
+        self._disk = AlarmDisk(folder, self._panel.alarm_rules, events)
+        self._disk.start()
+        try:
+            async with asyncio.timeout(LOAD_TIMEOUT_S):
+                await asyncio.shield(self._loaded)
+        except TimeoutError:
+            log.error("the disk takes too long: the alarms of before are shown when they are read")
+        self.evaluate()
+
+    async def stop(self) -> None:
+        """Evaluates no longer, and writes what is queued."""
+        self._stopped = True
+        for timer in (self._show_timer, self._slow_timer, self._due_timer):
+            if timer is not None:
+                timer.cancel()
+        if self._disk is not None:
+            await self._disk.stop()
+
+    def view(self) -> AlarmsView:
+        """The section of the view: what is on the disk."""
+        if self._view is None:
+            self._view = self._shown.view(time.monotonic(), self._fault)
+        return self._view
+
+    def rows(self) -> list[AlarmRow]:
+        """All rows that are shown, the most urgent first."""
+        return list(self._shown.listed())
+
+    async def history(self, wanted: HistoryFilter, limit: int) -> list[HistoryRow]:
+        """Transitions on the disk, the newest first; LogError if they can't be read."""
+        return await self._disk.history(wanted, limit) if self._disk else []
+
+    async def written(self, within_s: float) -> bool:
+        """Waits until all changes up to now are on the disk; False if that takes longer."""
+        if self._written_to >= self._seq:
+            return True
+        done: asyncio.Future[None] = self._loop.create_future()
+        self._waiters.append((self._seq, done))
+        try:
+            async with asyncio.timeout(within_s):
+                await done
+        except TimeoutError:
+            return False
+        return True
+
+    # Evaluation.
+
+    def evaluate(self) -> None:
+        """Evaluates some of the alarms that are due now, and plans the rest."""
+        if self._stopped or self._disk is None:
+            return
+        try:
+            self.engine.evaluate(AT_ONCE)
+        except Exception:
+            log.exception("alarms were not evaluated")
+        self._plan()
+
+    def _plan(self) -> None:
+        due = self.engine.due
+        if due == 0.0:
+            due = time.monotonic()
+        if due >= self._due:
+            return
+        if self._due_timer is not None:
+            self._due_timer.cancel()
+        self._due = due
+        self._due_timer = self._loop.call_at(due, self._run_due)
+
+    def _run_due(self) -> None:
+        self._due_timer, self._due = None, math.inf
+        self.evaluate()
+
+    # From a transition to the disk, and from there to the pages.
+
+    def _receive(self, transitions: Sequence[Transition]) -> None:
+        for transition in transitions:
+            before, after = transition.before, transition.after
+            if after.occurrence != before.occurrence:
+                self.raised += 1
+                self._shown.count_raise(transition.at.monotonic)
+            alarm = self.engine.alarms[transition.id]
+            record = record_of(alarm, transition.at)
+            row = HistoryRow(
+                transition.at.wall,
+                transition.id,
+                state_of(after),
+                after.occurrence,
+                transition.act,
+                transition.actor,
+                record,
+            )
+            shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
+            self._put(transition.id, row, None if shown is None else record, shown)
+
+    def _put(
+        self, alarm_id: str, row: HistoryRow | None, record: str | None, shown: AlarmRow | None
+    ) -> None:
+        self._seq += 1
+        assert self._disk is not None  # nothing changes before the start
+        if not self._disk.put(Change(self._seq, alarm_id, row, record)):
+            self._overrun[alarm_id] = None
+        self._pending.append(_Pending(self._seq, alarm_id, shown, time.monotonic()))
+        if self._fault:
+            self._show_until(math.inf)
+        elif self._slow_timer is None:
+            self._slow_timer = self._loop.call_later(SHOWN_WITHIN_S, self._show_slow)
+
+    def _on_disk(self, seq: int) -> None:
+        self._written_to = seq
+        self._show_until(seq)
+        waiters, self._waiters = self._waiters, []
+        for upto, done in waiters:
+            if upto > seq:
+                self._waiters.append((upto, done))
+            elif not done.done():
+                done.set_result(None)
+        if self._overrun and self._disk and not self._disk.waiting:
+            overrun, self._overrun = self._overrun, {}
+            self._write_records(overrun)
+
+    def _show_slow(self) -> None:
+        """Shows the changes that wait too long for the disk."""
+        self._slow_timer = None
+        since = time.monotonic() - SHOWN_WITHIN_S
+        last = max((change.seq for change in self._pending if change.since <= since), default=0)
+        self._show_until(last)
+        if self._pending:
+            wait_s = self._pending[0].since + SHOWN_WITHIN_S - time.monotonic()
+            self._slow_timer = self._loop.call_later(max(0.0, wait_s), self._show_slow)
+
+    def _show_until(self, seq: float) -> None:
+        changed = False
+        while self._pending and self._pending[0].seq <= seq:
+            change = self._pending.popleft()
+            self._shown.update(change.id, change.row)
+            changed = True
+        if changed:
+            self._show()
+
+    def _set_fault(self, fault: TextLike) -> None:
+        self._fault = fault
+        if fault and not self._loaded.done():
+            self._loaded.set_result(None)
+        self._show_until(math.inf)
+        self._show()
+
+    def _show(self) -> None:
+        """Notifies the views, at most once in `SHOW_EVERY_S`."""
+        if self._show_timer is None and not self._stopped:
+            wait_s = self._shown_at + SHOW_EVERY_S - time.monotonic()
+            self._show_timer = self._loop.call_later(max(0.0, wait_s), self._notify)
+
+    def _notify(self) -> None:
+        self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
+        for on_shown in self._listeners:
+            on_shown()
+
+    # Restart, and a new file.
+
+    def _restore(self, records: Mapping[str, str]) -> None:
+        try:
+            missing = self.engine.restore(records)
+        except (ValueError, KeyError, TypeError):
+            log.exception("the alarms of before could not be restored")
+            missing = []
+        at = now()
+        for alarm in self.engine.standing():
+            self._shown.update(alarm.definition.id, row_of(alarm, at))
+        for alarm_id in missing:
+            log.warning('the panel no longer has the alarm "%s", which stood', alarm_id)
+            self._put(alarm_id, None, None, None)
+        if not self._loaded.done():
+            self._loaded.set_result(None)
+        self._show()
+        self.evaluate()
+
+    def _write_standing(self) -> None:
+        """Writes all alarms that stand to a new file."""
+        self._write_records([alarm.definition.id for alarm in self.engine.standing()])
+
+    def _write_records(self, alarm_ids: Collection[str]) -> None:
+        at = now()
+        for alarm_id in alarm_ids:
+            alarm = self.engine.alarms.get(alarm_id)
+            stands = alarm is not None and not alarm.is_unlisted
+            record = record_of(alarm, at) if alarm and stands else None
+            self._put(alarm_id, None, record, row_of(alarm, at) if alarm and stands else None)
+
+
+class RobotAlarms:
+    """What a robot's turn tells the alarms."""
+
+    def __init__(self, alarms: Alarms, robot_id: str, robot: RobotState) -> None:
+        self._alarms = alarms
+        self._robot_id = robot_id
+        self._robot = robot
+        self._link: tuple[Any, ...] = ()
+
+    def update(self, topics: Collection[str]) -> None:
+        """Messages arrived on topics with these keys, or something else has changed."""
+        engine = self._alarms.engine
+        engine.topics_changed(self._robot_id, topics)
+        link = link_state(self._robot, time.monotonic())
+        if link != self._link:
+            self._link = link
+            engine.robot_changed(self._robot_id)
+        self._alarms.evaluate()

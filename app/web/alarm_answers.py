@@ -1,0 +1,211 @@
+"""What clients send to `/alarms` and get from it."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+
+from app.alarms.records import text_of
+from app.alarms.store import MAX_PAGE, HistoryFilter, HistoryRow
+from app.clock import iso_time
+from app.commands.acts import ActReceipt
+from app.commands.alarm_acts import ALARM_ACTS
+from app.commands.press import PRESS_ID
+
+MAX_ACKNOWLEDGED: Final = 500  # alarms in one request
+MAX_OCCURRENCE: Final = 2**53
+Occurrence = Annotated[int, Field(ge=0, le=MAX_OCCURRENCE)]
+
+
+class AlarmQuery(BaseModel):
+    """`history`: transitions, the newest first, instead of what is not normal now. The other fields are
+    for the history: of transitions before the number `before`, from `since` on and before `until`, with
+    `text` in the alarm's id, text, action or group."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    history: bool = False
+    before: Annotated[int, Field(ge=1, lt=2**62)] | None = None
+    limit: Annotated[int, Field(ge=1, le=MAX_PAGE)] = 100
+    since: AwareDatetime | None = None
+    until: AwareDatetime | None = None
+    text: Annotated[str, Field(max_length=100)] = ""
+
+    def filter(self) -> HistoryFilter:
+        return HistoryFilter(
+            2**62 if self.before is None else self.before,
+            self.since.timestamp() if self.since else -math.inf,
+            self.until.timestamp() if self.until else math.inf,
+            self.text,
+        )
+
+
+class AlarmActBody(BaseModel):
+    """`occurrence` is what the screen showed, for `acknowledge`; `reason` is needed for `shelve` and
+    `out_of_service`, and `until` or `for_s` (seconds) for `shelve`. `at` is when it was touched, in the
+    server's own time. The same `id` again is the same act. `seen` is the id of the last event."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    occurrence: Occurrence | None = None
+    reason: Annotated[str, Field(max_length=200)] = ""
+    until: AwareDatetime | None = None
+    for_s: Annotated[float, Field(gt=0, le=86_400)] | None = None
+    at: AwareDatetime | None = None
+    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
+    seen: Annotated[str, Field(max_length=40)] = ""
+
+    def values(self, alarm: str, now: float) -> dict[str, Any]:
+        """The values of the act on an alarm at `now` (seconds since the epoch)."""
+        values: dict[str, Any] = {"alarm": alarm}
+        if self.occurrence is not None:
+            values["occurrence"] = self.occurrence
+        if self.reason:
+            values["reason"] = self.reason
+        if self.until is not None:
+            values["until"] = self.until.isoformat()
+        elif self.for_s is not None:
+            values["until"] = iso_time(now + self.for_s)
+        if self.seen:
+            values["seen"] = self.seen
+        return values
+
+
+class AcknowledgeBody(BaseModel):
+    """`alarms` has the occurrences that the screen showed, by the alarms' ids."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    alarms: Annotated[dict[str, Occurrence], Field(max_length=MAX_ACKNOWLEDGED)]
+    at: AwareDatetime | None = None
+    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
+    seen: Annotated[str, Field(max_length=40)] = ""
+
+
+class TakenOutAnswer(BaseModel):
+    since: AwareDatetime
+    since_text: str
+    until: str
+    until_text: str
+    reason: str
+    who: str
+
+
+class AlarmAnswer(BaseModel):
+    """An alarm that is not normal, or is shelved, suppressed or out of service."""
+
+    id: str
+    robot: str
+    source: str
+    group: str
+    priority: Annotated[int, Field(ge=1, le=4)]
+    priority_text: str
+    state: str
+    before_unknown: str
+    state_text: str
+    acknowledged: bool
+    known: bool
+    occurrence: int
+    since: Annotated[str, Field(description='RFC 3339, "" if it was not raised')]
+    since_text: str
+    text: str
+    cause: str
+    consequence: str
+    action: str
+    picture: str
+    topic: str
+    field: str
+    value: float | None
+    value_text: str
+    limit: float | None
+    limit_text: str
+    shelf: TakenOutAnswer | None
+    out_of_service: TakenOutAnswer | None
+    acts: list[str]
+    follows: str
+    order: list[float]
+
+
+class TransitionAnswer(BaseModel):
+    """A row of the history: `state` is the one after it, `act` the act that caused it, "" for none."""
+
+    seq: int
+    at: AwareDatetime
+    id: str
+    state: str
+    acknowledged: bool
+    known: bool
+    occurrence: int
+    act: Annotated[str, Field(description=f'one of {", ".join(ALARM_ACTS)}, or ""')]
+    who: str
+    text: str
+    action: str
+    group: str
+    priority: int
+    value: float | None
+
+
+class AlarmsAnswer(BaseModel):
+    """What is not normal now, the most urgent first."""
+
+    alarms: list[AlarmAnswer]
+
+
+class HistoryAnswer(BaseModel):
+    """`older` is the `before` of the next page, null if there is none."""
+
+    history: list[TransitionAnswer]
+    older: int | None
+
+
+class AlarmReceipt(BaseModel):
+    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name."""
+
+    id: str
+    alarm: str
+    act: str
+    outcome: str
+    code: str
+    reason: str
+    at: AwareDatetime
+    done: bool
+
+
+class AlarmReceipts(BaseModel):
+    receipts: list[AlarmReceipt]
+
+
+def finite(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with null for numbers that JSON does not have."""
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in row.items()
+    }
+
+
+def transition(row: HistoryRow) -> dict[str, Any]:
+    """A row of the history, with texts that are not rendered yet."""
+    record = json.loads(row.record)
+    about = record.get("about", {})
+    return {
+        "seq": row.seq,
+        "at": iso_time(row.at),
+        "id": row.id,
+        "state": row.state,
+        "acknowledged": record.get("state", "") in ("normal", "acknowledged", "latched_acknowledged"),
+        "known": record.get("unknown_since") is None,
+        "occurrence": row.occurrence,
+        "act": row.act,
+        "who": row.actor,
+        "text": text_of(about.get("text", row.id)),
+        "action": text_of(about.get("action", "")),
+        "group": text_of(about.get("group", "")),
+        "priority": about.get("priority", 0),
+        "value": record.get("value"),
+    }
+
+
+def receipt_json(alarm: str, receipt: ActReceipt) -> dict[str, Any]:
+    return {**receipt.as_json(), "alarm": alarm, "done": receipt.done}

@@ -1,0 +1,272 @@
+"""Alarms of all robots: what is not normal now, their history, and the acts on them. JSON for programs
+and scripts, forms without them."""
+
+import asyncio
+import re
+import secrets
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Annotated, Any, Final
+from urllib.parse import quote, urlsplit
+
+from fastapi import APIRouter, Path, Query, Request
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+from pydantic import BaseModel
+
+from app import clock
+from app.commands.acts import ActReceipt, ActRequest
+from app.commands.alarm_acts import ALARM_ACTS
+from app.commands.press import PRESS_ID
+from app.commands.press_limits import RETRY_AFTER_S
+from app.errors import InputError
+from app.i18n import localized, say
+from app.permission.principal import Principal
+from app.runtime.robot_session import RobotSession
+from app.web.alarm_answers import (
+    AcknowledgeBody,
+    AlarmActBody,
+    AlarmQuery,
+    AlarmReceipt,
+    AlarmReceipts,
+    AlarmsAnswer,
+    HistoryAnswer,
+    finite,
+    receipt_json,
+    transition,
+)
+from app.web.app_state import AppState, CurrentState
+from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.language import language_of
+from app.web.openapi_parts import FORM, JSON, Described, described_body, errors, fields
+from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.routes.press_forms import TAP_AGAIN_S
+from app.web.routes.presses import STATUS
+
+router = APIRouter()
+
+AlarmId = Annotated[str, Path(max_length=300, description="the id of an alarm")]
+AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
+
+DISK_TIMEOUT_S: Final = 2.0  # then the receipt says that the act is not safely on the disk
+FORM_FIELDS_MOST: Final = 600
+OWN_PAGE: Final = re.compile(r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*)(\?[!-~]*)?")
+OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
+TOO_OFTEN: Final = say("control_too_often")
+TOO_SOON: Final = say("press_too_soon")
+
+
+def _acts(model: type[BaseModel]) -> Described:
+    """The responses of an act: receipts of this model."""
+    return errors(403, 404, 408, 413, 422) | {
+        303: {"description": "of a form: back to the page that it came from, with the receipt's id"},
+        409: {"model": model, "description": "it was not done"},
+        429: {
+            "model": model,
+            "description": "more than a client may",
+            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
+        },
+        503: {"model": model, "description": "the operator's log can't be written"},
+    }
+
+
+FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
+    "id": {"pattern": PRESS_ID},
+    "page": {"description": "the path of the panel's page to go back to"},
+    "_since": {
+        "description": "when the page was rendered, in the server's own time",
+        "pattern": r"^[0-9]{1,10}(\.[0-9]{1,3})?$",
+    },
+}
+ACT_FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
+    **FORM_PARTS,
+    "occurrence": {"pattern": "^[0-9]{1,15}$"},
+    "reason": {"maxLength": 200},
+    "for_s": {"pattern": "^[1-9][0-9]{0,3}$"},
+}
+
+
+@router.get(
+    "/alarms",
+    response_model=AlarmsAnswer | HistoryAnswer,
+    summary="The alarms that are not normal now, or the history of all alarms",
+    responses=errors(403, 422, 503),
+)
+async def alarms(
+    request: Request, state: CurrentState, query: Annotated[AlarmQuery, Query()]
+) -> Response:
+    content: dict[str, Any]
+    if query.history:
+        rows = await state.fleet.alarms.history(query.filter(), query.limit)
+        older = rows[-1].seq if len(rows) == query.limit else None
+        content = {"history": [transition(row) for row in rows], "older": older}
+    else:
+        content = {"alarms": [finite(row) for row in state.fleet.alarms.rows()]}
+    answer = localized(content, language_of(request))
+    return JSONResponse(answer, headers={"cache-control": "no-store"})
+
+
+@router.post(
+    "/alarms/acknowledge",
+    response_model=AlarmReceipts,
+    summary="Acknowledge several alarms, such as those that a page shows",
+    responses=_acts(AlarmReceipts),
+    openapi_extra=described_body(
+        AcknowledgeBody,
+        {
+            **fields(**FORM_PARTS),
+            "description": f'"{OCCURRENCE}" and the id: the occurrence that the page showed',
+            "additionalProperties": {"type": "string", "pattern": "^[0-9]{1,15}$"},
+        },
+        required=True,
+    ),
+)
+async def acknowledge(request: Request, state: CurrentState) -> Response:
+    is_form, content = await _body(request)
+    if is_form:
+        shown = {k.removeprefix(OCCURRENCE): v for k, v in content.items() if k.startswith(OCCURRENCE)}
+        body = as_model(AcknowledgeBody, {"alarms": shown, "id": content.get("id")})
+    else:
+        body = as_model(AcknowledgeBody, content)
+    acts = {
+        alarm: AlarmActBody(occurrence=occurrence, at=body.at, id=body.id, seen=body.seen)
+        for alarm, occurrence in body.alarms.items()
+    }
+    return await _answer(
+        request, state, "acknowledge", acts, content if is_form else None, several=True
+    )
+
+
+@router.post(
+    "/alarms/{alarm:path}/{act}",
+    response_model=AlarmReceipt,
+    summary="Acknowledge, shelve or reset an alarm, or take it out of service",
+    responses=_acts(AlarmReceipt),
+    openapi_extra=described_body(AlarmActBody, fields(**ACT_FORM_PARTS), required=False),
+)
+async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
+    is_form, content = await _body(request)
+    given = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
+    body = as_model(AlarmActBody, given if is_form else content)
+    return await _answer(request, state, act, {alarm: body}, content if is_form else None)
+
+
+async def _body(request: Request) -> tuple[bool, dict[str, Any]]:
+    """Whether the body is a form, and its content: JSON, a form, or nothing at all."""
+    kind, content = kind_of(request), await body_of(request)
+    if kind == FORM:
+        return True, dict(form_of(content, FORM_FIELDS_MOST))
+    if kind not in (JSON, ""):
+        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
+    decoded = json_of(content or b"{}")
+    if not isinstance(decoded, dict):
+        raise InputError("the body must be an object")
+    return False, decoded
+
+
+async def _answer(
+    request: Request,
+    state: AppState,
+    act: str,
+    bodies: Mapping[str, AlarmActBody],
+    form: Mapping[str, str] | None,
+    *,
+    several: bool = False,
+) -> Response:
+    """Runs an act on alarms and answers with the receipts."""
+    # Without a cookie the client is anonymous; its next request has this one.
+    who, token = principal_with_new_token(request, state)
+    refusal = TOO_SOON if form is not None and _is_second_tap(form) else None
+    if not state.limits.admit(who):
+        refusal = TOO_OFTEN
+    with state.in_flight.track():
+        receipts = await asyncio.gather(
+            *(
+                _run(state, who, act, alarm, body, form is None, refusal)
+                for alarm, body in bodies.items()
+            )
+        )
+    pairs = list(zip(bodies, receipts, strict=True))
+    response = (
+        _back(request, state, form, receipts) if form is not None else _json(request, pairs, several)
+    )
+    return set_client_cookie(response, request, token)
+
+
+async def _run(
+    state: AppState,
+    who: Principal,
+    act: str,
+    alarm: str,
+    body: AlarmActBody,
+    scripted: bool,
+    refusal: Any,
+) -> ActReceipt:
+    runner = _session(state, alarm).alarm_acts
+    # One rendered page has one id for all its buttons, and each is an act of its own.
+    act_id = f"{body.id}.{act}.{alarm}" if body.id else secrets.token_hex(8)
+    at = body.at.timestamp() if scripted and body.at else None
+    values = body.values(alarm, time.time())
+    if body.id and body.for_s is not None and (earlier := runner.request(act_id)):
+        values = dict(earlier.values)  # its end was that of the first request
+    requested = ActRequest(act, who, alarm, values, at, scripted)
+    if refusal is not None:
+        return runner.limited(requested, act_id, refusal)
+    receipt = await runner.act(requested, act_id)
+    if not receipt.done or await state.fleet.alarms.written(DISK_TIMEOUT_S):
+        return receipt
+    return replace(receipt, reason=receipt.reason or say("alarm_act_not_on_disk"))
+
+
+def _session(state: AppState, alarm: str) -> RobotSession:
+    """The session of an alarm's robot: who has control there may act. The panel's own alarms are of the
+    first robot."""
+    instance = state.fleet.alarms.engine.alarms.get(alarm)
+    robot = instance.definition.robot if instance else ""
+    known = {session.entry.id if session.entry else "": session for session in state.fleet.sessions}
+    return known.get(robot, state.fleet.first)
+
+
+def _is_second_tap(form: Mapping[str, str]) -> bool:
+    """Whether a page without scripts is touched sooner than anyone reads it."""
+    try:
+        shown_at = float(form.get("_since", "-inf"))
+    except ValueError:
+        raise InputError("_since: is not that of a page") from None
+    return clock.server_now() - shown_at < TAP_AGAIN_S
+
+
+def _json(request: Request, pairs: list[tuple[str, ActReceipt]], several: bool) -> Response:
+    receipts = [receipt_json(alarm, receipt) for alarm, receipt in pairs]
+    cause = next((receipt.cause for _, receipt in pairs if not receipt.done), "")
+    headers = {"retry-after": str(RETRY_AFTER_S)} if cause == "limit" else None
+    content = {"receipts": receipts} if several else receipts[0]
+    return JSONResponse(
+        localized(content, language_of(request)), status_code=STATUS[cause], headers=headers
+    )
+
+
+def _back(
+    request: Request, state: AppState, form: Mapping[str, str], receipts: Iterable[ActReceipt]
+) -> Response:
+    """A redirect to the page of the form, which shows the first receipt that says something."""
+    receipt = next((receipt for receipt in receipts if receipt.reason), None)
+    page = form.get("page") or _referring_page(request)
+    page = page.removeprefix(state.root)
+    page = page if OWN_PAGE.fullmatch(page) else "/"
+    if receipt is not None:
+        shown = receipt.code if receipt.cause == "limit" else receipt.id
+        page += f"{'&' if '?' in page else '?'}act={quote(shown, safe='')}"
+    return RedirectResponse(state.root + page, status_code=303)
+
+
+def _referring_page(request: Request) -> str:
+    """The path and query of the page that a browser names as the referrer, if it is one of this
+    server."""
+    try:
+        referrer = urlsplit(request.headers.get("referer", ""))
+    except ValueError:
+        return ""
+    if referrer.netloc != request.headers.get("host"):
+        return ""
+    return f"{referrer.path}?{referrer.query}" if referrer.query else referrer.path

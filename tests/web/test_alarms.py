@@ -1,0 +1,219 @@
+"""Alarms of a server: raised, shown on the stream, acknowledged over HTTP, and kept over a restart."""
+
+import json
+import re
+import signal
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+
+PANEL = """
+title = "Cell"
+language = "en"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "air"
+kind = "readout"
+label = "Air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+[demo]
+"/air" = { %s }
+[[alarm]]
+id = "air_low"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = { en = "Air pressure low", ja = "空気圧低下" }
+cause = "A leak"
+action = { en = "Open valve V1", ja = "バルブ V1 を開く" }
+group = "Air"
+unit = "bar"
+low = 5.0
+priority = 2
+[[alarm]]
+id = "air_latched"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "Air was lost"
+low = 5.0
+priority = 1
+latched = true
+"""
+LOW = "values = [4.5]"
+HEALTHY = "values = [6.0]"
+SILENT = "silent = true"
+
+
+def server_with(folder: Path, air: str = LOW, more: str = "", data: Path | None = None) -> Server:
+    environment = {} if data is None else {"KIOSK_DATA": str(data)}
+    return demo_server(folder, PANEL % air + more, **environment)
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Server]:
+    """Its alarms are active."""
+    with server_with(tmp_path) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        yield server
+
+
+def listed(server: Server, **headers: str) -> dict[str, dict[str, Any]]:
+    alarms = server.http.get("/alarms", headers=headers).json()["alarms"]
+    return {alarm["id"]: alarm for alarm in alarms}
+
+
+def act(server: Server, alarm: str, act: str, **body: Any) -> httpx.Response:
+    return server.http.post(f"/alarms/{alarm}/{act}", json=body)
+
+
+def history(server: Server, **query: Any) -> dict[str, Any]:
+    found: dict[str, Any] = server.http.get("/alarms", params={"history": "true", **query}).json()
+    return found
+
+
+def test_an_alarm_is_listed_with_its_text_and_value_in_the_readers_language(cell: Server) -> None:
+    alarm = listed(cell)["air_low"]
+    assert (alarm["state"], alarm["acknowledged"], alarm["occurrence"]) == ("active", False, 1)
+    assert (alarm["priority"], alarm["value"], alarm["limit"]) == (2, 4.5, 5.0)
+    assert (alarm["text"], alarm["action"]) == ("Air pressure low", "Open valve V1")
+    assert (alarm["value_text"], alarm["state_text"]) == ("4.5 bar", "Active, unacknowledged")
+    assert datetime.fromisoformat(alarm["since"]) < datetime.now(UTC)
+    assert alarm["acts"] == ["acknowledge", "shelve", "out_of_service"]
+    japanese = listed(cell, **{"accept-language": "ja"})["air_low"]
+    assert (japanese["text"], japanese["priority_text"]) == ("空気圧低下", "中")
+
+
+def test_the_most_urgent_is_the_line_and_the_events_bring_changes_only(cell: Server) -> None:
+    shown = cell.snapshot()["alarms"]
+    assert shown["line"]["id"] == "air_latched"
+    assert list(shown["rows"]) == ["air_latched", "air_low"]
+    assert (shown["standing"], shown["unacknowledged"], shown["more"]) == (2, 2, 0)
+    assert shown["priorities"]["2"] == {"standing": 1, "unacknowledged": 1}
+    with cell.stream() as stream:
+        stream.next("snapshot")
+        assert act(cell, "air_latched", "acknowledge", occurrence=1).status_code == 200
+        _, event, _ = stream.next("alarms")
+    assert list(event["rows"]) == ["air_latched"]
+    assert event["line"]["id"] == "air_low"
+    assert (event["standing"], event["unacknowledged"]) == (2, 1)
+
+
+def test_an_act_is_idempotent_checked_and_logged(cell: Server) -> None:
+    receipt = act(cell, "air_low", "acknowledge", occurrence=1, id="a1").json()
+    assert (receipt["outcome"], receipt["done"], receipt["alarm"]) == ("succeeded", True, "air_low")
+    assert act(cell, "air_low", "acknowledge", occurrence=1, id="a1").json() == receipt
+    stale = act(cell, "air_latched", "acknowledge", occurrence=0)
+    assert (stale.status_code, stale.json()["code"]) == (409, "alarm_came_again")
+    assert act(cell, "air_low", "acknowledge").status_code == 422
+    assert act(cell, "air_low", "dance").status_code == 404
+    assert act(cell, "oil", "acknowledge", occurrence=1).json()["code"] == "alarm_gone"
+    assert act(cell, "air_latched", "reset").json()["code"] == "alarm_still_active"
+    rows = history(cell)["history"]
+    assert [(row["id"], row["act"]) for row in rows if row["act"]] == [("air_low", "acknowledge")]
+    page = cell.http.get("/log").text
+    assert "Acknowledge alarm" in page
+    assert "Acknowledged: Air pressure low." in page
+
+
+def test_shelving_has_a_reason_and_an_end(cell: Server) -> None:
+    until_text = (datetime.now(UTC) + timedelta(minutes=10)).isoformat()
+    assert act(cell, "air_low", "shelve", until=until_text).json()["code"] == "alarm_reason_missing"
+    high = act(cell, "air_latched", "shelve", until=until_text, reason="Tests")
+    assert high.json()["code"] == "alarm_shelve_high"
+    assert act(cell, "air_low", "shelve", for_s=600, reason="Tests").status_code == 200
+    alarm = listed(cell)["air_low"]
+    assert (alarm["state"], alarm["shelf"]["reason"]) == ("shelved", "Tests")
+    assert cell.snapshot()["alarms"]["shelved"] == 1
+    assert act(cell, "air_low", "unshelve").status_code == 200
+    assert (listed(cell)["air_low"]["state"], listed(cell)["air_low"]["occurrence"]) == ("active", 2)
+
+
+def test_a_page_acknowledges_what_it_shows_at_once(cell: Server) -> None:
+    answer = cell.http.post(
+        "/alarms/acknowledge", json={"alarms": {"air_low": 1, "air_latched": 0}, "id": "a1"}
+    )
+    assert answer.status_code == 409
+    done = {receipt["alarm"]: receipt["done"] for receipt in answer.json()["receipts"]}
+    assert done == {"air_low": True, "air_latched": False}
+    assert not listed(cell)["air_latched"]["acknowledged"]
+
+
+def test_a_form_without_scripts_goes_back_to_its_page(cell: Server) -> None:
+    fields = {"occurrence": "1", "id": "f1", "page": "/pages/main", "_since": "0"}
+    answer = cell.http.post("/alarms/air_low/acknowledge", data=fields)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/pages/main")
+    assert listed(cell)["air_low"]["acknowledged"]
+    again = cell.http.post("/alarms/air_latched/acknowledge", data={**fields, "occurrence": "0"})
+    assert re.fullmatch(r"/pages/main\?act=f1\.acknowledge\.air_latched", again.headers["location"])
+    referring = {"referer": f"{cell.url}/alarms?group=Air"}
+    several = cell.http.post(
+        "/alarms/acknowledge", data={"occurrence.air_latched": "1"}, headers=referring
+    )
+    assert several.headers["location"] == "/alarms?group=Air"
+    elsewhere = cell.http.post(
+        "/alarms/acknowledge", data={**fields, "occurrence.air_low": "1", "page": "//x.y"}
+    )
+    assert elsewhere.headers["location"].startswith("/?act=") or elsewhere.headers["location"] == "/"
+
+
+def test_who_has_no_control_changes_no_alarm(tmp_path: Path) -> None:
+    with server_with(tmp_path, more="[control]\nrequired = true\n") as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        refused = act(server, "air_low", "acknowledge", occurrence=1)
+        assert (refused.status_code, refused.json()["code"]) == (409, "control_free")
+        assert server.http.post("/control/take", json={}).json()["done"]
+        assert act(server, "air_low", "acknowledge", occurrence=1).status_code == 200
+
+
+def test_the_history_has_pages_and_a_search(cell: Server) -> None:
+    for occurrence in (1, 1):
+        act(cell, "air_low", "acknowledge", occurrence=occurrence)
+    act(cell, "air_low", "out_of_service", reason="Tests")
+    first = history(cell, limit=2)
+    assert [row["state"] for row in first["history"]] == ["out_of_service", "active"]
+    second = history(cell, limit=2, before=first["older"])
+    assert {row["id"] for row in second["history"]} == {"air_low", "air_latched"}
+    assert second["history"][0]["seq"] < first["history"][-1]["seq"]
+    found = history(cell, text="was lost")["history"]
+    assert [(row["id"], row["text"], row["priority"]) for row in found] == [
+        ("air_latched", "Air was lost", 1)
+    ]
+
+
+def test_what_stood_is_not_known_after_a_kill_and_is_normal_when_it_is_heard(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    server = server_with(tmp_path, data=data)
+    until(lambda: len(listed(server)) == 2, "the alarms are raised")
+    assert act(server, "air_low", "acknowledge", occurrence=1).status_code == 200
+    server.end(signal.SIGKILL)
+    with server_with(tmp_path, SILENT, data=data) as server:
+        alarms = listed(server)
+        assert {a["id"]: (a["state"], a["acknowledged"]) for a in alarms.values()} == {
+            "air_latched": ("unknown", False),
+            "air_low": ("unknown", True),
+        }
+        assert (server.snapshot()["alarms"]["standing"], alarms["air_low"]["occurrence"]) == (2, 1)
+    with server_with(tmp_path, HEALTHY, data=data) as server:
+        until(lambda: "air_low" not in listed(server), "it is normal")
+        latched = until(lambda: listed(server)["air_latched"], "it is latched")
+        assert (latched["state"], latched["acknowledged"]) == ("latched", False)
+        assert act(server, "air_latched", "reset").json()["code"] == "alarm_acknowledge_first"
+        assert act(server, "air_latched", "acknowledge", occurrence=1).status_code == 200
+        assert act(server, "air_latched", "reset").status_code == 200
+        assert listed(server) == {}
+
+
+def test_every_row_is_json_that_the_description_has(cell: Server) -> None:
+    described = cell.http.get("/openapi.json").json()["components"]["schemas"]["AlarmAnswer"]
+    (alarm, _) = listed(cell).values()
+    assert set(alarm) == set(described["properties"])
+    json.dumps(alarm, allow_nan=False)
