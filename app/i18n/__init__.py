@@ -18,7 +18,7 @@ from app.i18n.text import (
     say,
     text_in,
 )
-from app.i18n.values import PanelText, date_and_time, number, time_of_day
+from app.i18n.values import PanelText, date_and_time, named_day, number, short_day, time_of_day
 
 __all__ = [
     "BETWEEN",
@@ -31,11 +31,13 @@ __all__ = [
     "hint",
     "joined",
     "localized",
+    "named_day",
     "number",
     "present_code",
     "render",
     "say",
     "sentences",
+    "short_day",
     "text_in",
     "time_of_day",
 ]

@@ -33,6 +33,11 @@ class Symbols(NamedTuple):
 # The minus sign of every language: a hyphen is too short to be seen from afar, and not read aloud.
 MINUS: Final = "\N{MINUS SIGN}"
 PLAIN: Final = Symbols({ord("-"): MINUS}, ".", ",", ":", ISO_DATE)
+WEEKDAYS: Final = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+MONTHS: Final = (
+    "January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
+    "November", "December",
+)  # fmt: skip
 # What Babel says of the panel's languages. Each page names them: an English panel need not hold what
 # Babel knows of all, 5 MB.
 OWN_NAMES: Final = {"de": "Deutsch", "en": "English", "ja": "日本語"}
@@ -89,6 +94,28 @@ def date_time_in(text: str, language: str) -> str:
     """A date and a time, "2026-11-21 14:02:11", as this language writes them; ValueError for none."""
     day, _, time = text.partition(" ")
     return f"{date_in(day, language)} {time_in(time, language)}"
+
+
+def day_in(text: str, language: str) -> str:
+    """A day by its names, "Saturday 21 November 2026"; ValueError for no date."""
+    day = date.fromisoformat(text)
+    locale = None if language == ENGLISH else locale_of(language)
+    if locale is None:
+        return f"{WEEKDAYS[day.weekday()]} {day.day} {MONTHS[day.month - 1]} {day.year}"
+    from babel.dates import format_date
+
+    return format_date(day, "full", locale)
+
+
+def short_day_in(text: str, language: str) -> str:
+    """A day without its year, as short as it is read: "Sat 21 Nov"; ValueError for no date."""
+    day = date.fromisoformat(text)
+    locale = None if language == ENGLISH else locale_of(language)
+    if locale is None:
+        return f"{WEEKDAYS[day.weekday()][:3]} {day.day} {MONTHS[day.month - 1][:3]}"
+    from babel.dates import format_skeleton
+
+    return format_skeleton("MMMEd", day, locale=locale)
 
 
 def own_name(language: str) -> str:

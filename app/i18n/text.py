@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Any, Final, NoReturn, Union
 
 from app.i18n.catalogue import ENGLISH, renamed_codes, sentences, when_changed
-from app.i18n.locales import date_time_in, number_in, symbols, time_in
+from app.i18n.locales import date_time_in, day_in, number_in, short_day_in, symbols, time_in
 from app.printable import readable
 
 # Stands in a sentence: a name or a number, which are in no language; another sentence; or several,
@@ -24,6 +24,7 @@ Param = Union[str, int, float, "Text", tuple["TextLike", ...]]
 BETWEEN: Final = frozenset({"between_sentences", "between_lines", "between_names"})
 # Codes of what is no sentence; none of a catalogue begins so.
 PANEL, PARTS, TIME, DATE_TIME = "=panel", "=parts", "=time", "=date_time"
+DAY, SHORT_DAY = "=day", "=short_day"
 NUMBER, NUMBERS = "=number", "=numbers"
 
 
@@ -167,6 +168,8 @@ _WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
     NUMBER: _number,
     NUMBERS: _numbers,
     TIME: lambda params, language: time_in(params["at"], language),
+    DAY: lambda params, language: day_in(params["at"], language),
+    SHORT_DAY: lambda params, language: short_day_in(params["at"], language),
     DATE_TIME: lambda params, language: date_time_in(params["at"], language),
 }
 

@@ -3,7 +3,19 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from app.i18n.catalogue import ENGLISH
-from app.i18n.text import DATE_TIME, NUMBER, NUMBERS, PANEL, PARTS, TIME, Text, TextLike, render
+from app.i18n.text import (
+    DATE_TIME,
+    DAY,
+    NUMBER,
+    NUMBERS,
+    PANEL,
+    PARTS,
+    SHORT_DAY,
+    TIME,
+    Text,
+    TextLike,
+    render,
+)
 
 
 class PanelText(Text):
@@ -99,6 +111,16 @@ def time_of_day(at: str) -> Text:
 def date_and_time(at: str) -> Text:
     """A date and a time like "2026-11-21 14:02:11"."""
     return Text(DATE_TIME, (("at", at),))
+
+
+def named_day(at: str) -> Text:
+    """A day like "2026-11-21", by its names."""
+    return Text(DAY, (("at", at),))
+
+
+def short_day(at: str) -> Text:
+    """A day like "2026-11-21", by its short names and without the year."""
+    return Text(SHORT_DAY, (("at", at),))
 
 
 def longest(text: TextLike) -> int:

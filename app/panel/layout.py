@@ -13,6 +13,7 @@ from app.panel.widgets.kinds import Widget
 
 COLUMNS: Final = 12  # of a page, and of a group that does not say
 SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
+FRAME_ONLY: Final = "-frame"  # no page has this id: what shows the frame around something else
 Placed = Iterator[tuple[str, BaseWidget]]
 
 Theme = Literal["light", "dark", "contrast"]

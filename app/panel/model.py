@@ -28,7 +28,7 @@ from app.panel.condition import Condition
 from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
-from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
+from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
 from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
@@ -156,7 +156,13 @@ class Panel(Description):
     def widgets_by_page(self) -> dict[str, frozenset[str]]:
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
         frame = {widget.id for widget in self.frame_widgets}
-        return {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
+        pages = {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
+        return pages | {FRAME_ONLY: frozenset(frame)}
+
+    @property
+    def has_rail(self) -> bool:
+        """Whether tabs or buttons of the frame stand at the side of its pages."""
+        return len(self.pages) > 1 or bool(self.frame.widgets)
 
     @cached_property
     def commands(self) -> tuple[Command, ...]:

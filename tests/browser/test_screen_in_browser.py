@@ -342,8 +342,8 @@ def test_the_menu_leads_to_the_log_and_changes_the_look(
         assert shown.url == f"{cell.url}/pages/setup"
         button(shown, "Menu").click()
         expect(button(shown, "Dark")).to_have_attribute("aria-pressed", "true")
-        menu.get_by_role("link").click()
-        expect(shown.get_by_role("heading", name="Operator's log")).to_be_visible()
+        shown.locator("nav.pages").get_by_role("link", name="Log").click()
+        expect(shown.get_by_role("heading", name="Operator's log")).to_be_attached()
         expect(root).to_have_attribute("data-theme", "dark")
 
 

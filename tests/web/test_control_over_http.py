@@ -483,8 +483,8 @@ def test_acts_are_in_the_operators_log_its_page_and_its_csv(
     ]
     assert acts[1]["press"] == "bobs-act"
     html = ann.http.get("/log", params={"text": "control_take"}).text
-    assert html.count("<td>Take control") == 2
-    assert "Release control" not in html
+    assert html.count("<b>Take control</b>") == 2
+    assert "<b>Release control</b>" not in html
     assert "Another panel has control. You can request it." in html
 
 

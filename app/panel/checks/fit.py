@@ -66,17 +66,12 @@ def page_height(panel: Panel, page: Page, screen: Screen) -> float:
 
 def page_width(panel: Panel, screen: Screen) -> float:
     """The width for the groups."""
-    return screen.width - (screen.rail if has_rail(panel) else 0) - 2 * screen.pad
-
-
-def has_rail(panel: Panel) -> bool:
-    """Whether tabs or buttons of the frame stand at the side."""
-    return len(panel.pages) > 1 or bool(panel.frame.widgets)
+    return screen.width - (screen.rail if panel.has_rail else 0) - 2 * screen.pad
 
 
 def long_rail(panel: Panel, screen: Screen) -> str:
     """Why not all tabs are seen beside the buttons of the frame; "" where they are."""
-    tabs = len(panel.pages) if has_rail(panel) else 0
+    tabs = len(panel.pages) + panel.log.enabled if panel.has_rail else 0
     low = screen.height <= LOW_SCREEN
     stops = {widget.id for widget in panel.stops}
     keys = [

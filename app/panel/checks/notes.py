@@ -1,6 +1,7 @@
 """Hints about a panel that are no faults; `python -m app.check` prints them."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from app.errors import Note
 from app.interfaces import Interfaces
@@ -9,12 +10,17 @@ from app.panel.checks.fit import fit_notes
 from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
 from app.panel.model import Panel
+from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.service_action import Action
 from app.panel.widgets.trend import Trend, history_bytes
+
+MOVING: Final = (HoldCommand, Action)
 
 
 def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """All notes with their places in the panel file, without ids and lines."""
     yield from _alarm_notes(panel)
+    yield from _stop_notes(panel)
     yield from _unbounded_trust_notes(panel)
     yield from _embedded_controls_notes(panel)
     yield from _unused_interlock_notes(panel)
@@ -30,6 +36,21 @@ def _alarm_notes(panel: Panel) -> Iterator[Note]:
     for i, alarm in enumerate(panel.alarms):
         if alarm.source in ("node", "diagnostics", "list") or alarm.inhibits:
             yield Note(f"alarm[{i}]", NOT_RAISED)
+
+
+def _stop_notes(panel: Panel) -> Iterator[Note]:
+    """The first widget that moves the robot, where Stop is not on every page."""
+    if any(widget in panel.stops for widget in panel.frame.widgets):
+        return
+    for p, page in enumerate(panel.pages):
+        for place, widget in page.placed():
+            if isinstance(widget, MOVING) or getattr(widget, "role", "") == "start":
+                message = (
+                    "can move the robot, and Stop is not on every page: add a [[frame.widget]] with "
+                    'role = "stop"'
+                )
+                yield Note(f"page[{p}].{place}", message)
+                return
 
 
 def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:

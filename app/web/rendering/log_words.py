@@ -2,13 +2,16 @@
 
 import json
 import re
-from datetime import datetime
+from collections.abc import Iterable, Iterator
+from datetime import datetime, timedelta
 from functools import cache
+from itertools import groupby
 from typing import Any, Final
 
+from app.audit import Row
 from app.clock import offset_if_twice
-from app.i18n import Param, Text, TextLike, render, say
-from app.i18n.locales import date_in, number_in, time_in
+from app.i18n import Param, Text, TextLike, named_day, render, say
+from app.i18n.locales import number_in, time_in
 from app.printable import printable
 
 OUTCOMES: Final = (
@@ -23,12 +26,9 @@ def _time(ms: int) -> datetime:
 
 
 def time_of(ms: int, language: str) -> str:
-    """The time of day with milliseconds, in the language's notation, and its offset where the clock
-    shows this time twice."""
-    at, offset = _time(ms), offset_if_twice(ms // 1000)
-    fraction = number_in(at.strftime(".%f")[:-3], language)
-    clock, _, shown = time_in(f"{at.strftime('%H:%M:%S')} {offset}", language).partition(" ")
-    return f"{clock}{fraction} {shown}".rstrip()
+    """The time of day in the language's notation, and its offset where the clock shows this time
+    twice."""
+    return time_in(f"{_time(ms).strftime('%H:%M:%S')} {offset_if_twice(ms // 1000)}", language).rstrip()
 
 
 def iso_of(ms: int) -> str:
@@ -36,8 +36,14 @@ def iso_of(ms: int) -> str:
     return _time(ms).isoformat(timespec="milliseconds")
 
 
-def date_of(ms: int, language: str) -> str:
-    return date_in(_time(ms).strftime("%Y-%m-%d"), language)
+def by_day(rows: Iterable[Row]) -> Iterator[tuple[Text, list[Row]]]:
+    """The rows of each day in turn, below its name."""
+    now = datetime.now().astimezone().date()
+    for day, entries in groupby(rows, key=lambda row: _time(row.entry.at).date()):
+        name = named_day(day.isoformat())
+        if day in (now, now - timedelta(days=1)):
+            name = word("today" if day == now else "yesterday", date=name)
+        yield name, list(entries)
 
 
 def word(name: str, **about: Param) -> Text:

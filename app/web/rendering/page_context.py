@@ -1,4 +1,4 @@
-"""The context of `screen.html`, the template of every page."""
+"""The context of `frame.html`, the frame around every page."""
 
 import secrets
 import time
@@ -14,7 +14,7 @@ from app.clock import format_datetime, format_time, iso_time
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike
-from app.panel.layout import Page
+from app.panel.layout import FRAME_ONLY, Page
 from app.panel.model import Panel
 from app.permission.principal import Principal
 from app.printable import printable_texts
@@ -42,13 +42,15 @@ RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a pre
 
 
 class PageContext(TypedDict):
-    """The variables of `screen.html`."""
+    """The variables of `frame.html` and `screen.html`."""
 
     site: AppState
     display: DisplaySettings
     choices: Sequence[Choice]
     panel: Panel
     page: Page
+    railed: bool
+    is_log: bool
     inside: Markup | None
     base: str
     robot: str
@@ -94,6 +96,7 @@ def page_context(
         of_client = audience_of(who, publisher.view["control"], rules, language)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
+    is_log = page.id == FRAME_ONLY
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -109,6 +112,8 @@ def page_context(
         choices=[*language_choice(panel, language), *choices(display)],
         panel=panel,
         page=page,
+        railed=panel.has_rail or is_log,
+        is_log=is_log,
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

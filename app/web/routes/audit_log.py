@@ -18,18 +18,18 @@ from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
 from app.errors import InputError, LogError, NotFound
-from app.i18n import Text, TextLike, say
-from app.panel.model import Panel
+from app.i18n import Text, TextLike, number, say
+from app.panel.layout import FRAME_ONLY, Page
 from app.panel.widgets.families import Command, EntryWidget
 from app.permission.verdict import WITHOUT_CONTROL
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
+from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
-from app.web.rendering.display_choice import DisplaySettings, display_of
 from app.web.rendering.log_words import (
     OUTCOMES,
-    date_of,
+    by_day,
     iso_of,
     outcome_of,
     time_of,
@@ -37,12 +37,14 @@ from app.web.rendering.log_words import (
     who_of,
     word,
 )
+from app.web.rendering.page_context import PageContext, page_context
 
 log = logging.getLogger("kiosk.log")
 
 router = APIRouter()
 
 ROWS_ON_PAGE: Final = 50
+REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not been loaded for so long
 # Entries of the kind "control": acts, and changes that no act made.
 CONTROL_ACTIONS: Final = (
     *(f"control_{act}" for act in CONTROL_ACTS),
@@ -66,7 +68,8 @@ A_TIME: Final[dict[str, JsonValue]] = {
 
 class Wanted(BaseModel):
     """The filter as a form sends it; times are `2026-11-21T10:00`, in the server's zone where they
-    have none of their own."""
+    have none of their own. `robot` is the id of the robot whose frame is around the page: it leaves no
+    entry out."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -78,6 +81,12 @@ class Wanted(BaseModel):
     text: Annotated[str, Field(max_length=100)] = ""
     every: bool = False
     before: Annotated[int, Field(ge=1, lt=2**63)] | None = None
+    robot: Annotated[str, Field(max_length=64)] = ""
+
+    @property
+    def is_narrowed(self) -> bool:
+        """Whether entries are left out."""
+        return any(self.model_dump(exclude={"before", "robot", "every"}).values())
 
     def filter(self) -> Filter:
         """Raises InputError for what is no time."""
@@ -96,22 +105,18 @@ class Wanted(BaseModel):
 
 
 class LogContext(TypedDict):
-    """The variables of `log.html`."""
+    """The variables of `log.html`, beside those of the frame."""
 
-    site: AppState
-    panel: Panel
-    display: DisplaySettings
     wanted: Wanted
     typed: dict[str, str]
-    rows: list[Row]
+    days: list[tuple[Text, list[Row]]]
     labels: dict[str, TextLike]
-    inputs: dict[str, TextLike]
+    entered: dict[str, TextLike]
     robots: dict[str, TextLike]
     acts: dict[str, Text]
     outcomes: tuple[str, ...]
     off: TextLike
-    banner: TextLike
-    fault: TextLike
+    count: TextLike
     older: str
     newest: str
     csv: str
@@ -130,40 +135,51 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         rows = await state.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
     rows = [_shown(row, language) for row in rows[:ROWS_ON_PAGE]]
-    panel = state.fleet.panel
+    panel, head = state.fleet.panel, state.log.head
     context = LogContext(
-        site=state,
-        panel=panel,
-        display=display_of(request, panel),
         wanted=wanted,
         typed=printable_texts(wanted.model_dump()),
-        rows=rows,
+        days=list(by_day(rows)),
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
-        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
+        entered={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         robots={str(robot.name): robot.name for robot in panel.robots},
         acts={action: word(action) for action in (*CONTROL_ACTIONS, *ALARM_ACTIONS)},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
-        banner=state.banner,
-        fault=state.log.fault,
+        count=word("head", count=number(f"{head.count:,d}")) if head else "",
         older=wanted.query(rows[-1].entry.seq) if more else "",
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
+    frame, token = log_frame(request, state, wanted.robot)
     html = state.templates.render(
         "log.html",
         language,
+        **frame,
         **context,
         time_of=partial(time_of, language=language),
         iso_of=iso_of,
-        date_of=partial(date_of, language=language),
         values_of=partial(values_of, language=language),
         outcome_of=outcome_of,
         who_of=who_of,
         word=word,
         without_control=WITHOUT_CONTROL.code,
     )
-    return HTMLResponse(html, headers={"cache-control": "no-store"})
+    headers = {"cache-control": "no-store"}
+    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+
+
+def log_frame(request: Request, state: AppState, robot: str) -> tuple[PageContext, str]:
+    """The frame around the log, of a robot or else the first; and the token of a new client."""
+    entry_of = {session.entry.id: session for session in state.fleet.sessions if session.entry}
+    session = entry_of.get(robot, state.fleet.first)
+    who, token = principal_with_new_token(request, state, embedded=False)
+    if session.control.rules.required:
+        session.control.loaded(who, REFRESH_S, opened_by_person(request))
+        session.show()
+    title = say("log_page_title")
+    shown = Page.model_construct(None, id=FRAME_ONLY, title=title, own=(), groups=())
+    return page_context(request, state, session, shown, who, REFRESH_S), token
 
 
 @router.get(

@@ -37,7 +37,7 @@ class Log {
     this.#root = root;
     this.#lines = root.querySelector(".lines");
     const wanted = root.querySelector(".wanted");
-    wanted.hidden = false;
+    wanted.inert = false;
     wanted.querySelector(".level").addEventListener("change", () => this.#restart());
     for (const input of wanted.querySelectorAll("input")) {
       input.addEventListener("input", () => this.#restart(SETTLE_MS));

@@ -1,0 +1,73 @@
+"""The operator's log stands inside the frame, in an operator's words, and nothing on a page moves while
+it loads."""
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.panel import load_panel
+from tests.support.browser.browsers import sized
+from tests.support.browser.pages import DRAWN, place
+from tests.support.parts import ROOT, SHIPPED, Server, until
+from tests.support.servers import ready
+
+SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (390, 844))
+STOP: Final = "[data-widget=stop] > button"
+# A button's own face, and a unit that stands after its number, may move.
+SHIFTS: Final = """globalThis.shifts = [];
+new PerformanceObserver((list) => {
+  for (const { sources } of list.getEntries()) {
+    const moved = sources.filter(({ node }) => !node?.parentElement?.closest(".face, .number"));
+    shifts.push(...moved.map(({ node }) => node?.outerHTML?.slice(0, 90)));
+  }
+}).observe({ type: "layout-shift", buffered: true });"""
+
+
+@pytest.fixture(scope="module")
+def cell() -> Iterator[Server]:
+    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED))) as mine:
+        yield mine
+
+
+def test_stop_is_on_the_log_page_and_works(cell: Server, page: Page) -> None:
+    page.goto(f"{cell.url}/log")
+    for width, height in SIZES:
+        sized(page, width, height).evaluate(DRAWN)
+        stop = place(page.locator(STOP))
+        assert stop["x"] < 12
+        assert stop["y"] + stop["height"] > height - 20
+        assert page.locator("main").evaluate("(main) => main.scrollWidth <= main.clientWidth")
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    sized(page, 1280, 800).locator(STOP).click()
+    until(lambda: " of stop by " in cell.process.text, "Stop is sent")
+    expect(page.locator("[data-widget=stop] .result")).to_contain_text("Confirmed")
+
+
+def test_the_log_has_days_and_the_words_of_an_operator(cell: Server, page: Page) -> None:
+    cell.http.post("/widgets/operation", json={"inputs": {"message": "for the log"}})
+    page.goto(f"{cell.url}/log?text=for the log")
+    expect(page.locator(".day")).to_have_text(re.compile(r"Today, \w+day \d+ \w+ \d{4}"))
+    row = page.locator("tr[data-kind]").first
+    expect(row).to_contain_text("Publish")
+    expect(row).to_contain_text("for the log")
+    assert re.search("[0-9a-f]{32}", page.locator("body").inner_text()) is None
+    page.goto(f"{cell.url}/log?text=nothing has this")
+    expect(page.locator(".empty")).to_be_visible()
+    page.goto(cell.url)
+    page.get_by_role("link", name="Log").click()
+    expect(page.locator(".pages [aria-current]")).to_have_text("Log")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_nothing_moves_while_a_page_loads(cell: Server, own_page: Page, size: tuple[int, int]) -> None:
+    own_page.add_init_script(SHIFTS)
+    sized(own_page, *size)
+    paths = [f"/pages/{described.id}" for described in load_panel(SHIPPED).pages]
+    for path in (*paths, "/log"):
+        own_page.goto(cell.url + path)
+        expect(own_page.locator("html[data-floor]")).to_be_attached()
+        own_page.evaluate(DRAWN)
+        assert own_page.evaluate("shifts") == [], path
