@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
 from app.interfaces.validation import format_value
 from app.panel.base import Description, File, Icon, Id, Label, Span
-from app.panel.widgets.families import BaseWidget
-from app.panel.widgets.kinds import Widget
+from app.panel.widgets.families import BaseWidget, EntryWidget
+from app.panel.widgets.kinds import KINDS, Widget
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.tiles import BUTTONS
 
 COLUMNS: Final = 12  # of a page, and of a group that does not say
 SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
@@ -47,12 +49,62 @@ class Group(Description):
         """The columns of its grid."""
         return self.columns or COLUMNS
 
+    @cached_property
+    def blocks(self) -> tuple["Block", ...]:
+        """Its widgets from above to below. The rows of buttons at the end are a block of their own,
+        which stands at the end of the group, unless they are below what is entered."""
+        cells = list(self.cells())
+        first = 1 + max((row for widget, row, _ in cells if not is_button(widget)), default=-1)
+        straddles = any(row < first < row + rows for _, row, rows in cells)
+        above = [widget for widget, row, rows in cells if row + rows == first]
+        is_entry = any(isinstance(widget, EntryWidget | Parameter) for widget in above)
+        if straddles or is_entry:
+            first = 1 + max((row for _, row, _ in cells), default=-1)
+        facts = tuple(widget for widget, row, _ in cells if row < first)
+        buttons = tuple(widget for widget, row, _ in cells if row >= first)
+        growing = [row for widget, row, _ in cells if widget.grow and row < first]
+        growing += [r for widget, r, _ in cells if KINDS[widget.kind].tile.grows and r < first]
+        blocks = (Block(facts, growing[0] + 1 if growing else 0, False), Block(buttons, 0, True))
+        return tuple(block for block in blocks if block.widgets)
+
+    def cells(self) -> Iterator[tuple[BaseWidget, int, int]]:
+        """(widget, its first row, its rows), placed one after the other as CSS places them in a
+        grid."""
+        taken: set[tuple[int, int]] = set()
+        row = column = 0
+        for widget in self.widgets:
+            span = self.span_of(widget)
+            while column + span > self.grid or taken & _places(row, column, span, widget.rows):
+                column += 1
+                if column + span > self.grid:
+                    row, column = row + 1, 0
+            taken |= _places(row, column, span, widget.rows)
+            yield widget, row, widget.rows
+            column += span
+
     def span_of(self, widget: BaseWidget) -> int:
         """The columns that a widget takes: one, where the group says how many it has and the widget
         does not."""
         if self.columns is not None and "span" not in widget.model_fields_set:
             return 1
         return min(widget.span, self.grid)
+
+
+class Block(NamedTuple):
+    """Rows of a group. The row `grows` takes the height that is left, counted from 1; 0: none."""
+
+    widgets: tuple[BaseWidget, ...]
+    grows: int
+    are_buttons: bool
+
+
+def is_button(widget: BaseWidget) -> bool:
+    """Whether it stands with others on one line at the end of its group."""
+    return KINDS[widget.kind].tile in BUTTONS
+
+
+def _places(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]:
+    return {(r, c) for r in range(row, row + rows) for c in range(column, column + span)}
 
 
 class Page(Description):

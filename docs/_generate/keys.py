@@ -45,7 +45,8 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))
     own: dict[str, Any] = WORDS["examples"]
-    return examples | own
+    grow = {f"{name}.grow": True for name, table in tables.items() if "grow" in table["properties"]}
+    return grow | examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:

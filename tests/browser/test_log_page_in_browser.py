@@ -61,6 +61,23 @@ def test_the_log_has_days_and_the_words_of_an_operator(cell: Server, page: Page)
     expect(page.locator(".pages [aria-current]")).to_have_text("Log")
 
 
+def test_all_pages_have_one_right_edge(cell: Server, page: Page) -> None:
+    paths = [f"/pages/{described.id}" for described in load_panel(SHIPPED).pages]
+    for width, height in SIZES[:4]:
+        sized(page, width, height)
+        edges = set()
+        for path in (*paths, "/log"):
+            page.goto(cell.url + path)
+            ends = page.locator(".group").evaluate_all(
+                "(groups) => groups.map((group) => group.getBoundingClientRect().right)"
+            )
+            edges.add(round(max(ends)))
+            edges.add(
+                round(page.locator(".menu-key").evaluate("(e) => e.getBoundingClientRect().right"))
+            )
+        assert len(edges) == 1, (width, edges)
+
+
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_nothing_moves_while_a_page_loads(cell: Server, own_page: Page, size: tuple[int, int]) -> None:
     own_page.add_init_script(SHIFTS)

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.panel import Panel
-from app.panel.checks.fit import fit_notes, placed
+from app.panel.checks.fit import fit_notes
 from app.panel.layout import Group
 
 KEY = {"kind": "publish", "topic": "/a", "type": "std_msgs/msg/Empty", "message": {}}
@@ -60,7 +60,7 @@ def test_widgets_are_placed_as_a_grid_places_them() -> None:
     group = Group.model_validate(
         {"columns": 3, "widget": [{**tall, "rows": 2}, {**wide, "span": 2}, {**small, "span": 2}]}
     )
-    assert [(w.id, row, rows) for w, row, rows in placed(group.widgets, group)] == [
+    assert [(w.id, row, rows) for w, row, rows in group.cells()] == [
         ("k0", 0, 2),
         ("k1", 0, 1),
         ("k2", 1, 1),

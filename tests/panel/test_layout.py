@@ -275,3 +275,33 @@ def test_no_key_is_red_yellow_or_green() -> None:
 
 def test_the_icons_of_roles_are_shipped() -> None:
     assert set(ICONS.values()) <= set(icons())
+
+
+def blocks_of(folder: Path, *widgets: Table) -> list[tuple[list[str], int, bool]]:
+    """The blocks of a group of one column: (ids, the growing row, whether they are buttons)."""
+    (page,) = loaded(folder, tables({"columns": 1, "widget": list(widgets)})).pages
+    group = page.parts[1]
+    return [([w.id for w in block.widgets], block.grows, block.are_buttons) for block in group.blocks]
+
+
+def test_buttons_stand_at_the_end_of_their_group_unless_they_are_below_an_input(tmp_path: Path) -> None:
+    assert blocks_of(tmp_path, HEARD, FREE, HALT) == [
+        (["heard"], 0, False),
+        (["free", "halt"], 0, True),
+    ]
+    assert blocks_of(tmp_path, FREE, HEARD) == [(["free", "heard"], 0, False)]
+    note = {"id": "note", "kind": "text", "label": "Note"}
+    assert blocks_of(tmp_path, HEARD, note, FREE) == [(["heard", "note", "free"], 0, False)]
+    assert blocks_of(tmp_path, FREE) == [(["free"], 0, True)]
+
+
+def test_one_widget_of_a_group_takes_the_height_that_is_left(tmp_path: Path) -> None:
+    second = {**HEARD, "id": "second", "grow": True}
+    assert blocks_of(tmp_path, HEARD, second, FREE) == [
+        (["heard", "second"], 2, False),
+        (["free"], 0, True),
+    ]
+    table = tables({"widget": [{**HEARD, "grow": True}, second]})
+    assert faults(tmp_path, table) == {
+        "page[0].group[0].widget[1].grow": '"heard" has it already: one widget of a group grows'
+    }

@@ -4,13 +4,12 @@ The parts of such a page have fixed heights: neither a font nor a value changes 
 pixels. tests/browser/test_fit_in_browser.py holds all this against a browser.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
 
 from app.errors import Note
 from app.panel.layout import COLUMNS, Group, Page
 from app.panel.model import Panel
-from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, NARROW, TOUCH, Screen
 
@@ -134,31 +133,12 @@ def group_height(group: Group, screen: Screen, page: Page) -> float:
 def row_heights(group: Group, screen: Screen) -> list[float]:
     """The heights of a group's rows, as the browser places its widgets."""
     heights: list[float] = []
-    for widget, row, rows in placed(group.widgets, group):
+    for widget, row, rows in group.cells():
         heights += [0.0] * (row + rows - len(heights))
         needed = (KINDS[widget.kind].tile.height(widget, screen) - GAP * (rows - 1)) / rows
         for at in range(row, row + rows):
             heights[at] = max(heights[at], needed)
     return heights
-
-
-def placed(widgets: Sequence[BaseWidget], group: Group) -> Iterator[tuple[BaseWidget, int, int]]:
-    """(widget, its first row, its rows), placed one after the other as CSS places them in a grid."""
-    taken: set[tuple[int, int]] = set()
-    row = column = 0
-    for widget in widgets:
-        span = group.span_of(widget)
-        while column + span > group.grid or taken & _cells(row, column, span, widget.rows):
-            column += 1
-            if column + span > group.grid:
-                row, column = row + 1, 0
-        taken |= _cells(row, column, span, widget.rows)
-        yield widget, row, widget.rows
-        column += span
-
-
-def _cells(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]:
-    return {(r, c) for r in range(row, row + rows) for c in range(column, column + span)}
 
 
 def too_narrow(group: Group, width: float, screen: Screen) -> str:

@@ -70,6 +70,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _trend_faults(panel)
     yield from page_template_faults(panel)
     yield from _scan_faults(panel)
+    yield from _grow_faults(panel)
     yield from language_faults(panel)
     if not (faults or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
@@ -83,6 +84,19 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:
             yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_RULE}: choose another id')
+
+
+def _grow_faults(panel: Panel) -> Iterator[Fault]:
+    """One widget of a group takes the height that is left."""
+    for p, page in enumerate(panel.pages):
+        growing: dict[str, str] = {}
+        for place, widget in page.placed():
+            group = place.rpartition("widget[")[0]
+            if widget.grow and group in growing:
+                message = f'"{growing[group]}" has it already: one widget of a group grows'
+                yield Fault(f"page[{p}].{place}.grow", message)
+            elif widget.grow:
+                growing[group] = widget.id
 
 
 def _scan_faults(panel: Panel) -> Iterator[Fault]:

@@ -67,12 +67,14 @@ class TopicSource(NamedTuple):
 
 class BaseWidget(Description):
     """The keys of every widget; `span` is its width in columns of its group, which are twelfths of the
-    page where the group does not say, and `rows` its height in rows of its group."""
+    page where the group does not say, and `rows` its height in rows of its group; with `grow` its row
+    takes the height that is left."""
 
     id: Id
     label: Label
     span: Span = 12
     rows: Annotated[int, Field(ge=1, le=8)] = 1
+    grow: bool = False
     kind: str
 
     # Why a key is required, if that is not obvious.

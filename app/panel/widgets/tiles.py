@@ -94,10 +94,12 @@ class Screen:
 
 class Tile(NamedTuple):
     """What the tile of a kind needs, from (widget, screen): the height, with what stands above and
-    below it, and the least width in which the widget can be used."""
+    below it, and the least width in which the widget can be used. `grows`: it takes the height that is
+    left, where no widget of the group has `grow`."""
 
     height: Callable[[Any, Screen], float]
     width: Callable[[Any, Screen], float]
+    grows: bool = False
 
 
 def _key_height(_: BaseWidget, screen: Screen) -> float:
@@ -174,10 +176,13 @@ JOYSTICK: Final = Tile(
     lambda widget, screen: screen.touch(PAD_MM), lambda widget, screen: PAD_MM * screen.mm
 )
 LABEL: Final = Tile(lambda widget, screen: LABEL_HEIGHT, lambda widget, screen: DISPLAY_WIDTH)
-LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH)
-CAMERA: Final = Tile(lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH)
+LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH, grows=True)
+CAMERA: Final = Tile(
+    lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH, grows=True
+)
 FIGURE: Final = Tile(_figure_height, lambda widget, screen: FIGURE_WIDTH)
 GAUGE: Final = Tile(_gauge_height, lambda widget, screen: GAUGE_WIDTH)
-JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH)
-TABLE: Final = Tile(_table_height, lambda widget, screen: TABLE_WIDTH)
-TREND: Final = Tile(_trend_height, _trend_width)
+JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH, grows=True)
+TABLE: Final = Tile(_table_height, lambda widget, screen: TABLE_WIDTH, grows=True)
+TREND: Final = Tile(_trend_height, _trend_width, grows=True)
+BUTTONS: Final = (KEY, ACTION, STEP)  # what stands on one line at the end of its group

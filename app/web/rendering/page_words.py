@@ -35,6 +35,7 @@ WORDS: Final = (
     "rosout_search",
     "rosout_pause",
     *(word.code for word in LEVEL_WORDS.values()),
+    "frame_keys",
     "clean",
     "cleaning",
     "cleaning_end",

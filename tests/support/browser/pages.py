@@ -17,11 +17,13 @@ DRAWN: Final = "() => new Promise((done) => requestAnimationFrame(() => requestA
 
 # The heights that the rows of a group need, without the room that is left over.
 ROWS: Final = """(number) => {
-  const grid = document.querySelector(`[data-group="${number}"] > .grid`);
-  grid.style.alignContent = "start";
-  const rows = getComputedStyle(grid).gridTemplateRows;
-  grid.style.alignContent = "";
-  return rows.split(" ").map(parseFloat);
+  return [...document.querySelectorAll(`[data-group="${number}"] > .grid`)].flatMap((grid) => {
+    grid.style.alignContent = "start";
+    grid.style.gridTemplateRows = "none";
+    const rows = getComputedStyle(grid).gridTemplateRows;
+    grid.style.alignContent = grid.style.gridTemplateRows = "";
+    return rows.split(" ").map(parseFloat);
+  });
 }"""
 
 
