@@ -5,6 +5,7 @@
 # make docs  the documentation as a site, in build/docs; a dead link is an error
 # make faults  every fault in its long form; writes the results as a table into docs/reliability.md
 # make screenshots  every page at every size, theme and language, in build/screenshots; the README's pictures
+# make mutants  changes the code that decides, one place at a time; lists what no unit test notices
 # make soak  normal operation for SOAK_S seconds (default: an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  installs what the benchmark's rivals need into the cache
@@ -21,7 +22,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check format dev docs wheel release faults screenshots soak bench bench-setup test-parts bridge lock clean
+.PHONY: run test check format dev docs wheel release faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
@@ -96,6 +97,10 @@ screenshots: system .venv/test
 
 soak: test-parts
 	.venv/bin/python -m tests.faults.soak
+
+# `ARGS="--only verify" make mutants`: of one module; `--most 600`: so many, evenly spread.
+mutants: test-parts
+	.venv/bin/python -m tests.mutants $(ARGS)
 
 wheel: .venv/build .venv/bin/operator-panel
 	.venv/bin/python -m hatchling build --target wheel --directory dist

@@ -29,6 +29,7 @@ from tests.support.builders import (
 from tests.support.words import coded, english
 
 FLOAT: Final = "std_msgs/msg/Float32"
+FLOATS: Final = "std_msgs/msg/Float32MultiArray"
 STEP: Final = {
     "id": "speed",
     "kind": "step",
@@ -124,6 +125,13 @@ def test_step_without_a_known_value_is_locked_with_a_reason() -> None:
     assert desk.reason() == say("interlock_stale", topic="/speed", limit=number("5"))
     assert desk.press(50).outcome == "refused"
     assert desk.sent() == []
+
+
+def test_step_locks_if_its_value_is_missing_in_the_message() -> None:
+    source = {"topic": "/speeds", "type": FLOATS, "field": "data[1]"}
+    desk = Desk(value=source)
+    says(desk.robot, "/speeds", [40.0], FLOATS, at=desk.now)
+    assert desk.reason() == say("interlock_field_missing", topic="/speeds", field="data[1]")
 
 
 def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_reported() -> None:

@@ -9,10 +9,13 @@ from app.dialect.bridge_dialect import bridge_token, server_token
 from app.i18n import say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
+from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
 from app.permission.interlocks import interlock_verdict, link_verdict
+from app.permission.mismatches import topic_mismatch
 from app.permission.press_permission import judged
+from app.permission.servers import parameters_offered
 from app.permission.verdict import Verdict, locked
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
@@ -62,6 +65,10 @@ def bridge_unheard(robot: RobotState) -> None:
     robot.is_responding = False
 
 
+def behind(robot: RobotState) -> None:
+    robot.is_caught_up = False
+
+
 def no_link_at(robot: RobotState) -> None:
     robot.link_up = False
     robot.endpoints = ("tcp/robot1:7447",)
@@ -87,6 +94,7 @@ WAYS: list[tuple[Callable[[RobotState], None], Verdict]] = [
     (no_bridge, locked("link_no_bridge", name="")),
     (bridge_silent, locked("link_bridge_silent")),
     (bridge_unheard, locked("link_bridge_silent")),
+    (behind, locked("link_catching_up")),
     (joining, Verdict(False, "link_connecting", say("link_connecting"), NOW + 1)),
 ]
 
@@ -237,6 +245,15 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
     assert interlock_verdict(asks_less, robot, NOW).permitted
 
 
+def test_a_best_effort_publisher_does_not_mismatch_a_topic_that_is_only_shown() -> None:
+    robot = robot_there(small_panel())
+    heard = next(source for source in small_panel().monitored() if source.topic == "/heard")
+    endpoint(robot, "MP", "/heard", TEXT, qos=Qos(reliable=False))
+    assert topic_mismatch("MS", heard, robot) is None
+    robot.reliable_readers = {robot.key("/heard")}
+    assert topic_mismatch("MS", heard, robot) == locked("qos_robot_best_effort", topic="/heard")
+
+
 def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
@@ -259,3 +276,35 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     robot.graph.apply_token(token, False)
     robot.graph.apply_token(token, True, NOW + 9)  # another node of this name
     assert judged(call, (), robot, NOW + 9).code == "service_connecting"
+
+
+def test_a_server_is_not_called_before_its_node_is_read() -> None:
+    call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
+    robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
+    robot.graph.apply_token(server_token(BRIDGE, "SS", "reset", call.type), True, 0.0)
+    assert judged(call, (), robot, NOW).permitted
+    robot.nodes_are_read = True
+    assert judged(call, (), robot, NOW) == locked("service_connecting", name="/reset")
+    robot.graph.update_routes((), (), 1.0)
+    assert judged(call, (), robot, NOW).permitted
+
+
+def test_parameters_need_the_three_services_with_their_types() -> None:
+    speed = {"id": "speed", "kind": "parameter", "label": "Speed", "node": "/arm"}
+    robot = robot_there(panel_of({**speed, "parameter": "speed", "type": "double"}))
+
+    def serve(name: str, type_name: str, alive: bool = True) -> None:
+        robot.graph.apply_token(server_token(BRIDGE, "SS", f"arm/{name}", type_name), alive, 0.0)
+
+    serve(*GET)
+    serve(*DESCRIBE)
+    assert parameters_offered("/arm", robot) == locked("parameter_node_unavailable", node="/arm")
+    trigger = "std_srvs/srv/Trigger"
+    serve(SET[0], trigger)
+    verdict = parameters_offered("/arm", robot)
+    assert verdict == locked("topic_wrong_type", topic=f"/arm/{SET[0]}", found=trigger, wanted=SET[1])
+    serve(SET[0], trigger, alive=False)
+    serve(*SET)
+    assert parameters_offered("/arm", robot) is None
+    robot.nodes_are_read = True
+    assert parameters_offered("/arm", robot) == locked("service_connecting", name=f"/arm/{GET[0]}")
