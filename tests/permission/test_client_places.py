@@ -55,6 +55,28 @@ def test_a_place_that_is_given_back_can_be_taken_again() -> None:
     assert taken(places, "192.0.2.1") == 1
 
 
+def test_released_places_are_free_for_all_and_leave_no_client_behind() -> None:
+    places = ClientPlaces(LIMITS)
+    assert places.empty
+    for number in range(8):
+        places.take(f"192.0.2.{number}")
+    assert places.full("192.0.2.9")
+    assert not places.empty
+    for number in range(8):
+        places.release(f"192.0.2.{number}")
+    assert places.empty
+    assert not places._taken
+    assert [taken(places, f"192.0.2.{number}") for number in range(3)] == [3, 3, 2]
+
+
+def test_a_refused_client_learns_the_limit_that_it_has_reached() -> None:
+    places = ClientPlaces(LIMITS)
+    assert taken(places, "192.0.2.1") == 3
+    assert places.most("192.0.2.1") == LIMITS.client
+    assert places.most("192.0.2.2") == LIMITS.others
+    assert places.most(KIOSK) == LIMITS.total
+
+
 @pytest.mark.parametrize("total", [1, 2, 3, 10, 20, 32, 824, 2000])
 def test_shares_fit_into_the_total(total: int) -> None:
     limits = shares(total)
