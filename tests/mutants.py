@@ -88,7 +88,7 @@ class Run:
         items = [item for item in session.items if not PROCESSES & {*getattr(item, "fixturenames", ())}]
         _failure(items[0], session)  # what all share is made once, before the forks
         made, noticed = Counter[Path](), Counter[Path]()
-        for tests in ROOMS.values():
+        for tests in dict.fromkeys(tests for _, tests in self._chosen):
             assert self._passes(items, tests, None), f"without a change {tests} fail"
         for mutant, tests in self._chosen:
             made[mutant.path] += 1
