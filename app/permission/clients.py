@@ -45,8 +45,6 @@ class Client:
     @property
     def title(self) -> Text:
         """The name at the begin of a sentence, with the address where it is of use."""
-        if self.local:
-            return say(TITLES[self._code], number=self.number)
         return say(TITLES[self._code], number=self.number, address=self.address)
 
     @property

@@ -107,3 +107,13 @@ def test_client_that_does_not_return_takes_no_number() -> None:
 
 def test_a_stranger_has_no_id() -> None:
     assert (anonymous("192.0.2.7").id, str(anonymous("192.0.2.7"))) == ("", "a program (192.0.2.7)")
+
+
+def test_requests_without_a_known_token_have_no_number() -> None:
+    assert anonymous("192.0.2.7").number == new_client(token(1), "192.0.2.7").number == 0
+    assert len(public_id(token(1))) == 12
+
+
+def test_a_program_has_a_title_with_its_address_also_at_the_cell() -> None:
+    assert str(anonymous("192.0.2.7").title) == "A program (192.0.2.7)"
+    assert str(anonymous("127.0.0.1").title) == "A program (127.0.0.1)"
