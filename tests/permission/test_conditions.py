@@ -106,7 +106,9 @@ def test_without_comparisons_the_value_must_be_true(value: bool, shown: str) -> 
     [
         ({"equals": 6.0}, "6 bar", True),
         ({"not_equals": 6.0}, "not 6 bar", False),
+        ({"not_equals": 5.0}, "not 5 bar", True),
         ({"max": 5.5}, "5.5 bar or less", False),
+        ({"max": 6.0}, "6 bar or less", True),
         ({"min": 5, "max": 8}, "5 to 8 bar", True),
         ({"min": 5, "not_equals": 6}, "5 bar or more and not 6 bar", False),
         ({"one_of": [1, 6, 7]}, "1 bar, 6 bar or 7 bar", True),
@@ -116,6 +118,11 @@ def test_reason_of_each_comparison_names_the_required_value(
     robot: RobotState, keys: Table, wanted: str, met: bool
 ) -> None:
     assert texts(state_of(air(**{"min": None, **keys}), robot)) == ("6 bar", wanted, met)
+
+
+def test_no_number_does_not_count_as_another_number(robot: RobotState) -> None:
+    says(robot, ENABLED, math.nan, FLOAT)
+    assert not state_of(air(min=None, not_equals=6.0), robot).verdict.permitted
 
 
 def test_constants_are_shown_by_their_names() -> None:
