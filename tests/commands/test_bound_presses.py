@@ -15,12 +15,14 @@ from playwright.sync_api import Browser, Page, expect
 from app import clock
 from app.audit import NullLog
 from app.commands.press_guard import PressGuard
-from app.i18n import Text
+from app.errors import InputError
+from app.i18n import Text, say
 from app.permission.control_authority import ControlAuthority
 from app.view.publisher import ViewPublisher
 from app.view.view import build_view
 from tests.support.builders import (
     NOW,
+    VIEW,
     Table,
     guard_of,
     permits,
@@ -184,6 +186,29 @@ def test_a_press_of_a_page_that_showed_the_lock_before_it_changed_is_stale() -> 
     assert reason("guarded", seen) == "press_state_changed"
     assert reason("free", seen) == ""
     assert reason("guarded", publisher.id) == ""
+
+
+@pytest.mark.parametrize("seen", ["", f"{VIEW}-0", "0123-99"])
+def test_a_press_with_a_view_of_this_or_another_server_is_received(seen: str) -> None:
+    panel = small_panel()
+    guard = guard_of(panel, robot_there(panel))
+    guard.receive(press_of(panel.commands[0], {}, seen=seen))
+
+
+@pytest.mark.parametrize("seen", ["x", "5eed", f"{VIEW}-99", f"{VIEW}--1"])
+def test_an_invalid_or_future_view_is_an_input_error(seen: str) -> None:
+    panel = small_panel()
+    guard = guard_of(panel, robot_there(panel))
+    with pytest.raises(InputError):
+        guard.receive(press_of(panel.commands[0], {}, seen=seen))
+
+
+def test_a_press_of_another_robots_or_an_earlier_view_is_stale() -> None:
+    panel = small_panel()
+    guard = guard_of(panel, robot_there(panel), other_views=["0123"])
+    reasons = [guard.stale_reason(press_of(panel.commands[0], {}, seen=f"{view}-1"))
+               for view in ("0123", "4567")]  # fmt: skip
+    assert reasons == [say("press_seen_on_another_robot"), say("press_seen_before_restart")]
 
 
 def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server, way: str) -> None:
