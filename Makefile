@@ -61,6 +61,7 @@ check: .venv/test $(FRONTEND)/ready
 	.venv/bin/ruff check $(PYTHON_FOLDERS)
 	.venv/bin/ruff format --check $(PYTHON_FOLDERS)
 	$(BIOME) ci --error-on-warnings $(BIOME_OPTIONS) $(FRONTEND_FOLDERS)
+	$(FRONTEND)/node_modules/.bin/tsc --project tests/frontend
 	.venv/bin/mypy
 	.venv/bin/python -m app.i18n
 	.venv/bin/python -m docs._generate --check

@@ -1,35 +1,38 @@
 // The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press. The
 // frame around the page stays live behind it: a stop button is never covered, and never waits for an answer.
+import { entries, isCheckbox } from "./entries.js";
 import { entryText } from "./number-inputs.js";
 import { TAP_AGAIN_MS } from "./press.js";
+import { closest, find, setText } from "./show.js";
 
 const NOT_NOW_MS = 15_000; // without an answer the question goes
 const GAP_PX = 12;
 
 let closing = 0;
 
-/** @param {HTMLElement} root @param {HTMLFormElement} form @param {(event: Event) => void} onYes */
-export function confirm(root, form, onYes) {
-  const dialog = root.querySelector("dialog.ask");
+/** @param {HTMLElement} root @param {(event: Event) => void} onYes */
+export function confirm(root, onYes) {
+  const dialog = find(root, "dialog.ask");
   if (dialog.matches(":popover-open")) return; // a second tap of a button in the frame, which stays live
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
-    place.textContent = shownText(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
+    setText(place, shownText(place.getAttribute("data-value-of")) || dialog.dataset.empty);
   }
-  const button = dialog.querySelector(".yes");
+  const button = find(dialog, "button.yes");
   const answers = new AbortController();
-  /** @param {string} name @param {(event: Data) => void} listener @param {EventTarget} [target] */
+  /** @template {keyof WindowEventMap} K @param {K} name @param {(event: WindowEventMap[K]) => void} listener @param {EventTarget} [target] */
   const on = (name, listener, target = dialog) =>
     target.addEventListener(name, listener, { signal: answers.signal, capture: target !== dialog });
+
   const close = () => dialog.matches(":popover-open") && dialog.hidePopover();
   on("click", (event) => {
     if (event.defaultPrevented) return; // it was not open when the finger went down
-    if (event.target.closest(".yes")) onYes(event);
-    if (event.target.closest("button")) close();
+    if (closest(event.target, ".yes")) onYes(event);
+    if (closest(event.target, "button")) close();
   });
   // A touch of anything else is "not now".
-  on("pointerdown", (event) => dialog.contains(event.target) || isSecondTap || close(), window);
+  on("pointerdown", ({ target }) => closest(target, ".ask") || isSecondTap || close(), window);
   on("keydown", (event) => event.key === "Escape" && close(), window);
-  on("focusout", (event) => event.relatedTarget && !dialog.contains(event.relatedTarget) && close());
+  on("focusout", ({ relatedTarget: next }) => next && !closest(next, ".ask") && close());
   on("resize", () => placeBeside(dialog, root.getBoundingClientRect()), window);
   // The second tap of the press that opens the question is no answer.
   let isSecondTap = true;
@@ -42,7 +45,7 @@ export function confirm(root, form, onYes) {
     clearTimeout(opening);
     clearTimeout(notNow);
     root.toggleAttribute("data-asked", false);
-    if (dialog.contains(document.activeElement)) root.querySelector("button").focus();
+    if (dialog.contains(document.activeElement)) find(root, "button").focus();
     // The second tap of an answer is no press of the button below.
     closing = setTimeout(() => delete document.body.dataset.asks, TAP_AGAIN_MS);
   });
@@ -51,13 +54,13 @@ export function confirm(root, form, onYes) {
   root.toggleAttribute("data-asked", true);
   dialog.showPopover();
   placeBeside(dialog, root.getBoundingClientRect());
-  dialog.querySelector(".no").focus();
+  find(dialog, ".no").focus();
 }
 
 // Above the button, else below or beside it, within the page.
 /** @param {HTMLElement} sheet @param {DOMRect} button */
 function placeBeside(sheet, button) {
-  const page = document.querySelector("main").getBoundingClientRect();
+  const page = find(document, "main").getBoundingClientRect();
   const { width, height } = sheet.getBoundingClientRect();
   /** @param {number} start @param {number} least @param {number} most */
   const within = (start, least, most) => Math.max(least, Math.min(start, most));
@@ -79,13 +82,10 @@ function placeBeside(sheet, button) {
 }
 
 // The value as the page shows it.
-/** @param {Entry | RadioNodeList} input @returns {string | null} */
-function shownText(input) {
-  const entry = input instanceof RadioNodeList ? [...input].find((one) => one.type !== "hidden") : input;
-  if (entry.type === "checkbox") {
-    return entry.parentElement.querySelector(entry.checked ? ".on" : ".off").textContent;
-  }
-  if (entry.value === "") return "";
-  if (entry.selectedOptions) return entry.selectedOptions[0].textContent;
-  return entryText(entry);
+/** @param {string | null} name */
+function shownText(name) {
+  const input = entries.find((entry) => entry.name === name);
+  if (!input || input.value === "") return "";
+  if (isCheckbox(input)) return input.parentElement?.querySelector(input.checked ? ".on" : ".off")?.textContent;
+  return input instanceof HTMLSelectElement ? input.selectedOptions[0].textContent : entryText(input);
 }

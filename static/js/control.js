@@ -1,7 +1,7 @@
 // Control of the robot: the bar that shows its holder, and the holder's keep-alive. The server locks the
 // buttons of a client without control. Loaded only where the panel requires control.
 import { newId, post, TAP_AGAIN_MS } from "./press.js";
-import { setText } from "./show.js";
+import { find, setText } from "./show.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
 const BEATS_PER_KEEP_ALIVE = 3; // two heartbeats a second; the server releases a holder after 5 s of silence
@@ -26,38 +26,42 @@ export class Control {
     for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => this.#touch(), true);
     this.#bar.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.#act(event.submitter, this.#timeOf(event));
+      if (event.submitter) this.#act(event.submitter, this.#timeOf(event));
     });
   }
 
   /** @param {{ role: string, shown: string, asker: string }} content */
   show({ role, shown, asker }) {
     this.#bar.dataset.role = role;
-    this.#bar.elements.to.value = asker;
-    this.#bar.querySelector(".refused").textContent = "";
-    setText(this.#bar.querySelector(".who"), shown);
+    find(this.#bar, "input[name=to]").value = asker;
+    find(this.#bar, ".refused").textContent = "";
+    setText(find(this.#bar, ".who"), shown);
     for (const button of this.#bar.querySelectorAll("button")) {
-      button.hidden = !button.dataset.roles.split(" ").includes(role);
+      button.hidden = !button.dataset.roles?.split(" ").includes(role);
       button.disabled = false;
     }
   }
 
   lost() {
     this.#bar.dataset.role = "";
-    this.#bar.querySelector(".who").textContent = pageGuard.page.sentences.unknown;
+    find(this.#bar, ".who").textContent = pageGuard.page.sentences.unknown;
     for (const button of this.#bar.querySelectorAll("button")) button.disabled = true;
   }
 
   beat() {
-    if (![...IN_CONTROL, "asking"].includes(this.#bar.dataset.role)) return;
+    if (![...IN_CONTROL, "asking"].includes(this.#role)) return;
     this.#beats += 1;
     if (this.#beats >= BEATS_PER_KEEP_ALIVE) this.#keepAlive(false);
   }
 
+  get #role() {
+    return this.#bar.dataset.role ?? "";
+  }
+
   #touch() {
-    this.#asker = this.#bar.elements.to.value;
+    this.#asker = find(this.#bar, "input[name=to]").value;
     const now = performance.now();
-    if (!IN_CONTROL.includes(this.#bar.dataset.role) || now - this.#touchedAt < TOUCH_INTERVAL_MS) return;
+    if (!IN_CONTROL.includes(this.#role) || now - this.#touchedAt < TOUCH_INTERVAL_MS) return;
     this.#touchedAt = now;
     this.#keepAlive(true);
   }
@@ -69,15 +73,15 @@ export class Control {
   }
 
   // A second tap is the same act: it must not meet the button that came in its place.
-  /** @param {HTMLButtonElement} button @param {string} at */
+  /** @param {HTMLElement} button @param {string} at */
   async #act(button, at) {
-    if (this.#busy || button.disabled) return;
+    if (this.#busy || button.matches(":disabled")) return;
     this.#busy = true;
     this.#bar.setAttribute("aria-busy", "true");
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
-    const refusal = this.#bar.querySelector(".refused");
+    const refusal = find(this.#bar, ".refused");
     try {
-      const act = button.getAttribute("formaction").split("/").at(-1);
+      const act = button.getAttribute("formaction")?.split("/").at(-1);
       const answer = await (await this.#post(act, { to: this.#asker, at, id: newId() })).json();
       refusal.textContent = answer.reason ?? answer.error;
     } catch {
@@ -88,7 +92,7 @@ export class Control {
     this.#bar.removeAttribute("aria-busy");
   }
 
-  /** @param {string} act @param {object} body @param {boolean} keepalive */
+  /** @param {string | undefined} act @param {object} body @param {boolean} keepalive */
   #post(act, body, keepalive = false) {
     return post(`${pageGuard.page.base}/control/${act}`, body, RESPONSE_TIMEOUT_MS, { keepalive });
   }

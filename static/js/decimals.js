@@ -2,8 +2,8 @@
 // app/panel/number_range.py.
 const NEAR = 1_000_000_000n; // within a billionth of a step
 
-// The numbers as integers of one scale. The last value is the scale's exponent.
-/** @template {string[]} T @param {T} plains @returns {[...{ [I in keyof T]: bigint }, number]} */
+// The numbers as integers of one scale, which has this exponent.
+/** @param {string[]} plains @returns {[bigint[], number]} */
 export function scaled(...plains) {
   const parts = plains.map((plain) => {
     const [digits, exponent = "0"] = plain.split("e");
@@ -11,12 +11,12 @@ export function scaled(...plains) {
     return { digits: BigInt(whole + fraction), exponent: Number(exponent) - fraction.length };
   });
   const least = Math.min(...parts.map(({ exponent }) => exponent));
-  return [...parts.map(({ digits, exponent }) => digits * 10n ** BigInt(exponent - least)), least];
+  return [parts.map(({ digits, exponent }) => digits * 10n ** BigInt(exponent - least)), least];
 }
 
 /** @param {string} one @param {string} other */
 export function isLess(one, other) {
-  const [first, second] = scaled(one, other);
+  const [[first, second]] = scaled(one, other);
   return first < second;
 }
 
@@ -24,7 +24,7 @@ export function isLess(one, other) {
 // number, if it is exactly.
 /** @param {string} plain @param {string} low @param {string} step @param {boolean} isWhole */
 export function isOnStep(plain, low, step, isWhole) {
-  const [value, from, size] = scaled(plain, low, step);
+  const [[value, from, size]] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
   return isWhole ? rest === 0n : least(rest, size - rest) * NEAR <= size;
 }
@@ -32,7 +32,7 @@ export function isOnStep(plain, low, step, isWhole) {
 // The step that is `times` steps from a number; between two steps, the next one counts as the first.
 /** @param {string} plain @param {number} times @param {string} low @param {string} step @param {boolean} isWhole */
 export function stepped(plain, times, low, step, isWhole) {
-  const [value, from, size, exponent] = scaled(plain, low, step);
+  const [[value, from, size], exponent] = scaled(plain, low, step);
   const rest = modulo(value - from, size);
   let below = value - rest;
   if (!isOnStep(plain, low, step, isWhole)) below += times < 0 ? size : 0n;

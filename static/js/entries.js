@@ -1,19 +1,25 @@
 // The values entered on the page, and the inputs of parameters.
 
-const NUMBERS = "[data-number], [data-list]";
+const NUMBERS = "input[data-number], input[data-list]";
 // What pages without numbers do not need.
-const { mark, sentNumber, setLimits } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
+export const numbers = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : null;
+
+/** @param {Entry} input @returns {input is Checkbox} */
+export const isCheckbox = (input) => input.type === "checkbox";
+/** @param {Entry} input @returns {input is NumberInput} */
+export const isNumber = (input) => input.matches(NUMBERS);
 
 // The value with its type. What is not a number is sent as text: the server says what is wrong.
 /** @param {Entry} input */
 function sentValue(input) {
-  if (input.type === "checkbox") return input.checked;
-  return input.matches(NUMBERS) ? sentNumber(input) : input.value;
+  if (isCheckbox(input)) return input.checked;
+  return isNumber(input) ? numbers?.sentNumber(input) : input.value;
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
-/** @type {Entry[]} */
-export const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)[name]")];
+export const entries = [
+  ...document.querySelectorAll("[data-widget] input[name]:not([type=hidden]), [data-widget] select[name]"),
+];
 
 // All values on the page, by the names of the inputs.
 export function enteredValues() {
@@ -22,7 +28,7 @@ export function enteredValues() {
 
 // The input of a parameter shows the robot's value until it is touched. Then it keeps what was entered
 // until that is set.
-/** @type {WeakSet<Entry>} */
+/** @type {WeakSet<Element>} */
 const touched = new WeakSet();
 // Whether what was entered is kept; else the input follows the robot's value.
 /** @param {Entry} input */
@@ -33,41 +39,45 @@ export function isTouched(input) {
 /** @type {WeakMap<Entry, string | boolean>} */
 const robotValues = new WeakMap(); // the robot's values since the last press
 
-/** @param {HTMLElement} root @returns {Entry | null} */
+/** @param {HTMLElement} root */
 function entryOf(root) {
-  return root.querySelector("[data-entry]");
+  return root.querySelector("input[data-entry], select[data-entry]");
 }
 
 /** @param {HTMLElement} root @param {string | boolean} value */
 export function showEntry(root, value) {
   const input = entryOf(root);
+  if (!input) return;
   robotValues.set(input, value);
   if (touched.has(input)) return;
-  if (input.type === "checkbox") input.checked = value === true;
+  if (isCheckbox(input)) input.checked = value === true;
   else if (input.value !== value) {
-    input.value = value;
-    if (input.matches(NUMBERS)) mark(input);
+    input.value = String(value);
+    if (isNumber(input)) numbers?.mark(input);
   }
 }
 
 /** @param {HTMLElement} root @param {Limits} bounds */
 export function showBounds(root, bounds) {
   const input = entryOf(root);
-  if (input.matches(NUMBERS)) setLimits(input, bounds);
+  if (input && isNumber(input)) numbers?.setLimits(input, bounds);
 }
 
 // The value was set: the input shows the robot's value again.
 /** @param {HTMLElement} root */
 export function releaseEntry(root) {
   const input = entryOf(root);
-  if (input) touched.delete(input);
-  if (robotValues.has(input)) showEntry(root, robotValues.get(input));
+  if (!input) return;
+  touched.delete(input);
+  const value = robotValues.get(input);
+  if (value !== undefined) showEntry(root, value);
 }
 
 // A press begins: only values from now on count as its result.
 /** @param {HTMLElement} root */
 export function forgetRobotValue(root) {
-  robotValues.delete(entryOf(root));
+  const input = entryOf(root);
+  if (input) robotValues.delete(input);
 }
 
 // The inputs that were changed here, by hand or by a script.
@@ -93,7 +103,7 @@ function hasKept() {
 export function followEntries() {
   addEventListener("input", ({ target }) => {
     changed.add(target);
-    if (target.matches?.("[data-entry]")) touched.add(target);
+    if (target instanceof Element && target.matches("[data-entry]")) touched.add(target);
   });
   const keep = () => import("./kept-entries.js").catch(() => {});
   if (hasKept()) keep();

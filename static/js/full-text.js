@@ -1,10 +1,10 @@
 // The full text of a key in a popover: its face shows two lines. A touch on a locked key opens it, or one on the "…"
 // that the face has where text is cut, which a keyboard reaches too. An open popover follows its key. A touch on the
 // bar of control shows its text in full.
-import { setText } from "./show.js";
+import { closest, copyOf, find, setText } from "./show.js";
 
 const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
-const popover = document.getElementById("whole");
+const popover = find(document, "#whole");
 /** @type {HTMLElement | null} */
 let shown = null; // the key whose text the popover shows
 
@@ -20,15 +20,15 @@ function visibleTexts(key) {
 }
 
 function fillPopover() {
-  const texts = visibleTexts(shown);
-  if (texts.length) setText(popover.querySelector("p"), texts.join("\n"));
+  const texts = shown ? visibleTexts(shown) : [];
+  if (texts.length) setText(find(popover, "p"), texts.join("\n"));
   return texts.length > 0;
 }
 
 /** @param {HTMLElement} key */
 function showFullText(key) {
   shown = key;
-  setText(popover.querySelector("h2"), key.querySelector(".name").textContent);
+  setText(find(popover, "h2"), find(key, ".name").textContent);
   if (fillPopover()) popover.showPopover();
 }
 
@@ -40,7 +40,7 @@ function isCut(text) {
 /** @param {HTMLElement} key @param {boolean} cut */
 function showCut(key, cut) {
   const isComplete = !cut && !key.querySelector('[data-text="more"]')?.textContent;
-  key.querySelector(".more").toggleAttribute("hidden", isComplete);
+  find(key, ".more").toggleAttribute("hidden", isComplete);
   if (key === shown && popover.matches(":popover-open") && !fillPopover()) popover.hidePopover();
 }
 
@@ -55,33 +55,33 @@ function mark(key) {
 
 // All are measured before the first is changed: the page is laid out once.
 function markAll() {
-  const keys = [...changed].map((key) => [key, [...key.querySelectorAll(".face > p")].some(isCut)]);
+  const keys = [...changed].map((key) => ({ key, cut: [...key.querySelectorAll(".face > p")].some(isCut) }));
   changed.clear();
-  for (const [key, cut] of keys) showCut(key, cut);
+  for (const { key, cut } of keys) showCut(key, cut);
 }
 
 /** @param {HTMLElement} key */
 function equip(key) {
-  const more = document.getElementById("more").content.firstElementChild.cloneNode(true);
-  const face = key.querySelector(".face");
-  face.append(more);
+  const face = find(key, ".face");
+  const button = find(key, "button");
+  face.append(copyOf(find(document, "template#more")));
   const observer = new MutationObserver(() => mark(key));
   observer.observe(face, { childList: true, characterData: true, subtree: true });
-  observer.observe(key.querySelector("button"), { attributeFilter: ["disabled"] });
+  observer.observe(button, { attributeFilter: ["disabled"] });
   new ResizeObserver(() => mark(key)).observe(key);
   key.addEventListener("click", ({ target }) => {
-    const locked = key.querySelector("button").disabled && !target.closest("button");
-    if (locked || target.closest(".more")) showFullText(key);
+    const locked = button.disabled && !closest(target, "button");
+    if (locked || closest(target, ".more")) showFullText(key);
   });
 }
 
 for (const key of document.querySelectorAll(".key")) equip(key);
 
-const control = document.getElementById("control");
-control?.querySelector("div").addEventListener("click", () => {
+const control = document.querySelector("#control");
+control?.querySelector("div")?.addEventListener("click", () => {
   shown = null;
-  setText(popover.querySelector("h2"), control.getAttribute("aria-label"));
+  setText(find(popover, "h2"), control.getAttribute("aria-label") ?? "");
   const texts = [...control.querySelectorAll("p")].map((text) => text.textContent).filter(Boolean);
-  setText(popover.querySelector("p"), texts.join("\n"));
+  setText(find(popover, "p"), texts.join("\n"));
   popover.showPopover();
 });

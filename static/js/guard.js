@@ -6,10 +6,12 @@
   var SETTLED_MS = 60000; // a page that works for so long forgets its reloads
   var RELOADS = "reloads";
 
-  var main = document.querySelector("script[data-src]").getAttribute("data-src");
+  var main = String(/** @type {HTMLElement} */ (document.querySelector("script[data-src]")).getAttribute("data-src"));
   var started = false;
   var reloading = false;
-  var page = JSON.parse(document.getElementById("page").textContent);
+  /** @type {PageData} */
+  var page = JSON.parse(/** @type {HTMLElement} */ (document.getElementById("page")).textContent);
+  /** @type {PageGuard} */
   var guard = (window.pageGuard = {
     page: page,
     isBroken: false,
@@ -30,6 +32,7 @@
     );
   }
 
+  /** @param {() => void} act */
   function onParsed(act) {
     if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", act);
     else act();
@@ -62,6 +65,7 @@
   }
 
   // Locks the page for good.
+  /** @param {unknown} [error] */
   function fail(error) {
     if (guard.isBroken) return;
     guard.isBroken = true;
@@ -79,40 +83,51 @@
     reload();
   }
 
+  /** @param {SubmitEvent} event */
   function refuse(event) {
-    if (event.target.matches(".page, .control")) event.preventDefault();
+    if (event.target instanceof Element && event.target.matches(".page, .control")) event.preventDefault();
   }
 
-  // Sets a property or an attribute of all these elements; only what differs, as it is called after each change.
+  // Sets an attribute, or the text, of all these elements; only what differs, as it is called after each change.
+  /** @param {string} selector @param {string} name @param {string} value */
   function show(selector, name, value) {
     document.querySelectorAll(selector).forEach(function (element) {
-      if (name.indexOf("data-") < 0) element[name] === value || (element[name] = value);
-      else if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+      if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+    });
+  }
+
+  /** @param {string} selector @param {string} text */
+  function showText(selector, text) {
+    document.querySelectorAll(selector).forEach(function (element) {
+      if (element.textContent !== text) element.textContent = text;
     });
   }
 
   function lock() {
     var words = page.sentences;
-    show("form.page [type=submit], form.control [type=submit], .hold", "disabled", true);
+    show("form.page [type=submit], form.control [type=submit], .hold", "disabled", "");
     document.querySelectorAll("dialog[popover]").forEach(function (dialog) {
       if (dialog.hidePopover && dialog.matches(":popover-open")) dialog.hidePopover();
     });
-    show('form.page :is([data-text="reason"], [data-text="reasons"])', "textContent", words.faulty);
-    show('form.page [data-text="more"]', "textContent", "");
+    showText('form.page :is([data-text="reason"], [data-text="reasons"])', words.faulty);
+    showText('form.page [data-text="more"]', "");
     show("[data-widget][data-state]", "data-state", "old");
     show("[data-widget][data-shape]", "data-shape", "old");
     show("[data-widget][data-shape]", "data-colour", "none");
-    show(":is([data-lamp], [data-robot]) b", "textContent", words.unknown);
+    showText(":is([data-lamp], [data-robot]) b", words.unknown);
     show("[data-lamp], [data-robot]", "data-state", "wait");
     show("#state", "data-state", "unknown");
-    show("#state b", "textContent", words.stateUnknown);
-    show("#fault", "textContent", words.faulty);
-    show("#fault", "hidden", false);
+    showText("#state b", words.stateUnknown);
+    showText("#fault", words.faulty);
+    document.querySelectorAll("#fault").forEach(function (element) {
+      element.hidden = false;
+    });
     show("body", "data-cut", "");
     show("body", "data-locked", "");
   }
 
   // After 1, 2, 4 … 30 s, as often as it was in vain, and when the server answers; `atOnce`: the first time.
+  /** @param {boolean} [atOnce] */
   function reload(atOnce) {
     if (reloading) return;
     reloading = true;
@@ -136,6 +151,7 @@
   }
 
   // What this tab keeps over a reload; in the history where a browser permits no storage.
+  /** @param {string} name */
   function recall(name) {
     try {
       return sessionStorage.getItem(name);
@@ -144,10 +160,11 @@
     }
   }
 
+  /** @param {string} name @param {string | number | null} value */
   function keep(name, value) {
     try {
       if (value === null) sessionStorage.removeItem(name);
-      else sessionStorage.setItem(name, value);
+      else sessionStorage.setItem(name, String(value));
     } catch (error) {
       var state = Object.assign({}, history.state);
       state[name] = value;

@@ -1,6 +1,7 @@
 // Hold-to-run, by a key or a joystick: acts while it is held. Every event that may mean a release ends the hold, and
 // only a new press starts another one. The page shows the server's response, nothing else.
 import { enteredValues } from "./entries.js";
+import { find } from "./show.js";
 
 // On the page's own thread on purpose: a page that stalls must not keep a hold alive.
 const BEAT_MS = 80;
@@ -30,7 +31,7 @@ export class Holding {
   /** @param {HTMLElement} root @param {import("./source.js").Source} source */
   constructor(root, source) {
     this.root = root;
-    this.button = root.querySelector(".hold");
+    this.button = find(root, "button.hold");
     this.#source = source;
     // A long touch must not open a menu; pointer events arrive all the same.
     this.button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
@@ -51,7 +52,7 @@ export class Holding {
 
   // The server's response to a heartbeat: the texts of what it has sent to the robot.
   /** @param {Record<string, string>} _moves */
-  onResponse() {}
+  onResponse(_moves) {}
 
   // The hold has ended.
   onEnd() {}
@@ -71,7 +72,7 @@ export class Holding {
     this.#number = 0;
     const { base, embed } = pageGuard.page;
     const path = `${base}/widgets/${this.root.dataset.widget}/hold${embed}`;
-    const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
+    const socket = new WebSocket(new URL(path, location.href).href.replace(/^http/, "ws"));
     this.#socket = socket;
     this.#stampedAt = performance.now();
     let begun = false;
@@ -93,7 +94,7 @@ export class Holding {
 
   /** @param {WebSocket | null} socket @param {object} message */
   #send(socket, message) {
-    if (socket.readyState !== WebSocket.OPEN) return;
+    if (socket?.readyState !== WebSocket.OPEN) return;
     socket.send(JSON.stringify({ ...message, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
   }
 
@@ -157,9 +158,9 @@ export class Holding {
 
   /** @param {string} outcome @param {string | undefined} reason */
   #show(outcome, reason) {
-    const receipt = this.root.querySelector(".receipt");
+    const receipt = find(this.root, ".receipt");
     receipt.dataset.outcome = outcome;
-    receipt.textContent = reason;
+    receipt.textContent = reason ?? "";
   }
 }
 
@@ -167,6 +168,7 @@ export class Holding {
 // Calls `end(why)`. `pointer` and `key` return the pointer id and the key that hold the button, or null.
 /** @param {HTMLButtonElement} button @param {() => number | null} pointer @param {() => string | null} key @param {(why: string) => void} end */
 function listenForEnd(button, pointer, key, end) {
+  /** @template {keyof WindowEventMap} K @param {EventTarget} target @param {K} name @param {(event: WindowEventMap[K]) => void} listener */
   const on = (target, name, listener) => target.addEventListener(name, listener, { capture: true });
   button.addEventListener("pointerleave", (event) => event.pointerId === pointer() && end("sliding"));
   button.addEventListener("contextmenu", (event) => {

@@ -7,7 +7,7 @@ import { numberText, plainText, readPlain } from "./number-text.js";
 // of the range at most.
 /** @param {{ min: string, max: string }} limits */
 function stepSize({ min, max }) {
-  const most = (max - min) / 100;
+  const most = (Number(max) - Number(min)) / 100;
   const place = 10 ** Math.floor(Math.log10(most));
   return Number((place * ([5, 2].find((times) => times * place <= most) ?? 1)).toPrecision(12));
 }
@@ -16,14 +16,14 @@ function stepSize({ min, max }) {
 /** @param {HTMLInputElement} input */
 function nearestStep(input) {
   const size = stepSize(input);
-  const rounded = Number((Math.round(input.value / size) * size).toPrecision(12));
-  return plainText(Math.min(Math.max(rounded, input.min), input.max));
+  const rounded = Number((Math.round(input.valueAsNumber / size) * size).toPrecision(12));
+  return plainText(Math.min(Math.max(rounded, Number(input.min)), Number(input.max)));
 }
 
 // Makes the output as wide as its longest value, so that nothing moves under a finger.
 /** @param {HTMLOutputElement} output @param {Limits} limits */
 function setWidth(output, { min, max, step }) {
-  const grain = step || stepSize({ min, max });
+  const grain = Number(step) || stepSize({ min, max });
   const places = Math.max(0, -Math.floor(Math.log10(grain)));
   const longest = Math.max(...[min, max].map((limit) => Number(limit).toFixed(places).length), output.value.length);
   output.style.minWidth = `max(3.2em, ${longest}ch)`;
@@ -37,7 +37,7 @@ function slide(input, output) {
   const show = () => (output.value = entryText(input));
   input.addEventListener("input", (event) => {
     // A value of the keypad is exact; a finger on a slider is not.
-    if (!size && !event.inputType) input.value = nearestStep(input);
+    if (!size && !(event instanceof InputEvent && event.inputType)) input.value = nearestStep(input);
     show();
   });
   show();
@@ -60,6 +60,7 @@ function buttonStep(input) {
 /** @param {HTMLInputElement} input */
 function equip(input) {
   const root = input.closest("[data-widget]");
+  if (!root) return;
   const output = root.querySelector("output");
   if (output) slide(input, output);
   else {

@@ -1,9 +1,7 @@
 // What is entered on a page is there again when the operator comes back to it in this tab: kept in the tab's storage,
 // for one start of the server and one panel file. It only fills inputs; nothing is pressed again.
-import { changed, entries, isTouched, keptName } from "./entries.js";
+import { changed, entries, isCheckbox, isNumber, isTouched, keptName, numbers } from "./entries.js";
 
-const NUMBERS = "[data-number], [data-list]";
-const { enterPortable, portable } = document.querySelector(NUMBERS) ? await import("./number-inputs.js") : {};
 if (document.querySelector("[data-step]")) await import("./inputs.js"); // sliders are there after it
 
 const { revision, seen } = pageGuard.page;
@@ -12,24 +10,28 @@ const STAMP = `${revision} ${seen.slice(0, seen.lastIndexOf("-"))}`; // the serv
 // null for what must not be restored.
 /** @param {Entry} input */
 function keptValue(input) {
-  if (input.type === "checkbox") return input.checked;
-  return input.matches(NUMBERS) ? portable(input) : input.value;
+  if (isCheckbox(input)) return input.checked;
+  return isNumber(input) ? numbers?.portable(input) : input.value;
 }
 
 // The storage is no part of the panel, whose limits may have changed too.
-/** @param {Entry} input @param {unknown} value */
+/** @param {Entry} input @param {string} value */
 function fits(input, value) {
-  if (input.type === "checkbox") return typeof value === "boolean";
-  if (input.options) return [...input.options].some((option) => !option.hidden && option.value === value);
-  return typeof value === "string" && (input.maxLength < 0 || [...value].length <= input.maxLength);
+  if (input instanceof HTMLSelectElement)
+    return [...input.options].some((option) => !option.hidden && option.value === value);
+  return input.maxLength < 0 || [...value].length <= input.maxLength;
 }
 
 /** @param {Entry} input @param {unknown} value */
 function fill(input, value) {
-  if (input.matches(NUMBERS)) return enterPortable(input, value);
-  if (!fits(input, value)) return false;
-  if (input.type === "checkbox") input.checked = value;
-  else input.value = value;
+  if (isNumber(input)) return numbers?.enterPortable(input, value);
+  if (isCheckbox(input)) {
+    if (typeof value !== "boolean") return false;
+    input.checked = value;
+  } else {
+    if (typeof value !== "string" || !fits(input, value)) return false;
+    input.value = value;
+  }
   return true;
 }
 

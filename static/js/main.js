@@ -1,7 +1,7 @@
 // Connects the event stream to the page: each event updates its section of the markup.
 import { followEntries } from "./entries.js";
 import { Presser } from "./press.js";
-import { addHooks, find, lockWidget, setText, showAttribute, showFailed } from "./show.js";
+import { addHooks, find, lockWidget, setText, showAttributes, showFailed } from "./show.js";
 import { Source } from "./source.js";
 
 const noop = () => {};
@@ -11,7 +11,7 @@ const COMMON = { link: showLink, notice: showNotice, state: showState, robots: s
 
 class Screen {
   #data = pageGuard.page;
-  #clock = /** @type {HTMLTimeElement} */ (document.getElementById("clock")); // shows the time of the last heartbeat
+  #clock = find(document, "time#clock"); // shows the time of the last heartbeat
   #reconnected = false; // a snapshot has arrived after a loss, and no heartbeat after it yet
   #widgets = new Map(
     [...document.querySelectorAll("[data-widget]:not([data-failed])")].map((root) => [root.dataset.widget ?? "", root]),
@@ -46,10 +46,10 @@ class Screen {
   }
 
   async start() {
-    const bar = document.getElementById("control");
+    const bar = document.querySelector("form#control");
     if (bar) {
       const { Control } = await import("./control.js");
-      this.#control = new Control(/** @type {HTMLFormElement} */ (bar), (event) => this.#source.timeOf(event));
+      this.#control = new Control(bar, (event) => this.#source.timeOf(event));
     }
     this.#load();
     window.operatorPanel = { eventAgeMs: () => this.#source.ageMs }; // for the watcher of a kiosk's screen
@@ -60,17 +60,19 @@ class Screen {
   // What this page needs besides. The stream waits for what shows a part of a snapshot.
   #load() {
     const source = this.#source;
-    if (document.querySelector("[data-step]")) source.load("./inputs.js", noop);
+    if (document.querySelector("[data-step]")) source.load(import("./inputs.js"), noop);
     for (const kind of this.#data.kinds) {
-      source.load(`./kinds/${kind}.js`, (hooks) => {
+      /** @type {Promise<Hooks>} */
+      const script = import(`./kinds/${kind}.js`);
+      source.load(script, (hooks) => {
         addHooks(kind, hooks);
         for (const root of document.querySelectorAll(`[data-kind="${kind}"]`)) {
           attempt(root, () => hooks.equip?.(root, source));
         }
       });
     }
-    if (document.querySelector(".group-tab")) source.load("./tabs.js", noop);
-    source.load("./full-text.js", noop);
+    if (document.querySelector(".group-tab")) source.load(import("./tabs.js"), noop);
+    source.load(import("./full-text.js"), noop);
     if (document.querySelector("template:is(#keypad, #keyboard)")) loadTouchEntry(this.#data.keyboard);
     if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(pageGuard.fail);
     if (this.#data.sounds) import("./sound.js").catch(pageGuard.fail);
@@ -98,9 +100,7 @@ class Screen {
   #showWidget(id, attributes) {
     const root = this.#widgets.get(id);
     if (!root) return;
-    attempt(root, () => {
-      for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
-    });
+    attempt(root, () => showAttributes(root, attributes));
   }
 
   /** @param {{ clock: string, at: string }} now */
@@ -166,8 +166,8 @@ function showLink(lamps) {
 
 /** @param {string} name @param {Lamp} lamp */
 function showLamp(name, lamp) {
-  const light = document.querySelector(`[data-lamp="${name}"]`);
-  const row = document.querySelector(`[data-link="${name}"]`);
+  const light = find(document, `[data-lamp="${name}"]`);
+  const row = find(document, `[data-link="${name}"]`);
   light.dataset.state = row.dataset.state = lamp.state;
   setText(light.querySelector("b"), lamp.text);
   for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
@@ -177,7 +177,7 @@ function showLamp(name, lamp) {
 /** @param {Record<string, Lamp>} robots */
 function showRobots(robots) {
   for (const [id, lamp] of Object.entries(robots)) {
-    const tab = document.querySelector(`[data-robot="${id}"]`);
+    const tab = find(document, `[data-robot="${id}"]`);
     tab.dataset.state = lamp.state;
     setText(tab.querySelector("b"), lamp.text);
   }

@@ -4,7 +4,7 @@ import { elementsOf, listText, numberText, readNumber, readNumbers, readPlain } 
 
 // Its limits as plain text, "" without one.
 /** @param {HTMLElement} input @returns {Limits} */
-export function limitsOf({ dataset: { min, max, stepSize, whole } }) {
+export function limitsOf({ dataset: { min = "", max = "", stepSize = "", whole } }) {
   return { min, max, step: stepSize === "any" ? "" : stepSize, isWhole: whole !== undefined };
 }
 
@@ -26,7 +26,7 @@ export function enter(input, plain) {
 }
 
 // What a press sends: a number, or the text as it is, which the server refuses; of a list its numbers.
-/** @param {HTMLInputElement} input */
+/** @param {HTMLInputElement} input @returns {number | string | (number | string)[]} */
 export function sentNumber(input) {
   if (input.matches("[data-list]")) return readNumbers(input.value, limitsOf(input).isWhole);
   return input.type === "range"
@@ -64,20 +64,20 @@ export function portable(input) {
   return input.matches("[data-list]") ? numbers.map(({ plain }) => plain) : numbers[0].plain;
 }
 
-/** @type {(plain: unknown, limits: Limits) => boolean} */
+/** @param {unknown} plain @param {Limits} limits @returns {plain is string} */
 const isPermitted = (plain, limits) => typeof plain === "string" && judged(numberText(plain), limits).problem === null;
 
 // Enters what was portable, if the limits permit it.
 /** @param {HTMLInputElement} input @param {unknown} value */
 export function enterPortable(input, value) {
-  const isList = input.matches("[data-list]");
   const limits = limitsOf(input);
-  if (
-    isList ? !Array.isArray(value) || !value.every((plain) => isPermitted(plain, limits)) : !isPermitted(value, limits)
-  )
-    return false;
-  if (isList) input.value = listText(value);
-  else enter(input, value);
+  if (input.matches("[data-list]")) {
+    if (!Array.isArray(value) || !value.every((plain) => isPermitted(plain, limits))) return false;
+    input.value = listText(value);
+  } else {
+    if (!isPermitted(value, limits)) return false;
+    enter(input, value);
+  }
   return true;
 }
 

@@ -42,7 +42,7 @@ export function numberText(plain) {
 /** @param {number} value */
 export function plainText(value) {
   const [digits, exponent] = value.toExponential().split("e");
-  if (value === 0 || (exponent >= -4 && exponent < 16)) return String(value);
+  if (value === 0 || (Number(exponent) >= -4 && Number(exponent) < 16)) return String(value);
   return `${digits}e${exponent[0]}${exponent.slice(1).padStart(2, "0")}`;
 }
 
@@ -71,7 +71,7 @@ function plainOf(text) {
 
 /** @param {string} one @param {string} other */
 function isEqual(one, other) {
-  const [first, second] = scaled(one, other);
+  const [[first, second]] = scaled(one, other);
   return first === second;
 }
 

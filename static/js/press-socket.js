@@ -9,7 +9,7 @@ export class PressSocket {
   /** @param {(socket: PressSocket) => void} onClose */
   constructor(onClose) {
     const { base, embed } = pageGuard.page;
-    const url = new URL(`${base}/presses${embed}`, location);
+    const url = new URL(`${base}/presses${embed}`, location.href);
     this.#socket = new WebSocket(url.href.replace(/^http/, "ws"));
     this.#socket.onmessage = ({ data }) => {
       const response = JSON.parse(data);
@@ -27,7 +27,7 @@ export class PressSocket {
   }
 
   // Sends the press at once. No response arrives before this returns.
-  /** @param {{ id: string }} press @param {number} timeoutMs */
+  /** @param {Press} press @param {number} timeoutMs */
   send(press, timeoutMs) {
     this.#socket.send(JSON.stringify(press));
     return new Promise((resolve, reject) => {

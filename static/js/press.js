@@ -1,6 +1,6 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
 import { enteredValues, forgetRobotValue } from "./entries.js";
-import { hooksOf, isEquipped, showReceipt } from "./show.js";
+import { closest, find, hooksOf, isEquipped, showReceipt } from "./show.js";
 import { feelTouches, StopKeys } from "./stop-keys.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
@@ -44,7 +44,7 @@ export class Presser {
   #downValue = ""; // of that button then: the goal that it cancels, or the value that it sends
   /** @type {typeof import("./ask.js").confirm} */
   #confirm = () => {}; // of ask.js, which is loaded with the page: nothing is pressed before that
-  /** @type {string | undefined} */
+  /** @type {string | null} */
   #seen = null;
   #id = newId(); // of the next press
   /** @type {Map<HTMLElement | null, HTMLElement>} */
@@ -55,36 +55,37 @@ export class Presser {
   constructor(widgets, source) {
     this.#widgets = widgets;
     this.#source = source;
-    if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
+    if (document.querySelector("dialog.ask"))
+      source.load(import("./ask.js"), ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     feelTouches();
     // A key that is held down is one press.
     addEventListener(
       "keydown",
-      (event) => event.repeat && event.target.closest?.("button") && event.preventDefault(),
+      (event) => event.repeat && closest(event.target, "button") && event.preventDefault(),
       true,
     );
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]:not([data-own])")) this.#buttons.set(button, root);
     }
-    const form = document.querySelector("form.page");
+    const form = find(document, "form.page");
     // A click presses at once: a browser takes its time to submit a form.
     form.addEventListener("click", (event) => this.#clicked(event), true);
     // A program may submit a form without a click.
-    form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
+    form.addEventListener("submit", (event) => this.#pressed(event, closest(event.submitter, "button")));
   }
 
   /** @param {EventTarget | null} target */
   #down(target) {
-    this.#downButton = target.closest?.("button:enabled");
-    this.#downValue = this.#downButton?.value;
+    this.#downButton = closest(target, "button:enabled");
+    this.#downValue = this.#downButton?.value ?? "";
     this.#seen = this.#source.seen; // the view at this moment
     this.#open();
   }
 
   /** @param {MouseEvent} event */
   #clicked(event) {
-    const button = event.target.closest("button");
+    const button = closest(event.target, "button");
     if (button && this.#stops.isPressed(event, button)) return event.preventDefault();
     // A button that was enabled under a resting finger was not pressed.
     if (button && event.detail > 0 && button !== this.#downButton) event.preventDefault();
@@ -92,11 +93,11 @@ export class Presser {
   }
 
   // What fails before a press is sent is said.
-  /** @param {MouseEvent | SubmitEvent} event @param {HTMLElement | null} pressed */
+  /** @param {Event} event @param {HTMLButtonElement | null} button */
   #pressed(event, button) {
     event.preventDefault();
     const root = this.#buttons.get(button);
-    if (!root || button.disabled || !isEquipped(root)) return;
+    if (!root || !button || button.disabled || !isEquipped(root)) return;
     try {
       this.#begin(event, root, button);
     } catch (error) {
@@ -111,20 +112,20 @@ export class Presser {
   }
 
   // By a pointer, a key or a program. Only a pointer has a "down" before.
-  /** @param {MouseEvent | SubmitEvent} event @param {HTMLElement} root @param {HTMLButtonElement} button */
+  /** @param {Event} event @param {HTMLElement} root @param {HTMLButtonElement} button */
   #begin(event, root, button) {
-    const byPointer = event.detail > 0 || event.type.startsWith("pointer");
+    const byPointer = event instanceof UIEvent && (event.detail > 0 || event.type.startsWith("pointer"));
     const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
     const isCancel = button.matches(".cancel");
     if (isCancel) click.press = byPointer ? this.#downValue : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
     Object.assign(inputs, hooksOf(root).values?.(button, byPointer ? this.#downValue : button.value));
     if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
-    else this.#confirm(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
+    else this.#confirm(root, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }
 
   // The view at an event, and the event's time by the server's clock.
-  /** @param {Event} event @returns {{ seen: string | undefined, at: string, press?: string }} */
+  /** @param {Event} event @param {string | null} [seen] @returns {Click} */
   #moment(event, seen = this.#source.seen) {
     return { seen, at: this.#source.timeOf(event) };
   }
@@ -153,13 +154,13 @@ export class Presser {
   }
 
   // A second tap while the first is pending is the same press: it sends nothing.
-  /** @param {HTMLElement} root @param {HTMLButtonElement} button @param {Record<string, Data>} inputs @param {object} click */
+  /** @param {HTMLElement} root @param {HTMLButtonElement} button @param {Record<string, Data>} inputs @param {Click} click */
   async #press(root, button, inputs, click) {
-    const url = button.getAttribute("formaction");
+    const url = button.getAttribute("formaction") ?? "";
     if (this.#pending.has(url)) return;
     this.#pending.add(url);
     try {
-      const timeoutMs = RESPONSE_TIMEOUT_MS + 1000 * (root.dataset.answerS ?? 0);
+      const timeoutMs = RESPONSE_TIMEOUT_MS + 1000 * Number(root.dataset.answerS ?? 0);
       const socket = this.#socket?.free && !button.matches(".cancel") ? this.#socket : null;
       const receipt = this.#send(root.dataset.widget, socket, url, { inputs, id: this.#id, ...click }, timeoutMs);
       // The press is sent; what can wait follows.
@@ -176,7 +177,7 @@ export class Presser {
   }
 
   // Sent once, never repeated: without a response the outcome is unknown.
-  /** @param {string | undefined} widget @param {import("./press-socket.js").PressSocket | null} socket @param {string} url @param {{ id: string }} press @param {number} timeoutMs @returns {Promise<Receipt>} */
+  /** @param {string | undefined} widget @param {import("./press-socket.js").PressSocket | null} socket @param {string} url @param {Press} press @param {number} timeoutMs @returns {Promise<Receipt>} */
   async #send(widget, socket, url, press, timeoutMs) {
     let response = null;
     try {

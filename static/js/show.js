@@ -22,15 +22,26 @@ export function isEquipped({ dataset: { kind = "" } }) {
 }
 
 // An element that the markup must have.
-/** @type {<S extends string>(root: ParentNode, selector: S) => PageElement<S>} */
+/** @template {string} S @param {ParentNode} root @param {S} selector @returns {PageElement<S>} */
 export function find(root, selector) {
   const element = root.querySelector(selector);
   if (!element) throw new Error(selector);
   return element;
 }
 
-/** @param {Element | null} element @param {string} text */
-export function setText(element, text) {
+// The element that an event met, or one around it.
+/** @template {string} S @param {EventTarget | null} target @param {S} selector @returns {PageElement<S> | null} */
+export function closest(target, selector) {
+  return target instanceof Element ? target.closest(selector) : null;
+}
+
+/** @param {HTMLTemplateElement} template */
+export function copyOf(template) {
+  return find(document.importNode(template.content, true), "*");
+}
+
+/** @param {HTMLElement | null} element @param {string | undefined} text */
+export function setText(element, text = "") {
   if (!element) return;
   if (element.dataset.unit) setValue(element, text);
   else setOnlyText(element, text);
@@ -39,7 +50,7 @@ export function setText(element, text) {
 // A number and, smaller, its unit; another text, such as that there is no value, has none.
 /** @param {HTMLElement} element @param {string} text */
 function setValue(element, text) {
-  const [number, unit] = element.firstElementChild.children;
+  const [number, unit] = find(element, "span").children;
   const ending = ` ${element.dataset.unit}`;
   const hasUnit = text.endsWith(ending);
   setOnlyText(number, hasUnit ? text.slice(0, -ending.length) : text);
@@ -50,7 +61,7 @@ function setValue(element, text) {
 /** @param {Element} element @param {string} text */
 function setOnlyText(element, text) {
   const node = element.firstChild;
-  if (node?.nodeType === Node.TEXT_NODE && !node.nextSibling) {
+  if (node instanceof Text && !node.nextSibling) {
     if (node.data !== text) node.data = text;
   } else if (node || text) element.textContent = text;
 }
@@ -62,10 +73,14 @@ const keys = new WeakMap();
 
 /** @param {HTMLElement} root @returns {HTMLButtonElement[]} */
 function keysOf(root) {
-  if (!keys.has(root))
-    keys.set(root, [...root.querySelectorAll("button[type=submit]:not(.cancel, [data-own]), .hold")]);
-  return keys.get(root);
+  const selector = "button[type=submit]:not(.cancel):not([data-own]), button.hold";
+  const buttons = keys.get(root) ?? [...root.querySelectorAll(selector)];
+  keys.set(root, buttons);
+  return buttons;
 }
+
+/** @template T @param {T | null} element @param {Partial<T>} properties */
+const assign = (element, properties) => element && Object.assign(element, properties);
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
 // `data-value` for the value of an element such as a meter, `data-width` for the width of a bar in percent, or an
@@ -77,22 +92,13 @@ const SHOW = {
     hooksOf(root).lock?.(root, !value);
     if (!value) root.querySelector(".ask:popover-open")?.hidePopover();
   },
-  stoppable: (root, value) => {
-    const cancel = root.querySelector(".cancel");
-    if (cancel) cancel.disabled = !value;
-  },
-  press: (root, value) => {
-    const cancel = root.querySelector(".cancel");
-    if (cancel) cancel.value = value;
-  },
+  stoppable: (root, value) => assign(root.querySelector("button.cancel"), { disabled: !value }),
+  press: (root, value) => assign(root.querySelector("button.cancel"), { value }),
   held: (root, value) => root.toggleAttribute("data-held", value),
-  outcome: (root, value) => {
-    find(root, ".result").dataset.outcome = value;
-  },
+  outcome: (root, outcome) => assign(find(root, ".result").dataset, { outcome }),
   busy: (root, value) => {
     root.toggleAttribute("data-busy", value);
-    const bar = root.querySelector("progress");
-    if (bar) bar.hidden = !value;
+    assign(root.querySelector("progress"), { hidden: !value });
   },
   progress: (root, value) => {
     const bar = root.querySelector("progress");
@@ -101,40 +107,20 @@ const SHOW = {
   },
 };
 
-// Widgets that this page itself locks, while something lies over it: how often, and what the server says of the lock.
-/** @type {WeakMap<HTMLElement, { fromServer: Attributes, times: number }>} */
-const localLocks = new WeakMap();
-const LOCK = ["enabled", "reason", "reasons", "more"];
+// What the server says of attributes of which the page itself decides for now (hold-locks.js), by the widget.
+/** @type {Map<HTMLElement, Attributes>} */
+export const withheld = new Map();
 
-// Locks the key of a widget for a reason of this page's own.
-/** @param {HTMLElement} root @param {string | undefined} reason */
-export function lockLocally(root, reason) {
-  const locked = localLocks.get(root);
-  if (locked) {
-    locked.times += 1;
-    return;
-  }
-  const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
-  const texts = { reason: text("reason"), reasons: text("reasons"), more: text("more") };
-  const fromServer = { enabled: keysOf(root).some((key) => !key.disabled), ...texts };
-  const lock = { enabled: false, reason, reasons: reason, more: "" };
-  for (const [name, value] of Object.entries(lock)) showAttribute(root, name, value);
-  localLocks.set(root, { fromServer, times: 1 });
-}
-
-// Once for each time that it was locked: after the last one the server's lock shows again, as it is by now.
-/** @param {HTMLElement} root */
-export function unlockLocally(root) {
-  const lock = localLocks.get(root);
-  if (!lock || --lock.times) return;
-  localLocks.delete(root);
-  for (const [name, value] of Object.entries(lock.fromServer)) showAttribute(root, name, value);
+/** @param {HTMLElement} root @param {Attributes} attributes */
+export function showAttributes(root, attributes) {
+  for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
 }
 
 /** @param {HTMLElement} root @param {string} name @param {Data} value */
-export function showAttribute(root, name, value) {
-  if (localLocks.has(root) && LOCK.includes(name)) {
-    localLocks.get(root).fromServer[name] = value;
+function showAttribute(root, name, value) {
+  const fromServer = withheld.get(root);
+  if (fromServer && name in fromServer) {
+    fromServer[name] = value;
     return;
   }
   const show = hooksOf(root).show?.[name] ?? SHOW[name];
@@ -145,7 +131,7 @@ export function showAttribute(root, name, value) {
 /** @param {HTMLElement} root @param {string} name @param {Data} value */
 function showInPlace(root, name, value) {
   setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
-  const meter = root.querySelector(`[data-value="${name}"]`);
+  const meter = /** @type {HTMLMeterElement | null} */ (root.querySelector(`[data-value="${name}"]`));
   if (meter) meter.value = value ?? meter.min;
   root.querySelector(`[data-width="${name}"]`)?.setAttribute("width", `${value ?? 0}%`);
   if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
@@ -163,12 +149,11 @@ export function showFailed(root, text) {
 /** @param {HTMLElement} root @param {string} lost @param {string} unknown */
 export function lockWidget(root, lost, unknown) {
   if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="doing"]'), unknown);
-  const buttons = root.querySelectorAll("button[type=submit], .hold");
+  const buttons = root.querySelectorAll("button[type=submit], button.hold");
   for (const button of buttons) button.disabled = true;
   root.querySelector(".ask:popover-open")?.hidePopover();
   const reason = root.querySelector(".why")?.dataset.lost ?? lost; // of a stop button: what to use instead
-  const locks = { reason, reasons: reason, more: "", enabled: false };
-  if (buttons.length) for (const [name, value] of Object.entries(locks)) showAttribute(root, name, value);
+  if (buttons.length) showAttributes(root, { reason, reasons: reason, more: "", enabled: false });
   if (!root.dataset.state) return;
   root.dataset.state = "old";
   if (!root.dataset.shape) return;
@@ -190,7 +175,7 @@ export function showReceipt(widgets, root, { id, outcome, reason }) {
   // no id: the goal's state shows that the cancel was requested.
   const shared = id ? outcome !== "refused" : outcome === "accepted";
   if (root.querySelector(".result") && shared) return;
-  const receipt = root.querySelector(".receipt");
+  const receipt = find(root, ".receipt");
   receipt.dataset.outcome = outcome;
   receipt.textContent = reason;
 }

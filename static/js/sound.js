@@ -16,7 +16,7 @@ function sound() {
 }
 
 const receipts = new MutationObserver((changes) => {
-  if (changes.some(({ target }) => target.dataset.outcome === "refused")) sound();
+  if (changes.some(({ target }) => target instanceof HTMLElement && target.dataset.outcome === "refused")) sound();
 });
 for (const receipt of document.querySelectorAll(".receipt"))
   receipts.observe(receipt, { attributeFilter: ["data-outcome"] });

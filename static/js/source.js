@@ -107,15 +107,15 @@ export class Source {
   }
 
   // Loads a further module. The stream opens after that, since the module may show attributes of the snapshot.
-  /** @param {string} name @param {(module: any) => void} use */
-  load(name, use) {
+  /** @template T @param {Promise<T>} module @param {(module: T) => void} use */
+  load(module, use) {
     this.#loading += 1;
-    const begin = (module) => {
-      use(module);
+    const begin = module.then((loaded) => {
+      use(loaded);
       this.#loading -= 1;
       if (!document.hidden) this.#open();
-    };
-    this.#loads.push(import(name).then(begin));
+    });
+    this.#loads.push(begin);
   }
 
   // For good: the page is locked, or about to reload.

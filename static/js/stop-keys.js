@@ -1,10 +1,11 @@
 // Touches of buttons: felt at once. A stop button is pressed by its own pointer, whatever else touches the glass.
+import { closest } from "./show.js";
 
 export const STOPS = '[data-role="stop"] > button[type="submit"]';
 
 /** @param {EventTarget | null} target */
 export function isStop(target) {
-  return target instanceof Element && target.closest(STOPS) !== null;
+  return closest(target, STOPS) !== null;
 }
 
 /** @param {HTMLElement} button @param {{ clientX: number, clientY: number }} event */
@@ -28,7 +29,8 @@ export class StopKeys {
     addEventListener("pointerdown", (event) => this.#began(event), true);
     addEventListener("pointermove", (event) => this.#moved(event), true);
     // Where another finger scrolls the page, the browser takes the pointers of all fingers away.
-    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, (event) => this.#ended(event), true);
+    for (const name of /** @type {const} */ (["pointerup", "pointercancel"]))
+      addEventListener(name, (event) => this.#ended(event), true);
   }
 
   // Whether a click is that of a press by a pointer.
@@ -39,8 +41,8 @@ export class StopKeys {
 
   /** @param {PointerEvent} event */
   #began(event) {
-    const button = event.button === 0 && isStop(event.target) && event.target.closest(STOPS);
-    if (button && !button.disabled) this.#down.set(event.pointerId, button);
+    const button = closest(event.target, STOPS);
+    if (button && event.button === 0 && !button.disabled) this.#down.set(event.pointerId, button);
   }
 
   // A finger that slides off takes its press back.
@@ -67,7 +69,7 @@ export function feelTouches() {
   /** @type {Map<number, HTMLElement>} */
   const touched = new Map();
   addEventListener("pointerdown", ({ target, pointerId }) => {
-    const button = target.closest?.("form.page button:enabled");
+    const button = closest(target, "form.page button:enabled");
     if (!button) return;
     touched.set(pointerId, button);
     button.toggleAttribute("data-down", true);
@@ -79,5 +81,6 @@ export function feelTouches() {
     touched.delete(event.pointerId);
     if (![...touched.values()].includes(button)) button.toggleAttribute("data-down", false);
   };
-  for (const name of ["pointermove", "pointerup", "pointercancel"]) addEventListener(name, released, true);
+  for (const name of /** @type {const} */ (["pointermove", "pointerup", "pointercancel"]))
+    addEventListener(name, released, true);
 }

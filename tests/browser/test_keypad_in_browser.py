@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -24,7 +25,31 @@ from tests.support.browser.touch import (
     touched_server,
 )
 from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 
+JOYSTICK: Final = """
+title = "Drive"
+[[interlock]]
+id = "operation"
+topic = "/stick_enabled"
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "speed"
+kind = "number"
+label = "Speed"
+min = 0
+max = 100
+[[page.widget]]
+id = "stick"
+interlock = "operation"
+kind = "joystick"
+label = "Drive"
+topic = "/stick"
+type = "geometry_msgs/msg/Twist"
+y_axis = { max = 0.5, unit = "m/s" }
+"""
 FIELDS: Final = ("#input-speed", "[data-widget=height] output", "#input-belt", "#input-offset")
 
 
@@ -224,6 +249,18 @@ def test_hold_buttons_are_locked_while_the_keypad_is_open(screen: Page) -> None:
     screen.locator(".cancel-entry").tap()
     expect(hold).to_be_enabled()
     expect(screen.locator("#why-jog")).to_have_text("")
+
+
+def test_joysticks_are_locked_while_the_keypad_is_open(touch_page: Page, tmp_path: Path) -> None:
+    with demo_server(tmp_path, JOYSTICK) as server:
+        page = touched(touch_page, server)
+        reason = page.locator("#why-stick")
+        expect(reason).to_contain_text("operation")  # of the interlock
+        open_for(page, "#input-speed")
+        expect(reason).to_have_text("The keypad is open. Close it first.")
+        page.locator(".cancel-entry").tap()
+        expect(reason).to_contain_text("operation")
+        page.goto("about:blank")  # the page would load itself again
 
 
 def test_opening_the_keypad_ends_a_hold(screen: Page) -> None:

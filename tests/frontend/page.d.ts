@@ -18,13 +18,53 @@ interface Window {
   operatorPanel?: { eventAgeMs(): number };
 }
 
-// Selectors that are no names of elements find elements of the page's markup.
+// What a selector finds: the class of the tag that it ends with, which the browser checks. Without a tag, an element
+// of the page's markup.
 interface ParentNode {
-  querySelector(selectors: string): HTMLElement | null;
-  querySelectorAll(selectors: string): NodeListOf<HTMLElement>;
+  querySelector<S extends string>(selectors: S): PageElement<S> | null;
+  querySelectorAll<S extends string>(selectors: S): NodeListOf<PageElement<S>>;
 }
 interface Element {
-  closest(selectors: string): HTMLElement | null;
+  closest<S extends string>(selectors: S): PageElement<S> | null;
+}
+type PageElement<S extends string> = string extends S
+  ? HTMLElement
+  : S extends `${infer First}, ${infer Rest}`
+    ? IsClosed<First> extends true
+      ? ElementOf<TagOf<First>> | PageElement<Rest>
+      : HTMLElement
+    : ElementOf<TagOf<S>>;
+type ElementOf<Tag extends string> = Tag extends keyof HTMLElementTagNameMap
+  ? HTMLElementTagNameMap[Tag]
+  : Tag extends keyof SVGElementTagNameMap
+    ? SVGElementTagNameMap[Tag]
+    : HTMLElement;
+type TagOf<S extends string> = S extends `${string} ${infer Rest}`
+  ? TagOf<Rest>
+  : Before<Before<Before<Before<S, ".">, "#">, "[">, ":">;
+type IsClosed<S extends string> = S extends `${string}(${infer Inside}`
+  ? Inside extends `${string})${infer After}`
+    ? IsClosed<After>
+    : false
+  : true;
+type Before<S extends string, Sign extends string> = S extends `${infer First}${Sign}${string}` ? First : S;
+
+// The name of an event tells its class, whatever it is sent to.
+interface EventTarget {
+  addEventListener<K extends keyof WindowEventMap>(
+    name: K,
+    listener: (event: WindowEventMap[K]) => void,
+    options?: AddEventListenerOptions,
+  ): void;
+}
+
+interface WindowEventMap {
+  visibilitychange: Event;
+  gesturestart: UIEvent; // WebKit
+}
+
+interface Performance {
+  getEntriesByType(type: "navigation"): PerformanceNavigationTiming[];
 }
 
 // The values that an event brings.
@@ -32,10 +72,14 @@ type Data = any; // the server's JSON: the tests of each widget kind check it
 type Attributes = Record<string, Data>;
 type Lamp = { state: string; text: string; since?: string; locks?: string; reason?: string };
 type Show = (root: HTMLElement, value: Data) => void;
-type Handlers = Record<string, (data: Data) => void>;
+type Handlers = Record<string, (data?: Data) => void>;
 
+type Click = { seen: string | null; at: string; press?: string };
+type Press = Click & { id: string; inputs: Record<string, Data>; widget?: string };
 type Receipt = { outcome: string; reason: string; id?: string };
 type Entry = HTMLInputElement | HTMLSelectElement;
+type Checkbox = HTMLInputElement & { type: "checkbox" };
+type NumberInput = HTMLInputElement & { type: "text" | "range" };
 type Limits = { min: string; max: string; step: string; isWhole: boolean };
 type Judgement = { plain: string | null; problem: string | null };
 
@@ -43,15 +87,26 @@ type CellValue = { text: string; shape?: string; colour?: string };
 
 // Of a trend: [number, lowest, highest, last, whether it begins a line].
 type Column = [number, number, number, number, boolean];
+// What the server says of it: null where a line ends.
+type ColumnItem = [number, number] | [number, number, number, number] | null;
+type TrendAnswer = {
+  now: number;
+  end: number;
+  shift: string;
+  width_s: number;
+  zone_s: number;
+  offset: string;
+  pens: ColumnItem[][];
+};
 type Pen = {
-  name: string | null;
-  unit: string | undefined;
+  name: string;
+  unit: string;
   digits: number | undefined;
   low: number | undefined;
   high: number | undefined;
   normal: number[] | undefined;
-  line: Element | undefined;
-  mark: Element | undefined;
+  line: SVGPathElement;
+  mark: SVGUseElement;
 };
 type View = {
   begin: number;
@@ -71,19 +126,6 @@ interface Hooks {
   lock?(root: HTMLElement, locked: boolean): void;
   values?(button: HTMLButtonElement, value: string): Record<string, Data>;
 }
-
-// The elements that some selectors find.
-interface PageElements {
-  "#control": HTMLFormElement;
-  ".cancel": HTMLButtonElement;
-  ".hold": HTMLButtonElement;
-  "dialog.ask": HTMLDialogElement;
-}
-type PageElement<S extends string> = S extends keyof PageElements
-  ? PageElements[S]
-  : S extends keyof HTMLElementTagNameMap
-    ? HTMLElementTagNameMap[S]
-    : HTMLElement;
 
 // The data of a page, app/web/rendering/page_data.py.
 interface PageData {

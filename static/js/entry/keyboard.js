@@ -1,14 +1,16 @@
 // The keyboard: types into its text field, in which the caret is seen. Cancel gives back what was there.
 import { isTouched, releaseEntry } from "../entries.js";
 import { capital, layoutOf, SIGNS } from "./layouts.js";
-import { Sheet } from "./sheet.js";
+import { Sheet, nameOf } from "./sheet.js";
+import { widgetOf } from "./place.js";
+import { closest, find } from "../show.js";
 
 const SHAPES = ["keys"];
 const SHIFTS = ["off", "once", "lock"];
 
 export class Entry {
   input;
-  #sheet = new Sheet("keyboard", SHAPES, () => this.cancel());
+  #sheet;
   /** @type {() => void} */
   #closed;
   #before;
@@ -25,13 +27,13 @@ export class Entry {
     this.#closed = closed;
     this.#before = input.value;
     this.#wasTouched = isTouched(input);
+    this.#sheet = new Sheet("keyboard", SHAPES, input, () => this.cancel());
     this.#draw();
-    this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(target.closest("button")));
+    this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(closest(target, "button")));
     addEventListener("keydown", this.#typed, true);
     input.addEventListener("input", this.#changed);
     document.addEventListener("selectionchange", this.#changed);
-    const named = input.labels[0] ?? document.getElementById(input.getAttribute("aria-labelledby"));
-    this.#sheet.open(input, named.textContent);
+    this.#sheet.open(nameOf(input));
     input.focus();
   }
 
@@ -40,7 +42,7 @@ export class Entry {
       this.input.value = this.#before;
       this.#dispatch("input");
     }
-    if (!this.#wasTouched) releaseEntry(this.input.closest("[data-widget]"));
+    if (!this.#wasTouched) releaseEntry(widgetOf(this.input));
     this.#close();
   }
 
@@ -70,7 +72,7 @@ export class Entry {
   /** @param {HTMLButtonElement | null} button */
   #clicked(button) {
     if (!button || button.disabled) return;
-    const { key } = button.dataset;
+    const { key = "" } = button.dataset;
     if (button.matches(".cancel-entry")) this.cancel();
     else if (button.matches(".set-entry")) this.#done();
     else if (key === "shift") this.#setMode({ shift: SHIFTS[(SHIFTS.indexOf(this.#shift) + 1) % SHIFTS.length] });
@@ -80,7 +82,9 @@ export class Entry {
 
   /** @param {string} key */
   #edit(key) {
-    const { selectionStart: start, selectionEnd: end, value } = this.input;
+    const { value } = this.input;
+    const start = this.input.selectionStart ?? value.length;
+    const end = this.input.selectionEnd ?? start;
     if (key === "left" || key === "right") {
       const to = key === "left" ? Math.max(0, start - 1) : Math.min(value.length, end + 1);
       return this.input.setSelectionRange(to, to);
@@ -105,18 +109,18 @@ export class Entry {
 
   #draw() {
     const { root } = this.#sheet;
-    const [shift, erase] = ["shift", "delete"].map((key) => root.querySelector(`[data-key=${key}]`));
+    const [shift, erase] = ["shift", "delete"].map((key) => find(root, `button[data-key=${key}]`));
     shift.setAttribute("aria-pressed", String(this.#shift !== "off"));
     shift.dataset.shift = this.#shift;
     shift.disabled = this.#signs;
-    root.querySelector("[data-key=signs]").setAttribute("aria-pressed", String(this.#signs));
+    find(root, "[data-key=signs]").setAttribute("aria-pressed", String(this.#signs));
     const letters = this.#signs ? SIGNS : layoutOf(document.documentElement.lang);
     const rows = letters.map((row) =>
       [...row].map((one) => keyOf(this.#shift === "off" || this.#signs ? one : capital(one))),
     );
     rows[0].push(erase);
-    rows.at(-1).unshift(shift);
-    root.querySelector(".rows").replaceChildren(...rows.map(rowOf));
+    rows[rows.length - 1].unshift(shift);
+    find(root, ".rows").replaceChildren(...rows.map(rowOf));
     this.#limit();
   }
 
@@ -124,7 +128,7 @@ export class Entry {
   #limit() {
     const { value, maxLength, selectionStart, selectionEnd } = this.input;
     const isFull = maxLength >= 0 && value.length >= maxLength && selectionStart === selectionEnd;
-    for (const key of this.#sheet.root.querySelectorAll("[data-key]:not(.fn)")) key.disabled = isFull;
+    for (const key of this.#sheet.root.querySelectorAll("button[data-key]:not(.fn)")) key.disabled = isFull;
   }
 }
 

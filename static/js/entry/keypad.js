@@ -2,10 +2,11 @@
 import { isTouched, releaseEntry } from "../entries.js";
 import { Draft } from "./draft.js";
 import { markScale } from "./scale.js";
-import { Sheet } from "./sheet.js";
+import { Sheet, nameOf } from "./sheet.js";
+import { widgetOf } from "./place.js";
 import { numberText } from "../number-text.js";
 import { enter, entryText, judged, limitsOf } from "../number-inputs.js";
-import { setText } from "../show.js";
+import { closest, find, setText } from "../show.js";
 
 const SHAPES = ["tall", "wide", "narrow"];
 const SCANNED_MS = 50; // a bar code reader types faster: its Enter confirms nothing
@@ -16,7 +17,7 @@ const KEYS = { Backspace: "delete", Delete: "clear" };
 
 export class Entry {
   input;
-  #sheet = new Sheet("keypad", SHAPES, () => this.cancel());
+  #sheet;
   #draft;
   /** @type {() => void} */
   #closed;
@@ -35,18 +36,19 @@ export class Entry {
     this.#before = input.value;
     this.#wasTouched = isTouched(input);
     this.#draft = new Draft(entryText(input));
+    this.#sheet = new Sheet("keypad", SHAPES, input, () => this.cancel());
     this.#label();
-    this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(target.closest("button")));
+    this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(closest(target, "button")));
     addEventListener("keydown", this.#typed, true);
     // What is pasted, and what an input method writes, is in the field itself.
     if (input.type !== "range") input.addEventListener("input", this.#changed);
-    this.#sheet.open(input, this.#find("h2").textContent);
+    this.#sheet.open(nameOf(input));
     this.#show();
   }
 
   cancel() {
     if (this.#isPasted) this.#put(this.#before);
-    if (this.#isPasted && !this.#wasTouched) releaseEntry(this.input.closest("[data-widget]"));
+    if (this.#isPasted && !this.#wasTouched) releaseEntry(widgetOf(this.input));
     this.#close();
   }
 
@@ -57,30 +59,29 @@ export class Entry {
     this.#closed();
   }
 
-  /** @param {string} selector */
+  /** @template {string} S @param {S} selector */
   #find(selector) {
-    return this.#sheet.root.querySelector(selector);
+    return find(this.#sheet.root, selector);
   }
 
   #label() {
     const { min, max, isWhole } = limitsOf(this.input);
-    const named = this.input.labels[0] ?? document.getElementById(this.input.getAttribute("aria-labelledby"));
-    setText(this.#find("h2"), named.textContent);
+    setText(this.#find("h2"), nameOf(this.input));
     setText(this.#find(".sheet-head b"), entryText(this.input));
     setText(this.#find("small"), this.input.dataset.unit ?? "");
     for (const [name, limit, end] of [
       ["min", min, ".low"],
       ["max", max, ".high"],
     ]) {
-      const key = this.#find(`[data-key=${name}]`);
+      const key = this.#find(`button[data-key=${name}]`);
       key.disabled = limit === "";
-      for (const place of [key.querySelector("b"), this.#find(end)]) setText(place, numberText(limit));
+      for (const place of [find(key, "b"), this.#find(end)]) setText(place, numberText(limit));
     }
     // A parameter is set by the page's own key of that name.
     if (this.input.matches("[data-entry]"))
       for (const label of [".name", ".label"]) setText(this.#find(`.finish ${label}`), this.#sheet.root.dataset.enter);
-    this.#find("[data-key=sign]").disabled = min !== "" && min >= 0;
-    this.#find('[data-key="."]').disabled = isWhole;
+    this.#find("button[data-key=sign]").disabled = min !== "" && Number(min) >= 0;
+    this.#find('button[data-key="."]').disabled = isWhole;
     this.#find(".scale").hidden = min === "" || max === "";
   }
 
@@ -89,13 +90,13 @@ export class Entry {
     if (!button || button.disabled) return;
     if (button.matches(".cancel-entry")) this.cancel();
     else if (button.matches(".set-entry")) this.#set();
-    else this.#press(button.dataset.key);
+    else this.#press(button.dataset.key ?? "");
   }
 
   /** @param {string} key */
   #press(key) {
-    const limit = limitsOf(this.input)[key];
-    this.#type(() => (limit === undefined ? this.#draft.press(key) : this.#draft.replace(numberText(limit))));
+    const limit = key === "min" || key === "max" ? limitsOf(this.input)[key] : null;
+    this.#type(() => (limit === null ? this.#draft.press(key) : this.#draft.replace(numberText(limit))));
   }
 
   /** @param {() => void} change */
@@ -134,7 +135,7 @@ export class Entry {
     this.#find(".entered p").hidden = !isOut;
     setText(this.#find(".entered p b"), isOut ? dataset[problem] : "");
     setText(this.#find(".entered p span"), isOut ? this.#limits() : "");
-    this.#find(".set-entry").disabled = problem !== null;
+    this.#find("button.set-entry").disabled = problem !== null;
     const isOff = problem === "tooLow" || problem === "tooHigh";
     setText(this.#find("[data-text=reason]"), problem ? dataset[isOff ? "outside" : problem] : "");
     markScale(this.#find(".scale"), plain, limitsOf(this.input));
@@ -142,12 +143,12 @@ export class Entry {
 
   // As the page says them: a node may change those of its parameter.
   #limits() {
-    return this.input.closest("[data-widget]").querySelector("[data-text=limits]").textContent;
+    return find(widgetOf(this.input), "[data-text=limits]").textContent;
   }
 
   #set() {
     const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
-    if (problem) return;
+    if (problem || plain === null) return;
     enter(this.input, plain);
     this.#put(this.input.value);
     this.#close();

@@ -1,19 +1,28 @@
 // Where a sheet lies: beside its field, never over it, the header or the rail with Stop.
+import { find } from "../show.js";
+
 /** @typedef {{ left: number, right: number, top: number, bottom: number }} Area @typedef {{ left: number, top: number, lift: number, side: string, point: number }} Spot */
 const GAP_PX = 8;
+
+/** @param {HTMLElement} input @returns {HTMLElement} */
+export function widgetOf(input) {
+  const root = input.closest("[data-widget]");
+  if (!root) throw new Error("an input outside of a widget");
+  return root;
+}
 
 // What is kept free: the field with its name, a slider with its value; where there is less room, the field alone.
 /** @param {HTMLElement} input */
 function fieldsOf(input) {
   const field = input.closest(".entry") ?? input;
-  const whole = input.matches("[data-entry]") ? field : input.closest("[data-widget]");
+  const whole = input.matches("[data-entry]") ? field : widgetOf(input);
   return [whole, field].map((one) => one.getBoundingClientRect());
 }
 
 // The page, beside the rail.
 /** @returns {Area} */
 function area() {
-  const { left, right, top, bottom } = document.querySelector("main").getBoundingClientRect();
+  const { left, right, top, bottom } = find(document, "main").getBoundingClientRect();
   return { left, right, top, bottom };
 }
 
@@ -62,11 +71,13 @@ function across(sheet, field, area, shape) {
 // Places the sheet for an input; returns by how many pixels the page is lifted.
 /** @param {HTMLElement} sheet @param {HTMLElement} input @param {string[]} shapes */
 export function place(sheet, input, shapes) {
-  const main = document.querySelector("main");
+  const main = find(document, "main");
   main.toggleAttribute("data-lifted", false);
   const spot = spotOf(sheet, fieldsOf(input), shapes);
   sheet.dataset.side = spot.side;
-  for (const name of ["left", "top", "point"]) sheet.style.setProperty(`--${name}`, `${Math.round(spot[name])}px`);
+  const { left, top, point } = spot;
+  for (const [name, px] of Object.entries({ left, top, point }))
+    sheet.style.setProperty(`--${name}`, `${Math.round(px)}px`);
   main.style.setProperty("--lift", `${Math.round(spot.lift)}px`);
   main.toggleAttribute("data-lifted", spot.lift !== 0);
   return spot.lift;
@@ -81,7 +92,7 @@ function spotOf(sheet, fields, shapes) {
       if (spot) return spot;
     }
   }
-  return lowest(sheet, fields.at(-1), page);
+  return lowest(sheet, fields[fields.length - 1], page);
 }
 
 // A screen that is too low for both: the end of the field is seen, and the sheet in its last shape.

@@ -1,9 +1,8 @@
 // A sheet over the page in which something is entered: one at a time, and hold-to-run keys are locked.
-import { lockLocally, unlockLocally } from "../show.js";
-import { place } from "./place.js";
+import { lockHolds, unlockHolds } from "../hold-locks.js";
+import { copyOf, find } from "../show.js";
+import { place, widgetOf } from "./place.js";
 import { TAP_AGAIN_MS } from "../press.js";
-
-const HOLDS = '[data-kind="hold"]';
 
 // The styles of sheets come with the first one.
 await new Promise((resolve, reject) => {
@@ -20,11 +19,18 @@ function settle() {
   settling = setTimeout(() => delete document.body.dataset.settling, TAP_AGAIN_MS);
 }
 
+// What an input is called on the page.
+/** @param {HTMLInputElement} input */
+export function nameOf(input) {
+  const named = input.labels?.[0] ?? document.getElementById(input.getAttribute("aria-labelledby") ?? "");
+  return named?.textContent ?? "";
+}
+
 export class Sheet {
   /** @type {HTMLElement} */
   root;
-  /** @type {HTMLElement | null} */
-  #input = null;
+  /** @type {HTMLElement} */
+  #input;
   /** @type {string[]} */
   #shapes;
   /** @type {() => void} */
@@ -33,25 +39,25 @@ export class Sheet {
   #placed = () => this.#place();
 
   // `shapes`: how it may look, the best one first.
-  /** @param {string} id @param {string[]} shapes @param {() => void} gone */
-  constructor(id, shapes, gone) {
-    this.root = document.getElementById(id).content.firstElementChild.cloneNode(true);
+  /** @param {string} id @param {string[]} shapes @param {HTMLElement} input @param {() => void} gone */
+  constructor(id, shapes, input, gone) {
+    this.root = copyOf(find(document, `template#${id}`));
+    this.#input = input;
     this.#shapes = shapes;
     this.#gone = gone;
     // The input keeps the focus, and so its caret.
     this.root.addEventListener("mousedown", (event) => event.preventDefault());
   }
 
-  /** @param {HTMLElement} input @param {string | null} label */
-  open(input, label) {
-    this.#input = input;
+  /** @param {string} label */
+  open(label) {
     this.root.setAttribute("aria-label", label);
     document.body.append(this.root);
-    input.closest("[data-widget]").dataset.entering = "";
-    for (const hold of document.querySelectorAll(HOLDS)) lockLocally(hold, this.root.dataset.locks);
+    widgetOf(this.#input).dataset.entering = "";
+    lockHolds(this.root.dataset.locks);
     if (this.#place()) settle();
     addEventListener("resize", this.#placed);
-    this.#watch.observe(input);
+    this.#watch.observe(this.#input);
   }
 
   close() {
@@ -59,9 +65,9 @@ export class Sheet {
     removeEventListener("resize", this.#placed);
     this.#watch.disconnect();
     this.root.remove();
-    document.querySelector("main").toggleAttribute("data-lifted", false);
-    delete this.#input.closest("[data-widget]").dataset.entering;
-    for (const hold of document.querySelectorAll(HOLDS)) unlockLocally(hold);
+    find(document, "main").toggleAttribute("data-lifted", false);
+    delete widgetOf(this.#input).dataset.entering;
+    unlockHolds();
   }
 
   #place() {

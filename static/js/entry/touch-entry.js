@@ -1,5 +1,7 @@
 // Opens the keypad or the keyboard on the screen at a touch in an input. With panel key `keyboard = "auto"` only
 // where a finger is the main pointer.
+import { closest } from "../show.js";
+
 const coarse = matchMedia("(pointer: coarse)");
 const always = pageGuard.page.keyboard === "on";
 const TOUCHED = ":is(input[type=text], output)";
@@ -22,8 +24,8 @@ function prepare() {
 
 /** @param {HTMLElement} place */
 async function openFor(place) {
-  const input = place.matches("output") ? place.parentElement.querySelector("input") : place;
-  if (open?.input === input) return;
+  const input = place instanceof HTMLInputElement ? place : place.parentElement?.querySelector("input");
+  if (!input || open?.input === input) return;
   open?.cancel();
   const touch = ++touches;
   try {
@@ -36,7 +38,7 @@ async function openFor(place) {
 }
 
 document.addEventListener("click", ({ target }) => {
-  const place = target.closest?.(`[data-widget] ${TOUCHED}`);
+  const place = closest(target, `[data-widget] ${TOUCHED}`);
   if (place && (always || coarse.matches)) openFor(place);
 });
 coarse.addEventListener("change", prepare);

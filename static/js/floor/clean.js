@@ -1,22 +1,22 @@
 // The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
 import { shield } from "./shield.js";
-import { lockLocally, unlockLocally } from "../show.js";
+import { lockHolds, unlockHolds } from "../hold-locks.js";
+import { find } from "../show.js";
 import { leaveStopsBare } from "./bare.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;
 const HOLD_TO_END_MS = 2000; // a cloth does not rest for so long on one place
-const HOLDS = '[data-kind="hold"]';
 
-const over = document.getElementById("cleaning");
-const totalMs = () => 1000 * over.dataset.seconds;
+const over = find(document, "#cleaning");
+const totalMs = () => 1000 * Number(over.dataset.seconds);
 
 export class Cleaning {
   #endsAt = 0; // by performance.now(): a clock that is set changes nothing
 
   constructor() {
     let holding = 0;
-    const end = over.querySelector(".end-cleaning");
+    const end = find(over, ".end-cleaning");
     end.addEventListener("pointerdown", () => {
       clearTimeout(holding); // of another finger: only the last one counts
       holding = setTimeout(() => this.#end(), HOLD_TO_END_MS);
@@ -38,9 +38,9 @@ export class Cleaning {
     this.#endsAt = performance.now() + ms;
     shield.raise();
     // A hold that goes on ends with its lock.
-    for (const hold of document.querySelectorAll(HOLDS)) lockLocally(hold, over.querySelector("p").textContent.trim());
-    document.activeElement?.blur();
-    document.getElementById("menu").hidePopover();
+    lockHolds(find(over, "p").textContent.trim());
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+    find(document, "#menu").hidePopover();
     over.showPopover();
     leaveStopsBare(over);
     this.#count();
@@ -50,14 +50,14 @@ export class Cleaning {
     if (!over.matches(":popover-open")) return;
     const left = this.#endsAt - performance.now();
     if (left <= 0) return this.#end();
-    over.querySelector("[role=timer]").textContent = Math.ceil(left / 1000);
+    find(over, "[role=timer]").textContent = String(Math.ceil(left / 1000));
     setTimeout(() => this.#count(), COUNT_MS);
   }
 
   #end() {
     pageGuard.keep(UNTIL, null);
     over.hidePopover();
-    for (const hold of document.querySelectorAll(HOLDS)) unlockLocally(hold);
+    unlockHolds();
     shield.lower();
   }
 }

@@ -1,10 +1,11 @@
 // The page gets dark when it is not touched for long. The touch that wakes it presses nothing.
 import { leaveStopsBare } from "./bare.js";
 import { shield } from "./shield.js";
+import { find } from "../show.js";
 
 const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keydown", "wheel"];
 
-const dark = document.getElementById("dark");
+const dark = find(document, "#dark");
 
 export class Dimming {
   /** @type {number} */
@@ -22,8 +23,8 @@ export class Dimming {
     const seen = new MutationObserver(() => this.wake());
     const machine = document.querySelector(".machine-state");
     if (machine) seen.observe(machine, { attributeFilter: ["data-state", "data-shape", "data-colour"] });
-    seen.observe(document.getElementById("state"), { attributeFilter: ["data-state"] });
-    seen.observe(document.getElementById("fault"), { attributeFilter: ["hidden"] });
+    seen.observe(find(document, "#state"), { attributeFilter: ["data-state"] });
+    seen.observe(find(document, "#fault"), { attributeFilter: ["hidden"] });
     this.#wait();
   }
 
@@ -36,10 +37,13 @@ export class Dimming {
   }
 
   /** @param {Event} event */
-  #touched({ type, pointerId, movementX, movementY }) {
-    if (type === "pointermove" && !movementX && !movementY) return; // the page moved, not the mouse
-    if (type === "pointerdown") this.#pressed.add(pointerId);
-    if (type === "pointerup" || type === "pointercancel") this.#pressed.delete(pointerId);
+  #touched(event) {
+    if (event instanceof PointerEvent) {
+      const { type, pointerId, movementX, movementY } = event;
+      if (type === "pointermove" && !movementX && !movementY) return; // the page moved, not the mouse
+      if (type === "pointerdown") this.#pressed.add(pointerId);
+      if (type === "pointerup" || type === "pointercancel") this.#pressed.delete(pointerId);
+    }
     this.wake();
   }
 

@@ -1,4 +1,6 @@
 // The page as a machine's screen: cleaning, dimming, and none of a browser's own gestures.
+import { find } from "../show.js";
+
 const ZOOM_KEYS = ["+", "-", "=", "0"];
 const coarse = matchMedia("(pointer: coarse)");
 
@@ -7,8 +9,9 @@ function isKiosk() {
   return "kiosk" in document.documentElement.dataset && coarse.matches;
 }
 
-/** @param {string} name @param {(event: Data) => boolean} isGesture */
+/** @template {keyof WindowEventMap} K @param {K} name @param {(event: WindowEventMap[K]) => boolean} isGesture */
 function refuse(name, isGesture = () => true) {
+  /** @param {WindowEventMap[K]} event */
   const listener = (event) => isKiosk() && isGesture(event) && event.preventDefault();
   addEventListener(name, listener, { capture: true, passive: false });
 }
@@ -28,8 +31,8 @@ let cleaning = null;
 const begin = () => import("./clean.js").then(({ Cleaning }) => new Cleaning()).catch(pageGuard.fail);
 const loaded = () => (cleaning ??= begin());
 if (pageGuard.recall("cleaning-until")) loaded();
-document.getElementById("menu").addEventListener("toggle", loaded, { once: true });
-const key = document.querySelector(".menu .clean");
+find(document, "#menu").addEventListener("toggle", loaded, { once: true });
+const key = find(document, ".menu .clean");
 key.hidden = false;
 key.addEventListener("click", () => loaded().then((one) => one?.start()));
 document.documentElement.dataset.floor = ""; // all of this is in force

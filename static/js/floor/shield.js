@@ -60,9 +60,12 @@ class Shield {
   /** @param {Event} event */
   #swallow(event) {
     if (!this.#up || isStop(event.target) || isEnd(event.target)) return;
-    const what = event.pointerId ?? event.code;
-    if (event.type === "pointerdown" || event.type === "keydown") this.#down.add(what);
-    if (["pointerup", "pointercancel", "keyup"].includes(event.type)) this.#down.delete(what);
+    const { type } = event;
+    if (event instanceof PointerEvent || event instanceof KeyboardEvent) {
+      const pressed = "pointerId" in event ? event.pointerId : event.code;
+      if (type === "pointerdown" || type === "keydown") this.#down.add(pressed);
+      if (["pointerup", "pointercancel", "keyup"].includes(type)) this.#down.delete(pressed);
+    }
     this.touched(event);
     event.stopImmediatePropagation();
     if (event.cancelable) event.preventDefault();

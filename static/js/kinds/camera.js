@@ -1,4 +1,5 @@
 // A camera: requests the next picture when the last one is drawn, and only while the widget is visible.
+import { find } from "../show.js";
 
 const RETRY_MS = 1000;
 const WATCH_MS = 100;
@@ -23,9 +24,9 @@ class Camera {
   /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
-    this.#canvas = root.querySelector("canvas");
+    this.#canvas = find(root, "canvas");
     new IntersectionObserver((entries) => {
-      this.#onScreen = entries.at(-1).isIntersecting;
+      this.#onScreen = entries[entries.length - 1].isIntersecting;
       this.#update();
     }).observe(root);
     document.addEventListener("visibilitychange", () => this.#update());
@@ -43,14 +44,14 @@ class Camera {
     if (this.#socket) return;
     clearTimeout(this.#retry);
     const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/frames`;
-    const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
+    const socket = new WebSocket(new URL(path, location.href).href.replace(/^http/, "ws"));
     socket.binaryType = "blob";
     this.#socket = socket;
     this.#drawnAt = performance.now();
     socket.onopen = () => this.#requestPicture(socket);
     socket.onmessage = ({ data }) => {
       if (typeof data === "string") this.#header = JSON.parse(data);
-      else this.#draw(socket, data, this.#header);
+      else if (this.#header) this.#draw(socket, data, this.#header);
     };
     socket.onclose = () => {
       if (socket !== this.#socket) return;
@@ -78,9 +79,9 @@ class Camera {
       const { width, height } = picture;
       if (this.#canvas.width !== width) this.#canvas.width = width;
       if (this.#canvas.height !== height) this.#canvas.height = height;
-      this.#canvas.getContext("2d").drawImage(picture, 0, 0);
+      this.#canvas.getContext("2d")?.drawImage(picture, 0, 0);
       picture.close();
-      this.#root.querySelector(".taken").textContent = time;
+      find(this.#root, ".taken").textContent = time;
       this.#root.dataset.frame = number;
       this.#drawnAt = performance.now();
       delete this.#root.dataset.broken;

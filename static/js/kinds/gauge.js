@@ -1,3 +1,5 @@
+import { find } from "../show.js";
+
 // Moves what stands on the scale of a gauge.
 /** @type {Record<string, Show>} */
 export const show = {
@@ -8,7 +10,7 @@ export const show = {
 // `percent` is from the lower end of the scale, null where it is unknown.
 /** @param {HTMLElement} root @param {string} mark @param {number | null} percent */
 function place(root, mark, percent) {
-  const element = root.querySelector(mark);
+  const element = find(root, mark);
   element.toggleAttribute("hidden", percent === null);
   if (percent === null) return;
   if (root.classList.contains("vertical")) element.setAttribute("y", `${100 - percent}%`);

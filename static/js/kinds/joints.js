@@ -1,7 +1,7 @@
 // Shows the joints of a widget, a row each.
-import { setText } from "../show.js";
+import { find, setText } from "../show.js";
 
-/** @type {<T>(root: HTMLElement, values: T[], show: (row: HTMLElement, value: T) => void) => void} */
+/** @template T @param {HTMLElement} root @param {T[]} values @param {(row: HTMLElement, value: T) => void} show */
 const eachRow = (root, values, show) => {
   for (const [number, row] of root.querySelectorAll("li").entries()) show(row, values[number]);
 };
@@ -17,7 +17,7 @@ export const show = {
 /** @param {HTMLElement} row @param {number | null} percent */
 function place(row, percent) {
   const zero = Number(row.dataset.zero);
-  const [amount, pointer] = [".amount", ".pointer"].map((part) => row.querySelector(part));
+  const [amount, pointer] = [".amount", ".pointer"].map((part) => find(row, part));
   for (const part of [amount, pointer]) part.toggleAttribute("hidden", percent === null);
   if (percent === null) return;
   pointer.setAttribute("x", `${percent}%`);

@@ -1,6 +1,7 @@
 // A joystick: a hold whose heartbeats have the deflection. It follows one finger, wherever that goes, and shows the
 // values that the server has sent to the robot.
 import { Holding } from "../holding.js";
+import { find } from "../show.js";
 
 const APART_MS = 40; // between two heartbeats of a finger that moves
 /** @type {Record<string, [number, number]>} */
@@ -22,7 +23,7 @@ class Joystick extends Holding {
   /** @param {HTMLElement} root @param {import("../source.js").Source} source */
   constructor(root, source) {
     super(root, source);
-    this.#knob = root.querySelector(".knob");
+    this.#knob = find(root, ".knob");
     this.button.addEventListener("pointerdown", (event) => this.#down(event));
     this.button.addEventListener("pointermove", (event) => event.pointerId === this.pointer && this.#moveTo(event));
     this.button.addEventListener("keydown", (event) => this.#keyDown(event));
@@ -35,8 +36,7 @@ class Joystick extends Holding {
 
   /** @param {Record<string, string>} moves */
   onResponse(moves) {
-    for (const [axis, text] of Object.entries(moves))
-      this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
+    for (const [axis, text] of Object.entries(moves)) find(this.root, `[data-axis="${axis}"]`).textContent = text;
   }
 
   onEnd() {
@@ -57,7 +57,7 @@ class Joystick extends Holding {
   // From the middle of the pad, as far as the knob goes.
   /** @param {PointerEvent} event */
   #moveTo({ clientX, clientY }) {
-    const { left, top, width, height } = this.root.querySelector(".pad").getBoundingClientRect();
+    const { left, top, width, height } = find(this.root, ".pad").getBoundingClientRect();
     const reach = (Math.min(width, height) - this.#knob.offsetWidth) / 2;
     this.#deflect((clientX - left - width / 2) / reach, (top + height / 2 - clientY) / reach);
     if (performance.now() - this.#beatAt < APART_MS) return;
@@ -67,12 +67,13 @@ class Joystick extends Holding {
 
   /** @param {number} x @param {number} y */
   #deflect(x, y) {
+    /** @param {number} value */
     const inside = (value) => Math.max(-1, Math.min(1, value));
     const far = this.root.dataset.shape === "circle" ? Math.max(1, Math.hypot(x, y)) : 1;
     this.#x = inside(x / far);
     this.#y = inside(y / far);
-    this.#knob.style.setProperty("--x", this.#x);
-    this.#knob.style.setProperty("--y", this.#y);
+    this.#knob.style.setProperty("--x", String(this.#x));
+    this.#knob.style.setProperty("--y", String(this.#y));
   }
 
   /** @param {KeyboardEvent} event */

@@ -1,5 +1,5 @@
 // A log: asks for its lines while it is seen, when more have come, and when other lines are wanted.
-import { setText } from "../show.js";
+import { copyOf, find, setText } from "../show.js";
 
 const APART_MS = 250;
 const SETTLE_MS = 300; // from the last letter typed
@@ -35,22 +35,22 @@ class Log {
   /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
-    this.#lines = root.querySelector(".lines");
-    const wanted = root.querySelector(".wanted");
+    this.#lines = find(root, ".lines");
+    const wanted = find(root, ".wanted");
     wanted.inert = false;
-    wanted.querySelector(".level").addEventListener("change", () => this.#restart());
+    find(wanted, ".level").addEventListener("change", () => this.#restart());
     for (const input of wanted.querySelectorAll("input")) {
       input.addEventListener("input", () => this.#restart(SETTLE_MS));
       input.addEventListener("keydown", (event) => event.key === "Enter" && event.preventDefault()); // no press
     }
-    const pause = wanted.querySelector(".pause");
+    const pause = find(wanted, ".pause");
     pause.addEventListener("click", () => {
       this.#paused = !this.#paused;
-      pause.setAttribute("aria-pressed", this.#paused);
+      pause.setAttribute("aria-pressed", String(this.#paused));
       this.update();
     });
     new IntersectionObserver((entries) => {
-      this.#onScreen = entries.at(-1).isIntersecting;
+      this.#onScreen = entries[entries.length - 1].isIntersecting;
       this.update();
     }).observe(root);
     document.addEventListener("visibilitychange", () => this.update());
@@ -78,12 +78,11 @@ class Log {
     this.#queriedAt = performance.now();
     const request = new AbortController();
     this.#request = request;
-    const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
     const query = new URLSearchParams({
-      level: of("level"),
-      node: of("node"),
-      search: of("search"),
-      after: whole ? 0 : this.#last,
+      level: find(this.#root, ".wanted select.level").value,
+      node: find(this.#root, ".wanted input.node").value,
+      search: find(this.#root, ".wanted input.search").value,
+      after: String(whole ? 0 : this.#last),
     });
     try {
       const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
@@ -99,19 +98,19 @@ class Log {
 
   /** @param {{ lines: Record<string, string>[], note: string, last: number }} answer @param {boolean} whole */
   #show({ lines, note, last }, whole) {
-    const template = this.#root.querySelector("template");
+    const template = find(this.#root, "template");
     const top = this.#lines.scrollTop;
     const before = this.#lines.scrollHeight;
     const rows = lines.reverse().map((line) => {
-      const row = template.content.firstElementChild.cloneNode(true);
+      const row = copyOf(template);
       row.dataset.level = line.level;
-      row.querySelector("time").dateTime = line.at;
-      for (const name of ["time", "word", "node", "text"]) row.querySelector(`.${name}`).textContent = line[name];
+      find(row, "time").dateTime = line.at;
+      for (const name of ["time", "word", "node", "text"]) find(row, `.${name}`).textContent = line[name];
       return row;
     });
     if (whole) this.#lines.replaceChildren(...rows);
     else this.#lines.prepend(...rows);
-    while (this.#lines.children.length > Number(this.#root.dataset.lines)) this.#lines.lastElementChild.remove();
+    while (this.#lines.children.length > Number(this.#root.dataset.lines)) this.#lines.lastElementChild?.remove();
     // Who reads further down stays there.
     if (top > 0 && !whole) this.#lines.scrollTop = top + this.#lines.scrollHeight - before;
     setText(this.#root.querySelector(".left-out"), note);

@@ -1,3 +1,5 @@
+import { find } from "../show.js";
+
 // The keys of a step have the values that they publish; one without a value is at the end of the limits.
 /** @type {Record<string, Show>} */
 export const show = {
@@ -7,7 +9,7 @@ export const show = {
 
 /** @param {HTMLElement} root @param {string} way @param {string} value */
 function setKey(root, way, value) {
-  const key = root.querySelector(`[data-way="${way}"]`);
+  const key = find(root, `button[data-way="${way}"]`);
   key.value = value;
   key.toggleAttribute("data-end", !value);
   key.disabled = !value || root.dataset.enabled === "false";
@@ -17,7 +19,7 @@ function setKey(root, way, value) {
 /** @param {HTMLElement} root @param {boolean} locked */
 export function lock(root, locked) {
   root.dataset.enabled = String(!locked);
-  for (const key of root.querySelectorAll("[data-end]")) key.disabled = true;
+  for (const key of root.querySelectorAll("button[data-end]")) key.disabled = true;
 }
 
 // What a key sends: its value when the finger went down.

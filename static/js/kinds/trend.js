@@ -2,6 +2,7 @@
 import { merged } from "../trend/columns.js";
 import { Cursor } from "../trend/cursor.js";
 import { duration, Plot } from "../trend/plot.js";
+import { closest, find } from "../show.js";
 
 const LEAST_MS = 500; // between two requests
 const AGAIN_MS = 2000; // after one that failed
@@ -37,8 +38,8 @@ class Trend {
   /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
-    this.#area = root.querySelector(".area");
-    this.#windows = root.dataset.windows.split(" ").map(Number);
+    this.#area = find(root, ".area");
+    this.#windows = (root.dataset.windows ?? "").split(" ").map(Number);
     this.#keep = Number(root.dataset.keep);
     this.#span = Number(root.dataset.window);
     this.#plot = new Plot(root);
@@ -48,11 +49,11 @@ class Trend {
   }
 
   #listen() {
-    new IntersectionObserver((seen) => this.#setVisible(seen.at(-1).isIntersecting)).observe(this.#area);
+    new IntersectionObserver((seen) => this.#setVisible(seen[seen.length - 1].isIntersecting)).observe(this.#area);
     document.addEventListener("visibilitychange", () => this.#update());
     const keys = this.#root.querySelector(".trend-keys");
     if (keys) keys.hidden = false;
-    keys?.addEventListener("click", (event) => this.#act(event.target.closest("button")?.dataset.do));
+    keys?.addEventListener("click", ({ target }) => this.#act(closest(target, "button")?.dataset.do));
     setInterval(() => this.#showBehind(), 1000);
   }
 
@@ -79,22 +80,24 @@ class Trend {
     const request = new AbortController();
     this.#request = request;
     const points = this.#plot.mostColumns;
-    const query = { span_s: this.#span, points };
+    const query = new URLSearchParams({ span_s: String(this.#span), points: String(points) });
     const width = this.#span / points;
     const drawn = this.#drawn;
     const goesOn = this.#end === null && drawn?.live && drawn.width === width;
-    if (this.#end !== null) query.end = this.#end;
-    if (goesOn) query.since = Math.max(0, Math.floor((drawn.end - LATE_S) / width) - 1);
-    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/trend?${new URLSearchParams(query)}`;
+    const since = goesOn ? Math.max(0, Math.floor((drawn.end - LATE_S) / width) - 1) : 0;
+    if (this.#end !== null) query.set("end", String(this.#end));
+    if (goesOn) query.set("since", String(since));
+    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/trend?${query}`;
     let wait = AGAIN_MS;
     try {
       const response = await fetch(path, { signal: request.signal });
       if (response.ok) {
+        /** @type {TrendAnswer} */
         const answer = await response.json();
         wait = Math.max(LEAST_MS, width * 1000);
         this.#clock = answer.now - performance.now() / 1000;
         if (goesOn && answer.shift !== drawn.shift) wait = 0;
-        this.#receive(answer, goesOn ? query.since : 0, wait > 0);
+        this.#receive(answer, since, wait > 0);
       }
     } catch {
       if (request.signal.aborted) return; // another one is under way
@@ -105,10 +108,11 @@ class Trend {
   }
 
   // Columns from `since` on take the place of those that are there.
-  /** @param {Data} answer @param {number} since @param {boolean} live */
+  /** @param {TrendAnswer} answer @param {number} since @param {boolean} live */
   #receive(answer, since, live) {
     const { end, shift, width_s: width, zone_s: zone, offset } = answer;
     const begin = end - this.#span;
+    /** @param {number} number */
     const isBefore = (number) => (number + 1) * width < begin;
     this.#columns = answer.pens.map((items, i) => merged(this.#columns[i], items, since, isBefore));
     this.#drawn = {
@@ -127,6 +131,7 @@ class Trend {
   }
 
   // The keys.
+  /** @param {string | undefined} what */
   #act(what) {
     const end = this.#end ?? this.#now;
     const window = this.#windows.indexOf(this.#span);
@@ -158,20 +163,23 @@ class Trend {
       shorter: window <= 0,
     };
     for (const [name, off] of Object.entries(keys)) {
-      const key = this.#root.querySelector(`[data-do="${name}"]`);
+      const key = this.#root.querySelector(`button[data-do="${name}"]`);
       if (key) key.disabled = off;
     }
-    const [pause, resume] = ["pause", "live"].map((name) => this.#root.querySelector(`[data-do="${name}"]`));
-    const had = [pause, resume].includes(document.activeElement);
-    if (pause) [pause.hidden, resume.hidden] = [!live, live];
-    if (had) (live ? pause : resume).focus();
-    this.#root.querySelector(".paused").hidden = live;
+    const pause = this.#root.querySelector("[data-do=pause]");
+    const resume = this.#root.querySelector("[data-do=live]");
+    if (pause && resume) {
+      const had = document.activeElement === pause || document.activeElement === resume;
+      [pause.hidden, resume.hidden] = [!live, live];
+      if (had) (live ? pause : resume).focus();
+    }
+    find(this.#root, ".paused").hidden = live;
     this.#showBehind();
   }
 
   #showBehind() {
     if (this.#end === null) return;
     const behindS = Math.max(0, Math.round(this.#now - this.#end));
-    this.#root.querySelector(".paused span").textContent = `−${duration(behindS)}`;
+    find(this.#root, ".paused span").textContent = `−${duration(behindS)}`;
   }
 }

@@ -2,7 +2,7 @@
 
 // The old ones, and the server's in place of those from `since` on (0: of all): it says [number, value], [number,
 // lowest, highest, last], or null where a line ends. One before the plot stays: a line comes in from there.
-/** @param {Column[]} old @param {([number, number] | [number, number, number, number] | null)[]} items @param {number} since @param {(number: number) => boolean} isBefore @returns {Column[]} */
+/** @param {Column[]} old @param {ColumnItem[]} items @param {number} since @param {(number: number) => boolean} isBefore @returns {Column[]} */
 export function merged(old, items, since, isBefore) {
   const columns = since ? old.filter(([number]) => number < since) : [];
   let starts = false;

@@ -1,5 +1,6 @@
 // The cursor of a trend: a line that a finger or a keyboard sets, and the values there.
 import { numberText } from "../number-text.js";
+import { find } from "../show.js";
 
 const NEAR = 0.02; // of the plot's width: how far from the cursor a value may be
 const STEP = 0.02; // of the plot's width, by a key
@@ -21,7 +22,8 @@ export class Cursor {
   constructor(root, plot) {
     this.#root = root;
     this.#plot = plot;
-    const area = root.querySelector(".area");
+    const area = find(root, ".area");
+    /** @param {PointerEvent} event */
     const point = (event) => this.#point((event.clientX - area.getBoundingClientRect().left) / area.clientWidth);
     area.addEventListener("pointerdown", point);
     area.addEventListener("pointermove", (event) => event.buttons && point(event));
@@ -36,7 +38,7 @@ export class Cursor {
   /** @param {View} drawn @param {Column[][]} columns */
   show(drawn, columns) {
     [this.#drawn, this.#columns] = [drawn, columns];
-    this.#show();
+    this.#show(drawn);
   }
 
   /** @param {number} place */
@@ -44,7 +46,7 @@ export class Cursor {
     if (!this.#drawn) return;
     const { begin, end } = this.#drawn;
     this.#time = begin + Math.min(Math.max(place, 0), 1) * (end - begin);
-    this.#show();
+    this.#show(this.#drawn);
   }
 
   /** @param {KeyboardEvent} event */
@@ -55,37 +57,41 @@ export class Cursor {
     const { begin, end } = this.#drawn;
     if (by) return this.#point(((this.#time ?? end) - begin) / (end - begin) + by);
     this.remove();
-    this.#show();
+    this.#show(this.#drawn);
   }
 
-  #show() {
-    const { begin, end } = this.#drawn;
+  /** @param {View} drawn */
+  #show(drawn) {
+    const { begin, end } = drawn;
     if (this.#time !== null && this.#time < begin) this.remove();
-    const shown = this.#time !== null && this.#time <= end;
-    const line = this.#root.querySelector(".cursor");
-    line.setAttribute("visibility", shown ? "visible" : "hidden");
-    const box = this.#root.querySelector(".cursor-values");
-    box.hidden = !shown;
-    if (!shown) return;
-    const place = (this.#time - begin) / (end - begin);
+    const time = this.#time !== null && this.#time <= end ? this.#time : null;
+    const line = find(this.#root, "line.cursor");
+    line.setAttribute("visibility", time === null ? "hidden" : "visible");
+    const box = find(this.#root, ".cursor-values");
+    box.hidden = time === null;
+    if (time === null) return;
+    const place = (time - begin) / (end - begin);
     for (const name of ["x1", "x2"]) line.setAttribute(name, `${place * 100}%`);
     box.dataset.side = place < 0.5 ? "right" : "left";
     const values = this.#plot.pens.flatMap((pen, i) => [
       ["span", pen.name],
-      ["span", this.#valueAt(pen, this.#columns[i])],
+      ["span", this.#valueAt(pen, this.#columns[i], time, drawn)],
     ]);
-    const texts = [["b", this.#plot.clockOf(this.#time)], ...values];
+    const texts = [["b", this.#plot.clockOf(time)], ...values];
     box.replaceChildren(
       ...texts.map(([tag, text]) => Object.assign(document.createElement(tag), { textContent: text })),
     );
   }
 
-  /** @param {Pen} pen @param {Column[]} columns */
-  #valueAt(pen, columns) {
-    const distance = (one) => Math.abs(this.#plot.timeOf(one[0]) - this.#time);
-    const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);
-    if (!nearest || distance(nearest) > this.#drawn.width + NEAR * this.#drawn.span) return NOTHING;
+  /** @param {Pen} pen @param {Column[]} columns @param {number} time @param {View} drawn */
+  #valueAt(pen, columns, time, { width, span }) {
+    if (!columns.length) return NOTHING;
+    /** @param {Column} column */
+    const distance = ([number]) => Math.abs(this.#plot.timeOf(number) - time);
+    const nearest = columns.reduce((best, column) => (distance(column) < distance(best) ? column : best));
+    if (distance(nearest) > width + NEAR * span) return NOTHING;
     const [, low, high] = nearest;
+    /** @param {number} value */
     const text = (value) =>
       numberText(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
     return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();

@@ -1,6 +1,7 @@
 // Draws a trend's columns into the elements that the server has rendered (templates/widgets/trend.html); the same as
 // app/view/trend_plot.py.
 import { numberText } from "../number-text.js";
+import { find } from "../show.js";
 import { axisRange, valueTicks } from "./axis.js";
 
 const SIZE = 1000;
@@ -11,6 +12,8 @@ const TIME_TICK_PX = 90;
 const STEPS = [
   1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800,
 ];
+
+const LONGEST_STEP = STEPS[STEPS.length - 1];
 
 // The name of a limit stands outside of what the limits enclose, if that is drawn.
 /** @type {(letter: string, place: number) => boolean} */
@@ -24,21 +27,22 @@ export class Plot {
   /** @type {HTMLElement} */
   #area;
   /** @type {View} */
-  #view; // {begin, end, width, zone, offset}: from when to when, the time of a column, the time zone, in seconds; its text if shown
+  #view = { begin: 0, end: 0, width: 0, zone: 0, offset: "", shift: "", span: 0, live: false }; // what is drawn
 
   /** @param {HTMLElement} root */
   constructor(root) {
     this.#root = root;
-    this.#area = root.querySelector(".area");
+    this.#area = find(root, ".area");
+    /** @type {Pen[]} */
     this.pens = [...root.querySelectorAll(".legend .pen")].map((pen, i) => ({
-      name: pen.querySelector('[role="rowheader"]').textContent,
-      unit: pen.dataset.unit,
-      digits: /\.(\d+)f$/.exec(pen.dataset.format)?.[1],
+      name: find(pen, '[role="rowheader"]').textContent,
+      unit: pen.dataset.unit ?? "",
+      digits: numberOr(/\.(\d+)f$/.exec(pen.dataset.format ?? "")?.[1]),
       low: numberOr(pen.dataset.low),
       high: numberOr(pen.dataset.high),
       normal: pen.dataset.normal?.split(" ").map(Number),
-      line: root.querySelectorAll(".pens > .line")[i],
-      mark: root.querySelectorAll(".end")[i],
+      line: root.querySelectorAll(".pens > path.line")[i],
+      mark: root.querySelectorAll("use.end")[i],
     }));
   }
 
@@ -53,9 +57,12 @@ export class Plot {
     this.#view = view;
     const { begin, end } = view;
     const [low, high] = this.#range(columns);
+    /** @param {number} time */
     const x = (time) => ((time - begin) / (end - begin)) * SIZE;
+    /** @param {number} value */
     const y = (value) => Math.min(Math.max((high - value) / (high - low), -0.5), 1.5) * SIZE;
-    const part = (name) => this.#root.querySelector(name);
+    /** @param {string} name */
+    const part = (name) => find(this.#root, name);
     const values = [...valueTicks(low, high, Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX)))];
     const times = [...this.#timeTicks()];
     part(".grid-lines").innerHTML =
@@ -67,14 +74,10 @@ export class Plot {
     part(".times").innerHTML = times
       .map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`)
       .join("");
-    const limits = this.pens.flatMap((pen, i) =>
-      [
-        ["H", pen.high],
-        ["L", pen.low],
-      ]
-        .filter(([, at]) => at !== undefined)
-        .map(([letter, at]) => ({ letter, at, i })),
-    );
+    const limits = this.pens.flatMap(({ high, low }, i) => [
+      ...(high === undefined ? [] : [{ letter: "H", at: high, i }]),
+      ...(low === undefined ? [] : [{ letter: "L", at: low, i }]),
+    ]);
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
     const named = limits
       .map((limit) => ({ ...limit, place: y(limit.at) / 10 }))
@@ -86,11 +89,8 @@ export class Plot {
       )
       .join("");
     part(".bands").innerHTML = this.pens
-      .filter((pen) => pen.normal)
-      .map(
-        ({ normal: [from, to] }) =>
-          `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`,
-      )
+      .flatMap(({ normal }) => (normal ? [normal] : []))
+      .map(([from, to]) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`)
       .join("");
     for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
   }
@@ -98,6 +98,7 @@ export class Plot {
   // Through the lowest and the highest value of each column: no peak is lost.
   /** @param {Pen} pen @param {Column[]} columns @param {(time: number) => number} x @param {(value: number) => number} y */
   #drawPen(pen, columns, x, y) {
+    /** @type {string[]} */
     const path = [];
     let before = 0;
     for (const [number, low, high, last, starts] of columns) {
@@ -131,6 +132,7 @@ export class Plot {
       .flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])])
       .filter((value) => value !== undefined);
     const { min, max } = this.#root.dataset;
+    /** @param {1 | 2} index @param {(a: number, b: number) => number} pick @param {number} none */
     const ends = (index, pick, none) => [...columns.flat().map((column) => column[index]), ...fixed].reduce(pick, none);
     const low = ends(1, (a, b) => Math.min(a, b), Infinity);
     const high = ends(2, (a, b) => Math.max(a, b), -Infinity);
@@ -142,7 +144,7 @@ export class Plot {
   *#timeTicks() {
     const { begin, end, zone } = this.#view;
     const step =
-      STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? STEPS.at(-1);
+      STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? LONGEST_STEP;
     for (let number = Math.ceil((begin + zone) / step); number * step - zone <= end; number++) {
       const time = number * step - zone;
       const [from, to] = step < 60 ? [11, 19] : step < 86400 ? [11, 16] : [5, 10];
@@ -169,6 +171,7 @@ export class Plot {
 // Seconds as "2 d 03:04:05".
 /** @param {number} s */
 export function duration(s) {
+  /** @param {number} number */
   const two = (number) => String(Math.floor(number)).padStart(2, "0");
   const days = s >= 86400 ? `${Math.floor(s / 86400)} d ` : "";
   return `${days}${two((s % 86400) / 3600)}:${two((s % 3600) / 60)}:${two(s % 60)}`;
