@@ -45,6 +45,14 @@ class PreparedPress(NamedTuple):
     handle: PressHandle
 
 
+class Dispatch(NamedTuple):
+    """Of a kind or family: `send` sends a press, `refusal` returns why that would be refused now, else
+    ""."""
+
+    send: Callable[[Any, PreparedPress], Awaitable[Outcome]]
+    refusal: Callable[[Any, dict[str, Any]], TextLike]
+
+
 class Trackers(NamedTuple):
     """The trackers of commands that the robot answers later."""
 
@@ -82,26 +90,21 @@ class Dispatcher:
         self._confirmations = trackers.confirmations
         self._parameters = trackers.parameters
         self._monotonic = monotonic
-        # By kind or family of widgets: how to send it, why it would be refused, how to check an entry.
-        self.senders: Mapping[type[Any], Callable[[Any, PreparedPress], Awaitable[Outcome]]] = {
-            PublishPress: self._publish,
-            Call: self._call,
-            Action: self._start,
-            Parameter: self._set,
-        }
-        self.refusals: Mapping[type[Any], Callable[[Any, dict[str, Any]], TextLike]] = {
-            PublishPress: self._check_message,
-            Call: self._check_call,
-            Action: lambda widget, _: self.actions.full(widget.action),
-            Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
+        # By kind or family of widgets: how to dispatch it, how to check an entry.
+        self.dispatches: Mapping[type[Any], Dispatch] = {
+            PublishPress: Dispatch(self._publish, self._check_message),
+            Call: Dispatch(self._call, self._check_call),
+            Action: Dispatch(self._start, lambda widget, _: self.actions.full(widget.action)),
+            Parameter: Dispatch(
+                self._set, lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}")
+            ),
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, value: widget.check_value(value),
             Parameter: self._parameters.check_value,
             Step: self._check_step,
         }
-        require_rows("sender", self.senders, PressCommand)
-        require_rows("refusal", self.refusals, PressCommand)
+        require_rows("dispatch", self.dispatches, PressCommand)
         require_rows("check of its entries", self.checks, EntryWidget)
 
     def _check_step(self, widget: Step, value: Any) -> float:
@@ -149,13 +152,14 @@ class Dispatcher:
         """
         values = self._checked_inputs(press)
         fields = fill(press.widget.template, add_now(values))
-        send = find_row(self.senders, press.widget)
-        return await send(press.widget, PreparedPress(values, fields, handle))
+        dispatch = find_row(self.dispatches, press.widget)
+        return await dispatch.send(press.widget, PreparedPress(values, fields, handle))
 
     def refusal(self, press: Press[PressCommand]) -> TextLike:
         """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
         widget, values = press.widget, self._checked_inputs(press)
-        return find_row(self.refusals, widget)(widget, fill(widget.template, add_now(values)))
+        dispatch = find_row(self.dispatches, widget)
+        return dispatch.refusal(widget, fill(widget.template, add_now(values)))
 
     def _checked_inputs(self, press: Press[PressCommand]) -> dict[str, Any]:
         return self.check_inputs(self._input_ids[press.widget.id], press.inputs)

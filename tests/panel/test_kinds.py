@@ -39,8 +39,7 @@ def test_each_part_of_a_kind_is_required(dispatcher: Dispatcher) -> None:
         (ATTRIBUTES, BaseWidget),
         (COMMAND_CHECKS, Command),
         (SIMULATED, BaseWidget),
-        (dispatcher.senders, PressCommand),
-        (dispatcher.refusals, PressCommand),
+        (dispatcher.dispatches, PressCommand),
         (dispatcher.checks, EntryWidget),
     ):
         require_rows("part", rows, family)
