@@ -27,7 +27,7 @@ LOW, LOW_LOW = Limit("low", 5.0, deadband=0.5), Limit("low_low", 2.0)
         (LOW, math.nan, False, True),
     ],
 )
-def test_a_limit_is_exceeded_beyond_it_until_the_value_is_past_the_deadband(
+def test_limit_stays_exceeded_until_the_value_is_past_the_deadband(
     limit: Limit, value: float, before: bool, exceeded: bool
 ) -> None:
     assert limit.is_exceeded(value, before) is exceeded

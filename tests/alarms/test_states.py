@@ -108,7 +108,7 @@ def test_a_level_that_rises_is_raised_again_with_its_priority() -> None:
     assert (fallen.state, fallen.level, fallen.raised_level) == (State.UNACKNOWLEDGED, 1, 2)
 
 
-def test_a_level_that_rises_unacknowledged_needs_the_operator_to_see_it() -> None:
+def test_acknowledgement_of_a_lower_level_is_refused_after_a_rise() -> None:
     risen = update_level(raised(TWO_LEVELS), TWO_LEVELS, 2, NOW)
     assert refusal(acknowledge(risen, TWO_LEVELS, 1)) == "alarm_came_again"
 

@@ -208,7 +208,7 @@ def test_a_press_that_no_client_waits_for_any_more_is_closed(tmp_path: Path, dis
     assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
 
 
-def test_a_press_that_is_called_away_as_it_was_written_is_closed(
+def test_press_cancelled_during_its_write_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     presses: list[asyncio.Task[Entry | None]] = []

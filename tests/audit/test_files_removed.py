@@ -57,7 +57,7 @@ def moved(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("take", [removed, renamed, all_removed, replaced, moved])
-def test_no_press_is_sent_when_the_log_is_gone_and_a_new_one_says_so(
+def test_no_press_is_sent_when_the_log_is_gone_and_the_new_log_records_that(
     tmp_path: Path, take: Callable[[Path], None]
 ) -> None:
     folder = tmp_path / "data"

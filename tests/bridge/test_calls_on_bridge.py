@@ -428,7 +428,7 @@ def test_another_clients_goal_is_not_shown_as_ours(
     robot.cancel()
 
 
-def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widget_usable(
+def test_node_that_ends_during_a_goal_leaves_the_result_unknown_and_the_widget_usable(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     robots: Callable[..., CycloneRobot],
@@ -486,7 +486,7 @@ def locked_until_found(kiosk: Server) -> None:
     assert kiosk.widget("count")["stoppable"]
 
 
-def test_a_goal_that_was_cut_off_locks_its_button_until_it_is_found(
+def test_cut_off_goal_locks_its_button_until_the_goal_is_reported(
     own_kiosk: Server, own_cyclone_bridge: Bridge, robots: Callable[..., CycloneRobot]
 ) -> None:
     robot = robots(own_cyclone_bridge.domain)

@@ -113,7 +113,7 @@ def commands(folder: Path) -> Sequence[tuple[str, ...]]:
     )
 
 
-def test_lost_topics_are_one_finding_of_all_commands(
+def test_lost_topics_are_one_finding_in_all_commands(
     lost: tuple[Bridge, RosNode], tmp_path: Path
 ) -> None:
     endpoint = lost[0].endpoint

@@ -243,7 +243,7 @@ def test_the_client_cancels_a_goal(robot: CycloneRobot, client: Client) -> None:
     }
 
 
-def test_a_cancel_is_refused_unknown_or_too_late_and_one_cancels_all(
+def test_cancel_is_refused_unknown_or_too_late_and_a_general_cancel_ends_all(
     robot: CycloneRobot, client: Client
 ) -> None:
     goals = Goals(client)

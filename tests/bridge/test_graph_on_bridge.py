@@ -244,7 +244,7 @@ def test_an_rclpy_node_describes_its_types_as_they_are_known(node: RosNode, name
 
 
 @pytest.mark.parametrize("hold", [True, False])
-def test_a_listener_holds_a_route_only_where_it_is_to(
+def test_listener_keeps_a_route_only_if_requested(
     own_bridge: Bridge, own_node: RosNode, hold: bool
 ) -> None:
     own_node.advertise("/heard", BOOL, durability="transient_local", depth=1)

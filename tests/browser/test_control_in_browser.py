@@ -288,7 +288,7 @@ def test_released_control_is_not_taken_again_by_a_page_load(opens: Opens) -> Non
 
 
 @pytest.mark.real_time
-def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
+def test_two_taps_take_control_and_do_not_release_control(opens: Opens) -> None:
     first = opens(FIRST)
     button(first, "Take control").dblclick(delay=20)
     expect(button(first, "Release control")).to_be_visible()

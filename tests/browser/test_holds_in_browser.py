@@ -181,7 +181,7 @@ def test_from_a_killed_server_nothing_more_comes(finger: Finger, jogger: RosNode
     expect(finger.button).to_be_disabled()
 
 
-def test_a_long_touch_is_held_as_long_as_it_is_and_shows_it(finger: Finger, jogger: RosNode) -> None:
+def test_long_touch_holds_and_shows_its_duration(finger: Finger, jogger: RosNode) -> None:
     """Longer than browsers take to see a long touch, with its menu and selection."""
     for _ in range(TRIES):
         ends = len(codes(finger.server))

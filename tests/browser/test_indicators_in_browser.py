@@ -130,7 +130,7 @@ def status(name: str, level: int) -> dict[str, Any]:
     return {"name": name, "level": level}
 
 
-def test_a_gauge_moves_its_pointer_and_says_which_limit_it_is_beyond(
+def test_gauge_moves_its_pointer_and_names_the_exceeded_limit(
     cell: Server, node: RosNode, page: Page
 ) -> None:
     page.goto(cell.url)

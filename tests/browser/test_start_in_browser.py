@@ -296,7 +296,7 @@ def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Pa
     is_locked(tab)
 
 
-def test_a_press_that_fails_before_it_is_sent_says_that_it_was_not(demo: Server, tab: Page) -> None:
+def test_press_that_fails_before_sending_says_not_sent(demo: Server, tab: Page) -> None:
     tab.route("**/press-socket.js", lambda route: route.abort())
     go(tab, demo.url + OPERATION)
     expect(tab.locator("html[data-floor]")).to_be_attached()

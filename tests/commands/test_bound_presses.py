@@ -99,8 +99,8 @@ def test_press_is_refused_if_the_state_changed_since_it_was_seen(
     again = kiosk.press("operation1", "changed", seen=event_id, id="changed-1")
     assert (again.status_code, again.json()) == (409, answer.json())
     assert kiosk.press("operation", "not guarded", seen=event_id).status_code == 200
-    assert kiosk.press("operation1", "anew", seen=kiosk.snapshot()["id"]).status_code == 200
-    until(lambda: node.heard_data("/operation1")[-1:] == ["anew"], "heard")
+    assert kiosk.press("operation1", "again", seen=kiosk.snapshot()["id"]).status_code == 200
+    until(lambda: node.heard_data("/operation1")[-1:] == ["again"], "heard")
     assert "changed" not in node.heard_data("/operation1")
 
 

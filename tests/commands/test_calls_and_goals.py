@@ -152,7 +152,7 @@ def test_control_characters_in_a_reply_are_shown_as_escapes() -> None:
     run(test)
 
 
-def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
+def test_first_timeout_hints_at_cyclone_and_later_timeouts_do_not() -> None:
     async def test(bench: Bench) -> None:
         first = await bench.call()
         assert first.outcome == "timed_out"

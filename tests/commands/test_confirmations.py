@@ -248,7 +248,9 @@ def test_a_one_shot_button_is_locked_until_its_command_is_answered() -> None:
         (None, "on", False),
     ],
 )
-def test_a_field_has_the_value_as_near_as_its_type_has_it(value: Any, wanted: Any, is_it: bool) -> None:
+def test_confirmation_compares_with_the_precision_of_the_field(
+    value: Any, wanted: Any, is_it: bool
+) -> None:
     assert equal(value, wanted) is is_it
 
 

@@ -171,7 +171,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sync, "AGAIN_S", 0.01)
 
 
-def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
+def test_node_is_queried_once_when_it_appears() -> None:
     async def test(bench: Bench) -> None:
         bench.parameters.on_graph_change()
         assert bench.line.keys == []
@@ -201,7 +201,7 @@ def test_a_node_that_appeared_is_read_once_more_when_its_events_flow() -> None:
     run(test)
 
 
-def test_an_event_of_the_node_counts_and_one_of_another_does_not() -> None:
+def test_event_of_the_node_counts_and_an_event_of_another_node_does_not() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
@@ -292,7 +292,7 @@ def test_briefly_replaced_node_is_queried_again() -> None:
     run(test)
 
 
-def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
+def test_unresponsive_node_is_queried_again_when_touched_or_new(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Each question makes a node on Fast DDS print an error."""
@@ -369,7 +369,7 @@ def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
     run(test)
 
 
-def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back() -> None:
+def test_node_cut_off_during_a_query_is_queried_after_its_return() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.queried(1)

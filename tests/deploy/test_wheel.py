@@ -267,7 +267,7 @@ def container(machine: Machine) -> Iterator[Process]:
     mine.end()
 
 
-def test_the_image_starts_read_only_and_its_health_check_sees_it(container: Process) -> None:
+def test_image_starts_read_only_and_its_health_check_passes(container: Process) -> None:
     (health,) = instructions("HEALTHCHECK")
 
     def inside(command: str) -> int:

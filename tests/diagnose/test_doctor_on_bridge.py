@@ -362,7 +362,7 @@ def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
     assert [finding.code for finding in findings] == [expected]
 
 
-def test_two_bridges_for_one_robot(shared: Bridge, robot: RosNode, setup: Setup) -> None:
+def test_two_bridges_for_one_robot_are_found(shared: Bridge, robot: RosNode, setup: Setup) -> None:
     other = Bridge(shared.domain, options=[f'connect/endpoints=["{shared.endpoint}"]'])
     with started(other), closing(Client(other.endpoint)) as client:
         until(lambda: both(client), "both bridges forward it")

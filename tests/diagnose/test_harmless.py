@@ -100,7 +100,7 @@ def test_a_megabyte_of_anything_takes_no_time(unit: str, is_toml: bool) -> None:
 @pytest.mark.parametrize(
     "before", ["", "{ ", '"', "'", "x = [", "endpoints: [", 'mode: "', '"""', "topic = ", "\\"]
 )
-def test_no_form_of_a_secret_is_kept_wherever_it_stands(form: str, before: str) -> None:
+def test_no_form_of_a_secret_is_kept_in_any_place(form: str, before: str) -> None:
     for text in (
         f"{before}{form}",
         f"a = 1\n{before}{form}\nb = 2",

@@ -308,7 +308,7 @@ def test_a_host_that_does_not_answer(error: OSError, monkeypatch: pytest.MonkeyP
     assert report.codes() == ["no_route"]
 
 
-def test_a_permission_by_name_is_that_of_the_last_message_that_has_it(tmp_path: Path) -> None:
+def test_permission_by_name_is_of_the_last_message_with_the_name(tmp_path: Path) -> None:
     """Another node publishes other joints on the same topic."""
     state = "sensor_msgs/msg/JointState"
     lock = interlock("/joints", type=state, field="position[name=lift]", max=0.5)

@@ -253,7 +253,7 @@ def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.Captur
     }
 
 
-def test_the_command_ends_with_2_where_it_cannot_look(
+def test_doctor_ends_with_2_if_checks_are_impossible(
     setup: Setup, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = command(setup)

@@ -93,7 +93,7 @@ def journal_of(folder: Path, lines: Sequence[str], unit: str = "operator-panel.s
     program.chmod(0o755)
 
 
-def test_no_secret_is_in_it_in_any_form_from_anywhere(
+def test_support_bundle_has_no_secret_in_any_form(
     setup: Setup, demo: Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("KIOSK_HOSTS", "panel1.local")
@@ -156,7 +156,7 @@ def test_no_secret_is_in_it_in_any_form_from_anywhere(
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_no_secret_of_a_broken_file_is_in_it(
+def test_support_bundle_has_no_secret_of_a_broken_file(
     setup: Setup, form: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor in the errors that tell what is wrong with it."""
@@ -223,7 +223,7 @@ def test_support_asks_before_writing(
     assert len(list(quick.folder.glob("operator-panel-support-*.zip"))) == (status == 0)
 
 
-def test_without_a_terminal_it_says_so(
+def test_support_without_a_terminal_asks_for_an_option(
     quick: Setup, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))

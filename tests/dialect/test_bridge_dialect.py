@@ -229,7 +229,7 @@ def test_a_server_is_read_from_its_token(role: ServerRole) -> None:
 @pytest.mark.parametrize(
     "type_name", ["x" * 50_000, "a\u202eb", "std msgs", "", "a//b", "std_msgs/msg/Bool\n"]
 )
-def test_a_type_that_can_not_be_one_is_no_type(type_name: str) -> None:
+def test_malformed_type_is_no_type(type_name: str) -> None:
     assert valid_type(type_name) == NO_TYPE
     if type_name:
         endpoint = parsed(f"@/b1/@ros2_lv/MP/enabled/{type_name.replace('/', '§')}/:1:0:0,1:")
@@ -239,7 +239,7 @@ def test_a_type_that_can_not_be_one_is_no_type(type_name: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["a" * 600, "1st", "a\u202eb", "a b"])
-def test_a_name_that_can_not_be_one_shows_nothing(key: str) -> None:
+def test_malformed_name_parses_to_nothing(key: str) -> None:
     assert parsed(f"@/b1/@ros2_lv/MP/{key}/std_msgs§msg§Bool/:1:0:0,1:") is None
     assert parsed(f"@/b1/@ros2_lv/SS/{key}/std_srvs§srv§Trigger") is None
     assert parsed(f"@/{'b' * 65}/@ros2_lv") is None

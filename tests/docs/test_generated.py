@@ -119,7 +119,7 @@ def test_mistakes_of_one_key_are_found_by_the_schema(words: str) -> None:
     assert found_by_schema(mistake) is not needs_another_key
 
 
-def test_a_third_of_all_mistakes_is_found_while_one_types() -> None:
+def test_schema_finds_a_third_of_all_mistakes() -> None:
     found_mistakes = [mistake for mistake in MISTAKES if found_by_schema(mistake)]
     assert len(found_mistakes) > len(MISTAKES) / 3  # the others need the types, or another key
 
@@ -163,7 +163,7 @@ def test_the_japanese_advice_is_for_the_same_sentences_and_names_keys_as_they_ar
     assert keys <= set(sentences("ja").values())
 
 
-def test_each_sentence_leads_to_the_modules_that_say_it() -> None:
+def test_each_sentence_is_listed_with_its_modules() -> None:
     rows = [row.split(" | ") for row in places.sentences_table().splitlines()[2:]]
     assert len(rows) == len(SENTENCES.keys() - BETWEEN)
     assert [row for row in rows if "`app/" not in row[2]] == []

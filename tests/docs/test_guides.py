@@ -48,7 +48,7 @@ def kinds(folder: Path, *blocks: str) -> set[str]:
     return {widget.kind for widget in load_panel(panel).widgets()}
 
 
-def test_the_first_panel_is_good_as_it_is(tmp_path: Path) -> None:
+def test_first_panel_of_the_guide_is_valid(tmp_path: Path) -> None:
     panel = tmp_path / "cell1.toml"
     panel.write_text(GUIDE[0])
     assert load_panel(panel).title == "Robot cell 1"

@@ -26,7 +26,7 @@ def shown() -> set[str]:
 
 
 @pytest.mark.parametrize("quote", sorted(set(quotes(PAGE)) - FROM_ELSEWHERE))
-def test_a_quoted_sentence_is_one_of_the_screen(quote: str) -> None:
+def test_quoted_sentences_are_in_the_catalogue(quote: str) -> None:
     assert quote in shown()
 
 

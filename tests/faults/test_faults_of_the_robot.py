@@ -70,7 +70,7 @@ def test_a_hung_node(rig: Rig, server: Server) -> None:
     recorded("node hung for 2 s (max_age_s = 0.5)", trial)
 
 
-def test_a_publisher_that_is_replaced_by_one_of_another_type(rig: Rig, server: Server) -> None:
+def test_publisher_replaced_by_another_type_locks(rig: Rig, server: Server) -> None:
     def replaced() -> None:
         rig.robot.withdraw("/pulsed")
         rig.robot.advertise("/pulsed", TEXT)

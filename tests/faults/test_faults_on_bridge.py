@@ -178,7 +178,7 @@ def test_a_required_publisher_that_goes_away_locks(
 
 
 @pytest.mark.real_time
-def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
+def test_stale_value_locks_and_a_fresh_value_unlocks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(strict(own_bridge, tmp_path, "max_age_s = 0.5"))

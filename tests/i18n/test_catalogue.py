@@ -54,7 +54,7 @@ def test_every_code_that_the_program_says_has_a_sentence() -> None:
     assert [(where, code) for where, code, _ in said if code not in SENTENCES] == []
 
 
-def test_every_sentence_gets_all_that_it_is_about() -> None:
+def test_every_sentence_gets_all_its_parameters() -> None:
     # `refused(code, why)` fills in `why` and `time` itself.
     lacking = [
         (where, code)
@@ -96,7 +96,7 @@ def test_a_text_is_its_code_and_its_parameters() -> None:
         text.code = "interlock_waiting"
 
 
-def test_a_text_in_a_text_is_rendered_with_it() -> None:
+def test_nested_text_is_rendered_with_its_sentence() -> None:
     why = say("interlock_waiting", topic="/estop")
     assert render(say("with_stop", said=say("and_more", names=("/a", why), number=2))) == (
         f"/a, {render(why)} and 2 more."
@@ -267,5 +267,5 @@ def test_a_translation_ends_as_its_english_does(language: str) -> None:
         (360_000, "100 h"),
     ],
 )
-def test_an_age_reads_as_an_operator_says_it(seconds: float, text: str) -> None:
+def test_age_is_rendered_in_words(seconds: float, text: str) -> None:
     assert render(format_age(seconds)) == text

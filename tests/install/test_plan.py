@@ -210,7 +210,7 @@ def test_a_calibration_that_is_none_is_named(matrix: tuple[str, ...]) -> None:
         touch_rule(matrix)
 
 
-def test_the_rule_of_a_touch_screen_is_one_for_udev() -> None:
+def test_udev_accepts_the_rule_of_the_touch_screen() -> None:
     rule = touch_rule(("0", "-1", "1", "1", "0", "0"))
     assert 'ENV{LIBINPUT_CALIBRATION_MATRIX}="0 -1 1 1 0 0"' in rule
 
@@ -341,7 +341,7 @@ def test_a_command_of_the_machine_does_not_read_this_programs_modules(
 
 
 @pytest.mark.parametrize(("options", "units"), [([], [SERVER, SCREEN]), (["--no-screen"], [SERVER])])
-def test_the_end_says_how_to_see_whether_it_runs(
+def test_end_of_the_installation_names_the_status_command(
     options: list[str],
     units: list[str],
     tmp_path: Path,

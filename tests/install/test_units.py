@@ -71,7 +71,7 @@ def test_the_browser_reaches_this_machine_only() -> None:
     assert "file:///run/operator-panel-kiosk/waiting.html" in policies["URLAllowlist"]
 
 
-def test_the_users_file_is_one_for_sysusers(tmp_path: Path) -> None:
+def test_sysusers_accepts_the_users_file(tmp_path: Path) -> None:
     (tmp_path / "etc/sysusers.d").mkdir(parents=True)
     shutil.copy(DEPLOY / "sysusers.conf", tmp_path / "etc/sysusers.d/operator-panel.conf")
     subprocess.run(["systemd-sysusers", f"--root={tmp_path}"], check=True, capture_output=True)

@@ -177,7 +177,7 @@ def test_a_lost_server_leaves_the_locked_page_and_its_reason(
     until(screen.lives, "the panel is back")
 
 
-def test_the_service_manager_hears_that_it_is_ready_and_alive(
+def test_kiosk_reports_ready_and_alive_to_the_service_manager(
     screens: Callable[..., KioskScreen], servers: Callable[[Server], Server], tmp_path: Path
 ) -> None:
     address = tmp_path / "notify"

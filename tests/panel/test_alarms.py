@@ -46,7 +46,7 @@ def fault(folder: Path, *alarms: str) -> tuple[str, str]:
     return only.place, only.message
 
 
-def test_the_shortest_alarm_is_one_of_a_limit(tmp_path: Path) -> None:
+def test_shortest_alarm_table_has_a_limit(tmp_path: Path) -> None:
     panel = load(tmp_path, AIR + "low = 5.0\npriority = 2\n")
     (alarm,) = panel.alarms
     assert (alarm.source, alarm.limits, alarm.priorities) == ("limits", {"low": 5.0}, (2, 1))

@@ -92,7 +92,7 @@ def test_a_wrong_environment_is_reported_without_a_traceback(
     assert capsys.readouterr().err == 'KIOSK_MODE is "maybe": it must be "demo" or "live"\n'
 
 
-def test_several_panels_are_checked_and_the_worst_one_is_the_status(
+def test_worst_of_several_panels_is_the_exit_status(
     faulty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     none = tmp_path / "none.toml"

@@ -186,7 +186,7 @@ def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
     assert (widget.html_attributes["step"], widget.is_whole) == (step, whole)
 
 
-def test_a_value_within_a_billionth_of_a_step_is_on_it_and_is_sent_as_it_is() -> None:
+def test_value_within_a_billionth_of_a_step_is_accepted_unchanged() -> None:
     speed, count = input_of(SPEED), input_of(COUNT)
     for entered in (0.1 + 0.2, 0.1 * 3 + 0.4, 1.1 - 0.2, 0.3 + 1e-10, 0.3 - 1e-10, -0.1 - 0.2):
         assert speed.check_value(entered) == entered

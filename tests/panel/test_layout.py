@@ -254,7 +254,7 @@ message = {}
 
 
 @pytest.mark.parametrize("role", COLOURS)
-def test_each_role_has_a_colour_that_is_right_for_it(tmp_path: Path, role: str) -> None:
+def test_each_role_has_a_suitable_colour(tmp_path: Path, role: str) -> None:
     (_, plain) = loaded(tmp_path, key(role=role)).pages[0].widgets
     assert isinstance(plain, Publish)
     assert plain.shown_colour == OWN_COLOURS.get(plain.role, "")

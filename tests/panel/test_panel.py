@@ -105,7 +105,7 @@ def test_a_file_that_does_not_say_means_a_live_robot(load: Load) -> None:
     assert load(tables()).mode == "live"
 
 
-def test_an_interlock_is_a_bools_data_unless_it_says_otherwise(load: Load) -> None:
+def test_interlock_defaults_to_the_data_of_a_bool(load: Load) -> None:
     (interlock,) = load(tables()).interlocks
     assert (interlock.type, interlock.field) == ("std_msgs/msg/Bool", "data")
     assert (interlock.max_age_s, interlock.require_publisher) == (None, False)
@@ -493,7 +493,7 @@ def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> 
     }
 
 
-def test_faults_of_one_cause_are_one_and_tell_of_the_others(load: Load) -> None:
+def test_faults_of_one_cause_are_one_fault_with_all_places(load: Load) -> None:
     buttons = [{**GUARDED, "id": f"b{n}", "topic": f"/b{n}", "interlock": "x"} for n in range(6)]
     page = {"id": "one", "title": "One", "widget": [MESSAGE, *buttons]}
     assert faults(load, tables(page=[page])) == {
@@ -529,7 +529,7 @@ def test_faults_are_reported_in_the_order_of_the_file(load: Load, tmp_path: Path
     ]
 
 
-def test_a_faulty_input_makes_no_fault_where_it_is_used(load: Load) -> None:
+def test_faulty_input_causes_no_fault_in_its_messages(load: Load) -> None:
     used = {**FREE, "type": "std_msgs/msg/Int8", "message": {"data": "{n}"}}
     page = {"id": "one", "title": "One", "widget": [without(NUMBER, "max"), used]}
     assert list(faults(load, tables(page=[page]))) == ["page[0].widget[0].max"]
@@ -634,7 +634,7 @@ def test_invalid_toml_file_is_unreadable(tmp_path: Path, data: bytes, reason: st
     assert [fault.place for fault in caught.value.faults] == [""]
 
 
-def test_an_unknown_field_is_no_fault_of_the_input_in_it(load: Load) -> None:
+def test_unknown_field_is_not_also_a_fault_of_its_input(load: Load) -> None:
     reported = faults(load, with_widget(1, message={"date": "{message}"}))
     assert reported == {f"{BUTTON}.message.date": "unknown field; std_msgs/msg/String has data"}
 
@@ -765,7 +765,7 @@ def test_types_that_the_server_needs_must_be_usable(
     assert reported["interfaces[0]"].startswith(f'the panel needs this type: "{name}" can\'t')
 
 
-def test_the_types_that_the_kiosk_needs_are_those_that_it_uses() -> None:
+def test_server_types_are_the_types_in_use() -> None:
     assert ROSOUT == LOG_TYPE
     assert (STATUS, f"{CANCEL}_Request") == ACTION_SERVER_TYPES
 

@@ -45,7 +45,7 @@ def notes(folder: Path, old: str, new: str) -> list[str]:
     return [f"{note.place}: {note.message}" for note in check_panel(folder / "panel.toml").notes]
 
 
-def test_a_text_is_a_table_of_languages_and_a_plain_one_stays_a_text(tmp_path: Path) -> None:
+def test_text_may_be_a_table_of_languages_or_plain(tmp_path: Path) -> None:
     panel = load(tmp_path)
     lamp = panel.pages[0].widgets[-1]
     assert (type(lamp.label), lamp.label) == (str, "Door 1")

@@ -95,7 +95,7 @@ def test_value_at_a_field_of_a_template_is_found(where: str, value: Any) -> None
     assert value_at(template, where) == (template if value is None else value)
 
 
-def test_now_is_the_time_at_which_it_is_asked_for() -> None:
+def test_now_is_the_time_of_filling_in() -> None:
     before = time.time_ns()
     values = add_now({"a": 1})
     stamp = fill([{"stamp": "{now}"}], values)[0]["stamp"]

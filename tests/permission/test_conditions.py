@@ -80,7 +80,7 @@ def test_a_state_has_the_value_and_its_need_whether_met_or_not(
     assert texts(state_of(air(), robot)) == (shown, "5 bar or more", met)
 
 
-def test_the_reason_of_an_unmet_condition_names_it(robot: RobotState) -> None:
+def test_reason_of_an_unmet_condition_names_the_condition(robot: RobotState) -> None:
     says(robot, ENABLED, 3.2, FLOAT)
     reason = state_of(air(), robot).verdict.reason
     assert render(reason or "") == "Air pressure is 3.2 bar: it must be 5 bar or more."

@@ -188,7 +188,7 @@ def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
     assert verdict_of(robot, {"require_publisher": True}).permitted
 
 
-def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: RobotState) -> None:
+def test_ended_publisher_locks_a_required_publisher_interlock(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     endpoint(robot, "MP", ENABLED, BOOL, alive=False)
     assert verdict_of(robot, {"require_publisher": True}).code == "interlock_no_publisher"

@@ -73,7 +73,7 @@ def test_former_signal_handler_is_called_once_after_shutdown(
     assert heard == [INT if by is INT else TERM]
 
 
-def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard: list[int]) -> None:
+def test_second_interrupt_exits_at_once_and_a_third_is_passed_on(heard: list[int]) -> None:
     async def run() -> None:
         process = EndingProcess()
         with ExitStack() as stack:

@@ -98,7 +98,7 @@ def test_message_of_an_earlier_publisher_does_not_count_for_the_next(known: Sile
     assert silent(known)
 
 
-def test_a_message_counts_that_was_taken_in_before_the_token_that_came_before_it(
+def test_message_ingested_before_its_earlier_token_counts(
     known: SilentPublishers,
 ) -> None:
     known.record_message(KEY, BRIDGE, 5, 99.0)

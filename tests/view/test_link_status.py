@@ -273,7 +273,7 @@ def test_a_publisher_that_went_has_its_remedy_while_others_are_there() -> None:
     assert node["reason"] == say("link_node_gone", name=ENABLED)
 
 
-def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
+def test_node_lost_with_its_bridge_is_absent_behind_the_next() -> None:
     panel = cell()
     robot = robot_there(panel)
     endpoint(robot, "MP", "/heard", TEXT)
@@ -346,7 +346,7 @@ class DatedLinks:
 
 
 @pytest.mark.usefixtures("utc")
-def test_a_state_begins_when_it_is_first_seen() -> None:
+def test_lamp_state_begins_when_first_seen() -> None:
     links = DatedLinks()
     assert links.at(61.0) == ("", "1970-01-01 00:01:01", "1970-01-01 00:01:01")
     assert links.at(3 * DAY_S) == ("", "1970-01-01 00:01:01", "1970-01-01 00:01:01")

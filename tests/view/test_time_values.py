@@ -81,7 +81,7 @@ def test_an_age_counts_from_the_clock_at_the_last_message() -> None:
         (WALL * 1e9 - 3e9, {"format": "age", "scale": 1e-9}, "3 s"),
     ],
 )
-def test_a_number_is_one_of_seconds(data: float, more: Any, text: str) -> None:
+def test_number_is_shown_as_seconds(data: float, more: Any, text: str) -> None:
     assert shown("std_msgs/msg/Float64", {"data": data}, **more)[0] == text
 
 

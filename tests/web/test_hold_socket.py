@@ -420,7 +420,7 @@ def test_closed_terminal_shuts_the_server_down_cleanly(
     assert (said["outcome"], said["code"]) == ("aborted", "hold_by_shutdown")
 
 
-def test_a_server_that_ends_reports_it_though_the_robot_has_to_be_queried_first(
+def test_ending_server_reports_the_end_of_a_hold_despite_a_pending_query(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")

@@ -108,7 +108,7 @@ def test_a_press_without_an_id_gets_one(demo: Server) -> None:
     assert receipt["widget"] == "operation"
 
 
-def test_the_same_id_is_the_same_press_whatever_way_it_comes(demo: Server) -> None:
+def test_press_id_is_shared_by_all_ways(demo: Server) -> None:
     ways = ("post", "socket", "post", "socket")
     presses = [demo.by(w).press("operation", "once only", id="one-press").json() for w in ways]
     assert presses == [presses[0]] * len(ways)

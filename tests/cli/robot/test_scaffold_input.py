@@ -69,7 +69,7 @@ def graph_of(*namespaces: str) -> GraphSnapshot:
     )
 
 
-def test_robots_that_a_panel_can_not_have_do_not_keep_it_from_being_made() -> None:
+def test_unusable_robots_do_not_prevent_a_scaffold() -> None:
     graph = usable(graph_of("", "/r1", "/r1\\u000a[[page]]", "/a__b", "no namespace", "/r2"))
     assert [robot.namespace for robot in graph.robots] == ["", "/r1", "/r2"]
     many = usable(graph_of(*(f"/r{number}" for number in range(1000))))
