@@ -207,6 +207,28 @@ def test_hold_sends_at_its_rate_and_one_message_at_the_end(bench: Bench) -> None
     assert coded(receipt.reason, "seconds") == ("hold_released", "1.0")
 
 
+def test_heartbeat_without_permission_ends_the_hold_at_once(bench: Bench) -> None:
+    holding = bench.begun()
+    permits(bench.robot, False)
+    assert not bench.holds.beat(holding, 1, bench.loop.now)
+    assert bench.points == [MOVES, STOPS]
+    assert [receipt.code for receipt in bench.receipts] == ["interlock_not_permitted"]
+
+
+def test_reason_against_a_hold_is_known_before_its_begin_and_not_recorded(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    press = press_of(bench.holds.widget("jog"), HALF, "p1")
+    assert bench.holds.refusal(press, bench.loop.now) is None
+    bench.pending.append(lambda: permits(bench.robot, False))
+    with caplog.at_level("INFO"):
+        receipt = bench.holds.refusal(press, bench.loop.now)
+    assert receipt is not None
+    assert (receipt.outcome, receipt.cause, why(receipt.reason)) == ("refused", "interlock", FORBIDS)
+    assert caplog.text == ""
+    assert bench.points == []
+
+
 def test_each_hold_message_has_its_own_sending_time() -> None:
     stamped = "geometry_msgs/msg/PointStamped"
     header = {"header": {"stamp": "{now}"}}

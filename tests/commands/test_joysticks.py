@@ -165,6 +165,8 @@ def test_sent_value_is_within_the_limits(x: float, y: float, dead: float, shape:
         ("circle", (0.2, 0.0), (0.0, 0.0)),
         ("circle", (0.6, 0.0), (0.5, 0.0)),
         ("circle", (0.0, -1.0), (0.0, -1.0)),
+        ("square", (2.0, -3.0), (1.0, -1.0)),  # more than a joystick has
+        ("circle", (-3.0, 0.0), (-1.0, 0.0)),
     ],
 )
 def test_the_dead_zone_is_zero_and_begins_with_zero(
