@@ -215,6 +215,18 @@ def test_heartbeat_without_permission_ends_the_hold_at_once(bench: Bench) -> Non
     assert [receipt.code for receipt in bench.receipts] == ["interlock_not_permitted"]
 
 
+def test_end_of_a_hold_that_ends_others_ends_each_once(bench: Bench) -> None:
+    def ended(receipt: Receipt) -> None:
+        bench.receipts.append(receipt)
+        bench.holds.judge()
+
+    for widget in ("jog", "arm"):
+        bench.holds.begin(press_of(bench.holds.widget(widget), HALF, widget), bench.loop.now, ended)
+    permits(bench.robot, False)
+    bench.holds.judge()
+    assert sorted(receipt.widget for receipt in bench.receipts) == ["arm", "jog"]
+
+
 def test_reason_against_a_hold_is_known_before_its_begin_and_not_recorded(
     bench: Bench, caplog: pytest.LogCaptureFixture
 ) -> None:
