@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from app.i18n import TextLike
 from app.interfaces.validation import format_value
-from app.panel.base import Description, FieldPath, Label, Seconds, TopicName, TopicQos, Type
+from app.panel.base import Description, FieldPath, Id, Label, Seconds, TopicName, TopicQos, Type
 from app.panel.widgets.numbers import Unit
 
 COMPARISONS: Final = ("equals", "not_equals", "min", "max", "one_of")
@@ -39,6 +39,7 @@ class Condition(Description):
     noun: ClassVar[str] = "a condition"  # in faults
 
     label: Label | None = None
+    action: Label | None = None
     topic: TopicName
     type: Type = "std_msgs/msg/Bool"
     field: FieldPath = "data"
@@ -75,3 +76,9 @@ class Condition(Description):
         resolved = self.model_copy(update=dict(comparisons))
         resolved._constants = constants
         return resolved
+
+
+class NamedCondition(Condition):
+    """A condition that widgets name by its id: it locks nothing."""
+
+    id: Id

@@ -3,16 +3,14 @@
 from typing import ClassVar, Literal
 
 from app.i18n import TextLike
-from app.panel.base import Id
-from app.panel.condition import Condition
+from app.panel.condition import NamedCondition
 
 
-class Interlock(Condition):
+class Interlock(NamedCondition):
     """A condition that permits the commands which name it, and locks them while it is not met."""
 
     noun: ClassVar[str] = "an interlock"
 
-    id: Id
     require_publisher: bool = False
     publishers: Literal["any", "one"] = "any"
 

@@ -86,8 +86,10 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         ]
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
     interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
+    conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
     state = panel.state and panel.state.with_constants(interfaces)
-    return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks, "state": state})
+    resolved_parts = {"interlocks": interlocks, "own_conditions": conditions, "state": state}
+    return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
 
 
 def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:

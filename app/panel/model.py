@@ -24,7 +24,7 @@ from app.panel.base import (
     catalogue_default,
     parse_namespace,
 )
-from app.panel.condition import Condition
+from app.panel.condition import NamedCondition
 from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
@@ -102,6 +102,9 @@ class Panel(Description):
     alarm_rules: AlarmRules = Field(AlarmRules(), alias="alarms")
     alarms: Annotated[tuple[Alarm, ...], Field(strict=False)] = Field((), alias="alarm")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
+    own_conditions: Annotated[tuple[NamedCondition, ...], Field(strict=False)] = Field(
+        (), alias="condition"
+    )
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
@@ -197,10 +200,15 @@ class Panel(Description):
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """All conditions that are judged: each message on their topics counts, and a value of unknown
-        age is known to be one."""
-        return self.interlocks
+    def conditions(self) -> tuple[NamedCondition, ...]:
+        """All conditions that are judged, interlocks first: each message on their topics counts, and a
+        value of unknown age is known to be one."""
+        return (*self.interlocks, *self.own_conditions)
+
+    def shown_topics(self, widget: DisplayWidget) -> frozenset[str]:
+        """The topics that a display shows: its own, and those of the conditions that it names."""
+        named = {c.topic for c in self.conditions if c.id in widget.named_conditions}
+        return frozenset(named | {source.topic for source in widget.sources()})
 
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """The interlocks that must permit a press, in the widget's order."""

@@ -14,6 +14,7 @@ from typing import Any, Final
 from app.dialect.peer_traits import EVERY_SENTENCES, PeerSentences
 from app.i18n import joined, number, say
 from app.interfaces import has_key
+from app.panel.condition import NamedCondition
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
@@ -22,7 +23,14 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
-from app.permission.conditions import not_finite, stale, unread, value_verdict
+from app.permission.conditions import (
+    ConditionState,
+    condition_state,
+    not_finite,
+    stale,
+    unread,
+    value_verdict,
+)
 from app.permission.mismatches import topic_mismatch
 from app.permission.servers import call_blocked, set_blocked
 from app.permission.verdict import PERMITTED, Verdict, locked
@@ -93,6 +101,15 @@ def interlock_verdict(
     if verdict.code in BY_VALUE and not has_key(interlock.field):
         return _with_publishers(verdict, interlock, robot)
     return verdict
+
+
+def state_of(condition: NamedCondition, robot: RobotState, now: float, link: Verdict) -> ConditionState:
+    """The state of an interlock or another condition, as a list of conditions shows it. `link` is the
+    link's verdict at `now`."""
+    state = condition_state(condition, robot, now, link)
+    if not isinstance(condition, Interlock):
+        return state
+    return replace(state, verdict=interlock_verdict(condition, robot, now, link))
 
 
 def _publishers_lock(interlock: Interlock, robot: RobotState) -> Verdict | None:

@@ -89,6 +89,7 @@ class RobotState:
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
+        self.conditions = {condition.id: condition for condition in panel.conditions}
         self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
         self.silent_publishers = SilentPublishers(self._condition_keys, traits)
         self.topic_publishers = TopicPublishers()

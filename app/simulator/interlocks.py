@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from app.interfaces import INTEGER_RANGES
 from app.interfaces.definitions import FLOAT_TYPES
-from app.panel.interlock import Interlock
+from app.panel.condition import Condition
 from app.panel.values import same_value
 from app.simulator import robot
 from app.simulator.values.signals import Signal, as_type, swing
@@ -29,7 +29,7 @@ def permitted(t: float, offset: float, period_s: float | None) -> bool:
 
 
 def permitting(
-    interlocks: Sequence[Interlock],
+    interlocks: Sequence[Condition],
     kind: str,
     others: Sequence[Any],
     offset: float,
@@ -59,7 +59,7 @@ def permitting(
     return value
 
 
-def satisfies(interlock: Interlock, value: Any) -> bool:
+def satisfies(interlock: Condition, value: Any) -> bool:
     """Whether a value meets all conditions; without any, whether it is true."""
     comparisons = interlock.comparisons
     if not comparisons:
@@ -76,7 +76,7 @@ def satisfies(interlock: Interlock, value: Any) -> bool:
     )
 
 
-def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any]) -> Iterator[Any]:
+def _candidates(interlocks: Sequence[Condition], kind: str, others: Sequence[Any]) -> Iterator[Any]:
     """Values to choose from, the likeliest first."""
     if kind == "bool":
         yield from (True, False)
@@ -104,7 +104,7 @@ def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any
         yield from ("ready", "not ready")
 
 
-def _limits(interlock: Interlock) -> tuple[float, float]:
+def _limits(interlock: Condition) -> tuple[float, float]:
     """Both limits: one that is not given is a fifth of the other away."""
     low, high = interlock.comparisons.get("min"), interlock.comparisons.get("max")
     if low is None:
@@ -113,7 +113,7 @@ def _limits(interlock: Interlock) -> tuple[float, float]:
     return low, low + max(abs(low) / 5, 4) if high is None else high
 
 
-def _moving(interlocks: Sequence[Interlock], kind: str) -> Signal | None:
+def _moving(interlocks: Sequence[Condition], kind: str) -> Signal | None:
     """A number that moves inside the limits, if there are any."""
     limits = [
         _limits(interlock) for interlock in interlocks if {"min", "max"} & interlock.comparisons.keys()

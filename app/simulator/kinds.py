@@ -15,6 +15,7 @@ from app.panel.constants import parent_type, resolve_names
 from app.panel.machine_state import MachineState
 from app.panel.template import response_paths
 from app.panel.widgets.camera import Camera
+from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand
 from app.panel.widgets.figure import Figure, TargetField
@@ -22,6 +23,7 @@ from app.panel.widgets.gauge import Gauge, SetpointField
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
+from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call, ServerCommand
@@ -160,6 +162,12 @@ def _figure(figure: Figure, _: Interfaces) -> Iterator[Need]:
         )
 
 
+def _pallet(pallet: Pallet, _: Interfaces) -> Iterator[Need]:
+    """From an empty pallet to a full one."""
+    for shown in _shown(pallet):
+        yield replace(shown, low=0.0, high=float(pallet.in_layer * pallet.layers))
+
+
 def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
     """In its normal range for the most part, and at times beyond the limit above."""
     low, high = gauge.normal or (gauge.min, gauge.max)
@@ -262,6 +270,8 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Indicator: _indicator,
     MachineState: _machine_state,
     Figure: _figure,
+    Pallet: _pallet,
+    Conditions: None,
     Gauge: _gauge,
     Joints: _joints,
     Table: None,

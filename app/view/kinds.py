@@ -9,6 +9,7 @@ from typing import Any, Final, TypedDict
 from app.i18n import TextLike, joined, say
 from app.panel.machine_state import MachineState
 from app.panel.widgets.camera import Camera
+from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
 from app.panel.widgets.figure import Figure
@@ -18,6 +19,7 @@ from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric
+from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.static import Static
@@ -28,12 +30,14 @@ from app.permission.verdict import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
 from app.view.camera_values import camera
+from app.view.condition_values import conditions
 from app.view.display_values import indicator, readout, value
 from app.view.figure_values import figure
 from app.view.gauge_values import gauge
 from app.view.joint_values import joints
 from app.view.log_values import log
 from app.view.machine_values import machine_state
+from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
 from app.view.step_values import step
 from app.view.table_values import table
@@ -157,6 +161,8 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Indicator: lambda widget, robot, verdict, now: indicator(widget, robot, now),
     MachineState: lambda widget, robot, verdict, now: machine_state(widget, robot, now),
     Figure: lambda widget, robot, verdict, now: figure(widget, robot, now),
+    Pallet: lambda widget, robot, verdict, now: pallet(widget, robot, now),
+    Conditions: lambda widget, robot, verdict, now: conditions(widget, robot, now),
     Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
     Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
     Table: lambda widget, robot, verdict, now: table(widget, robot, now),

@@ -104,7 +104,7 @@ class ViewRefresher:
         self._link_times = LinkTimes()
         self._frame_s = 1 / panel.display_hz
         self._displays = [
-            (frozenset(key for source in w.sources() for key in robot.possible_keys(source.topic)), w)
+            (frozenset(key for topic in panel.shown_topics(w) for key in robot.possible_keys(topic)), w)
             for w in panel.displays
         ]
         self._current = self._build()

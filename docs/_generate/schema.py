@@ -107,7 +107,7 @@ def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, S
 
 def of_kind(kind: str | None) -> str | None:
     """The name of a widget's table: its kind, unless another table has that name."""
-    return f"{kind}_{WIDGET}" if kind == "log" else kind
+    return f"{kind}_{WIDGET}" if kind in ("log", "conditions") else kind
 
 
 def kinds_of(tables: Mapping[str, Schema]) -> dict[str, Schema]:

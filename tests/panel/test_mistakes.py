@@ -107,7 +107,9 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
 
 def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsOf) -> None:
     assert faults_of(GOOD) == []
-    conditions = [f"interlock.{key}" for key in (*COMPARISONS, "unit")]  # not all fit one interlock
+    # Not all comparisons fit one condition.
+    conditions = [f"interlock.{key}" for key in (*COMPARISONS, "unit")]
+    conditions += [f"condition.{key}" for key in (*COMPARISONS, "unit")]
     # There are robots, which have their own namespaces.
     # The catalogue is a file beside the panel file; no type of ROS 2 has a list with a bool `active`.
     files = ["list.active", "list.catalogue"]
@@ -229,6 +231,9 @@ def shows_at(number: int) -> set[int]:
     """Where it may be said that a line is missing."""
     header = header_of(number)
     elsewhere = SHOWS_AT.get(LINES[number - 1])
+    if LINES[number - 1].startswith("durability"):  # a topic has one QoS: another place has another
+        tables = {n for n, line in enumerate(LINES, 1) if line == "[page.widget.qos]"}
+        return {header, LINES.index(elsewhere or "") + 1, *tables}
     return {header} if elsewhere is None else {header, LINES.index(elsewhere) + 1 if elsewhere else 0}
 
 

@@ -16,6 +16,7 @@ from app.panel.constants import (
     parent_type,
     resolve_constant,
 )
+from app.panel.model import Panel
 from app.panel.values import same_value
 
 BEST_EFFORT: Final = (
@@ -24,6 +25,23 @@ BEST_EFFORT: Final = (
 )
 EXCLUSIVE: Final = ("equals", "one_of")  # exclude all other comparisons
 NEEDS: Final = "needs a bool, or conditions: equals, not_equals, min and max, or one_of"
+
+
+def condition_id_faults(panel: Panel) -> Iterator[Fault]:
+    """Interlocks and conditions are named in the same places."""
+    ids = [condition.id for condition in panel.conditions]
+    for number, condition in enumerate(panel.own_conditions, len(panel.interlocks)):
+        if condition.id in ids[:number]:
+            message = f'"{condition.id}" is already the id of an interlock or a condition'
+            yield Fault(f"condition[{number - len(panel.interlocks)}].id", message)
+
+
+def condition_faults_of(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
+    """Faults of each interlock and condition."""
+    for i, interlock in enumerate(panel.interlocks):
+        yield from condition_faults(f"interlock[{i}]", interlock, interfaces)
+    for c, condition in enumerate(panel.own_conditions):
+        yield from condition_faults(f"condition[{c}]", condition, interfaces)
 
 
 def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -> Iterator[Fault]:

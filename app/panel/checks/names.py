@@ -15,6 +15,8 @@ def spelling_faults(panel: Panel, widgets: Iterator[tuple[str, BaseWidget]]) -> 
     """Faults of names that are below the namespace and written as if they were not, beside the other
     way: what the panel knows of a topic, it knows by one name."""
     names = [(f"interlock[{i}].topic", interlock.topic) for i, interlock in enumerate(panel.interlocks)]
+    for c, condition in enumerate(panel.own_conditions):
+        names.append((f"condition[{c}].topic", condition.topic))
     for i, alarm in enumerate(panel.alarms):
         named = (("topic", alarm.topic), ("node", alarm.node))
         names += [(f"alarm[{i}].{key}", name) for key, name in named if name]

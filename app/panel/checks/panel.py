@@ -8,15 +8,15 @@ from app.errors import Fault, InterfaceError
 from app.i18n.values import alike
 from app.interfaces import Interfaces
 from app.panel.checks.alarms import alarm_faults
-from app.panel.checks.conditions import condition_faults
+from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
+from app.panel.condition import NamedCondition
 from app.panel.faults.wording import list_names
-from app.panel.interlock import Interlock
 from app.panel.machine_state import STATE_ID
 from app.panel.model import Panel, RobotEntry
 from app.panel.template import NOW
@@ -55,12 +55,12 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
         *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, reported)),
     }
     faults = [
-        *_interlock_faults(panel, interfaces),
+        *condition_faults_of(panel, interfaces),
         *_widget_faults(panel, interfaces, faulty),
         *alarm_faults(panel, interfaces, faulty),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
-    missed |= {"input", "control"} if missed - {"interlock", "alarm"} else set()
+    missed |= {"input", "control"} if missed - {"interlock", "condition", "alarm"} else set()
     faults = [fault for fault in faults if fault.cause.partition(" ")[0] not in missed]
     yield from faults
     yield from _topic_conflicts(panel, [fault.place for fault in faults])
@@ -79,6 +79,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
 def _id_faults(panel: Panel) -> Iterator[Fault]:
     """Faults of ids. Their items may be missing elsewhere under the correct id."""
     yield from _duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
+    yield from condition_id_faults(panel)
     yield from _duplicate_ids("alarm", [alarm.id for alarm in panel.alarms])
     yield from _duplicate_widget_ids(panel)
     for place, widget in _widgets_with_places(panel):
@@ -149,6 +150,7 @@ def _check_context(
         inputs={w.id: w for w in widgets if isinstance(w, Input)},
         all_inputs=[w.id for w in panel.widgets() if isinstance(w, Input)],
         interlocks=[interlock.id for interlock in panel.interlocks],
+        conditions=[condition.id for condition in panel.conditions],
         types=panel.subscriptions(),
         faulty=faulty,
         pages=[page.id for page in panel.pages],
@@ -161,11 +163,6 @@ def _input_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, Input):
             yield from widget.faults(place, checking)
-
-
-def _interlock_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    for i, interlock in enumerate(panel.interlocks):
-        yield from condition_faults(f"interlock[{i}]", interlock, interfaces)
 
 
 def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
@@ -267,9 +264,10 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     """Faults of topics with several types or QoS in the panel. Places that are `reported` already are
     skipped: their type may be the mistake."""
-    places: list[tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = []
+    places: list[tuple[str, NamedCondition | TopicWidget | TopicSource | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", interlock) for i, interlock in enumerate(panel.interlocks)]
+    places += [(f"condition[{c}]", condition) for c, condition in enumerate(panel.own_conditions)]
     for i, alarm in enumerate(panel.alarms):
         places.extend((f"alarm[{i}]", source) for source in alarm.sources())
     for place, widget in _widgets_with_places(panel):
@@ -280,7 +278,7 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
             places.append((place, widget))
         if isinstance(widget, PublishPress) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
-    firsts: dict[str, tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = {}
+    firsts: dict[str, tuple[str, NamedCondition | TopicWidget | TopicSource | Confirm]] = {}
     for place, topic_user in (*places, *confirms):
         above, first = firsts.setdefault(topic_user.topic, (place, topic_user))
         if topic_user.type != first.type:

@@ -14,7 +14,7 @@ from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
 
-TABLES: Final = ("interlock", "page", "frame", "robot")
+TABLES: Final = ("interlock", "condition", "page", "frame", "robot")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +57,10 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 page.pop(key, None)
                 rest.tables["page"][p] = {"id": f"faulty_{p}", "title": "?"} | page
                 rest.undecidable.update(("input", "control", "listens", "page"))
-            case ("interlock", int(i), *_):
-                rest.tables["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | {
-                    "topic": f"/faulty_{i}"
-                }
-                rest.undecidable.update(("listens", *_unnamed("interlock", tables["interlock"][i])))
+            case ("interlock" | "condition" as name, int(i), *_):
+                stand_in = _stand_in(tables[name][i], f"{name}_{i}")
+                rest.tables[name][i] = stand_in | {"topic": f"/faulty_{name}_{i}"}
+                rest.undecidable.update(("listens", *_unnamed("interlock", tables[name][i])))
             case ("alarm", int(i), *_):
                 stand_in = _stand_in(tables["alarm"][i], str(i))
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}

@@ -38,14 +38,16 @@ from app.panel.widgets.sent_message import SentMessage
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What a widget's check needs: the inputs of its page by id, the ids of all inputs and of all
-    interlocks, topic → type of the subscriptions (`types`), the ids of all `pages` and the names of all
-    `pictures`. Faults of widgets in `faulty` are reported already: checks of them are skipped."""
+    """What a widget's check needs: the inputs of its page by id, the ids of all inputs, of all
+    interlocks and of all conditions (interlocks too), topic → type of the subscriptions (`types`), the
+    ids of all `pages` and the names of all `pictures`. Faults of widgets in `faulty` are reported
+    already: checks of them are skipped."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
     all_inputs: Collection[str]
     interlocks: Collection[str]
+    conditions: Collection[str]
     types: Mapping[str, str]
     faulty: Collection[str] = ()
     pages: Collection[str] = ()
@@ -171,9 +173,10 @@ class DisplayWidget(BaseWidget):
     def sources(self) -> Iterator[TopicSource]:
         """The topics that it shows."""
 
-    def endpoints(self) -> Iterator[tuple[Role, str]]:
-        for topic in dict.fromkeys(source.topic for source in self.sources()):
-            yield "MP", topic
+    @property
+    def named_conditions(self) -> tuple[str, ...]:
+        """The ids of the interlocks and conditions that it shows."""
+        return ()
 
 
 class Display(TopicWidget, DisplayWidget):

@@ -10,6 +10,7 @@ from pydantic import Field
 from app.errors import KindError
 from app.panel.widgets import tiles
 from app.panel.widgets.camera import Camera
+from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.figure import Figure
@@ -20,6 +21,7 @@ from app.panel.widgets.joints import Joints
 from app.panel.widgets.joystick import Joystick
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import NumberInput, SliderInput
+from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Action, Call
@@ -64,6 +66,8 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
     "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
     "figure": WidgetKind(Figure, tiles.FIGURE, styles=("own",), script=False),
+    "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("own",), script=True),
+    "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("own",), script=True),
     "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Self
 
+from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.figure import Figure
 from app.panel.widgets.gauge import Gauge
@@ -26,8 +27,17 @@ PARAMETER_WIDTH: Final = 314.0  # its entry and its key side by side
 SLIDER_WIDTH: Final = 200.0
 NUMBER_WIDTH: Final = 100.0
 DISPLAY_WIDTH: Final = 80.0
-FIGURE_HEIGHTS: Final = ((620, 95.0, 28.0), (560, 70.0, 24.0), (0, 46.0, 20.0))  # above, number, bar
+NO_NAMES: Final = 620  # up to this height names of figures and plans are only read aloud
+FIGURE_HEIGHTS: Final = (
+    (NO_NAMES, 95.0, 28.0),
+    (560, 70.0, 24.0),
+    (0, 46.0, 20.0),
+)  # above, number, bar
 FIGURE_WIDTH: Final = 190.0
+PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
+CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
+CONDITION, LOW_CONDITION = 42.0, 36.0
+CONDITIONS_WIDTH: Final = 200.0
 UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
 GAUGE_WIDTH: Final = 126.0
 JOINTS_FRAME: Final = 41.0  # name and note
@@ -142,6 +152,15 @@ def _figure_height(figure: Figure, screen: Screen) -> float:
     return number + (bar if figure.has_bar else 0.0)
 
 
+def _conditions_height(widget: Conditions, screen: Screen) -> float:
+    row = LOW_CONDITION if screen.height <= LOW_SCREEN else CONDITION
+    return CONDITIONS_FRAME + widget.rows_at_most * row
+
+
+def _plan_height(_: BaseWidget, screen: Screen) -> float:
+    return PLAN_HEIGHT if screen.height > NO_NAMES else LOW_PLAN_HEIGHT
+
+
 def _joints_height(widget: Joints, screen: Screen) -> float:
     return JOINTS_FRAME + len(widget.joints) * (LOW_JOINT if screen.height <= LOW_SCREEN else JOINT)
 
@@ -180,6 +199,8 @@ LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH, grows=True)
 CAMERA: Final = Tile(
     lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH, grows=True
 )
+PALLET: Final = Tile(_plan_height, lambda widget, screen: PLAN_WIDTH, grows=True)
+CONDITIONS: Final = Tile(_conditions_height, lambda widget, screen: CONDITIONS_WIDTH)
 FIGURE: Final = Tile(_figure_height, lambda widget, screen: FIGURE_WIDTH)
 GAUGE: Final = Tile(_gauge_height, lambda widget, screen: GAUGE_WIDTH)
 JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH, grows=True)

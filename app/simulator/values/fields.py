@@ -8,8 +8,8 @@ from typing import Any, Final
 from app.interfaces import INTEGER_RANGES, Interfaces, parent_path
 from app.interfaces.definitions import FLOAT_TYPES
 from app.interfaces.field_path import field_name
+from app.panel.condition import Condition
 from app.panel.demo import NO_ENTRY, DemoEntry
-from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.simulator.interlocks import offset_of, permitting
 from app.simulator.kinds import Shown
@@ -45,7 +45,7 @@ class PanelFields:
         self.confirmed = {
             (confirmation.topic, confirmation.field) for confirmation in panel.confirmations()
         }
-        locked = dict.fromkeys((interlock.topic, interlock.field) for interlock in panel.interlocks)
+        locked = dict.fromkeys((interlock.topic, interlock.field) for interlock in panel.conditions)
         self.offsets: Mapping[tuple[str, str], float] = {
             field: offset_of(number, len(locked)) for number, field in enumerate(locked)
         }
@@ -96,7 +96,7 @@ class _Field:
             return None
         interlocks = [
             interlock
-            for interlock in self._panel_fields.panel.interlocks
+            for interlock in self._panel_fields.panel.conditions
             if (interlock.topic, interlock.field) == (self._topic, self._path)
         ]
         if interlocks:
@@ -174,7 +174,7 @@ class _Field:
         low, high = sorted((end - unit.offset) / unit.scale for end in (guess.low, guess.high))
         return Span(low, high, guess.shape)
 
-    def _permitting(self, interlocks: Sequence[Interlock]) -> Signal:
+    def _permitting(self, interlocks: Sequence[Condition]) -> Signal:
         entry, kind = self._entry, self._kind.name
         if entry.values:
             return cycle(entry.values, self._round_s)

@@ -5,7 +5,7 @@ from typing import Final
 from app.web.gallery.controls import ACTIONS, JOYSTICKS, KEYS, ROLES, STEPS
 from app.web.gallery.displays import CAMERAS, LAMPS, LOGS, READOUTS
 from app.web.gallery.examples import Part
-from app.web.gallery.indicators import FIGURES, GAUGES, JOINT_ROWS, TABLES
+from app.web.gallery.indicators import CHECKS, FIGURES, GAUGES, JOINT_ROWS, PALLETS, TABLES
 from app.web.gallery.inputs import INPUTS, PARAMETERS, STATIC
 from app.web.gallery.trends import TRENDS
 
@@ -16,6 +16,8 @@ PARTS: Final = (
     Part("Readouts", 6, READOUTS),
     Part("Lamps", 6, LAMPS),
     Part("Figures", 3, FIGURES),
+    Part("Pallets", 6, PALLETS),
+    Part("Conditions", 3, CHECKS),
     Part("Gauges", 6, GAUGES),
     Part("Joints", 3, JOINT_ROWS),
     Part("Tables", 2, TABLES),

@@ -1,5 +1,6 @@
-"""Figures, gauges, joints and tables in each of their states."""
+"""Figures, plans, check lists, gauges, joints and tables in each of their states."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from app.i18n import Text, TextLike, number, say
@@ -38,6 +39,77 @@ FIGURES: Final = (
             | ({} if state == "old" else {"text": "—", "part": None}),
         )
         for state, note in NOT_LIVE.items()
+    ),
+)
+PLAN: Final[Table] = TOPIC | {"label": texts.BOXES_COUNT.table, "across": 6, "along": 4, "layers": 6}
+PLANNED: Final[Table] = {
+    "state": "live",
+    "note": "",
+    "text": say("pallet_layer", layer=4, layers=6, place=16, places=24),
+    "filled": "M0 0H6V2H0zM0 2H3V3H0z",
+    "next": "3 2",
+}
+EMPTY: Final[Table] = PLANNED | {"filled": "", "next": ""}
+PALLETS: Final = (
+    Example("partly filled", "pallet", PLAN, PLANNED),
+    Example(
+        "full",
+        "pallet",
+        PLAN,
+        EMPTY | {"text": say("pallet_full"), "filled": "M0 0H6V4H0z"},
+    ),
+    *(
+        Example(
+            state,
+            "pallet",
+            PLAN,
+            (PLANNED if state == "old" else EMPTY) | {"state": state, "note": note},
+        )
+        for state, note in NOT_LIVE.items()
+    ),
+)
+CHECKED: Final[Table] = {
+    "label": texts.CONDITIONS.table,
+    "conditions": ["door", "vacuum", "air"],
+    "rows_shown": 3,
+}
+
+
+def _checks(shape: str, text: TextLike, states: Sequence[str]) -> Table:
+    order = ("unmet", "unknown", "met")
+    return {
+        "state": "live",
+        "shape": shape,
+        "text": text,
+        "row_labels": [texts.GUARD_DOOR.shown, texts.VACUUM.shown, texts.AIR_INLET.shown],
+        "row_states": states,
+        "row_values": [
+            say(f"condition_{states[0]}"),
+            say("condition_unknown") if states[1] == "unknown" else number("-71", "kPa"),
+            number("5.6", "bar"),
+        ],
+        "row_needs": [
+            "",
+            say("condition_needs", need=number("-60", "kPa")),
+            say("condition_needs", need=number("5", "bar")),
+        ],
+        "order": sorted(range(3), key=lambda place: order.index(states[place])),
+    }
+
+
+CHECKS: Final = (
+    Example("all met", "conditions", CHECKED, _checks("met", say("conditions_met"), ["met"] * 3)),
+    Example(
+        "some not met",
+        "conditions",
+        CHECKED,
+        _checks("unmet", say("conditions_unmet", number=2, total=3), ["met", "unknown", "unmet"]),
+    ),
+    Example(
+        "not known",
+        "conditions",
+        CHECKED,
+        _checks("unknown", say("conditions_unmet", number=1, total=3), ["met", "unknown", "met"]),
     ),
 )
 GAUGE: Final[Table] = TOPIC | {
