@@ -102,6 +102,7 @@ class Run:
         for path, number in made.items():
             missed = number - noticed[path]
             print(f"| `{path.relative_to(ROOT)}` | {number} | {noticed[path]} | {missed} |")
+        session._setupstate.teardown_exact(None)
         return True
 
     def _passes(self, items: list[pytest.Item], tests: tuple[str, ...], mutant: Mutant | None) -> bool:
