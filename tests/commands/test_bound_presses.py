@@ -22,6 +22,7 @@ from app.view.publisher import ViewPublisher
 from app.view.view import build_view
 from tests.support.builders import (
     NOW,
+    PROGRAM,
     VIEW,
     Table,
     guard_of,
@@ -209,6 +210,13 @@ def test_a_press_of_another_robots_or_an_earlier_view_is_stale() -> None:
     reasons = [guard.stale_reason(press_of(panel.commands[0], {}, seen=f"{view}-1"))
                for view in ("0123", "4567")]  # fmt: skip
     assert reasons == [say("press_seen_on_another_robot"), say("press_seen_before_restart")]
+
+
+def test_an_act_needs_control_only_where_the_panel_requires_it() -> None:
+    for required in (False, True):
+        panel = small_panel(control={"required": required})
+        guard = guard_of(panel, robot_there(panel))
+        assert guard.control_verdict(PROGRAM).permitted is not required
 
 
 def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server, way: str) -> None:

@@ -136,7 +136,7 @@ class Way(FakeTransport):
 class Bench:
     """Holds on a robot that is there and permits, at a time that is set."""
 
-    def __init__(self, *widgets: Table, panel: Panel | None = None) -> None:
+    def __init__(self, *widgets: Table, panel: Panel | None = None, **more: Any) -> None:
         self.panel = panel or panel_of(SPEED, *(widgets or (JOG, BACK, ARM)))
         self.loop = Loop()
         self.way = Way(self.loop)
@@ -150,7 +150,7 @@ class Bench:
         judge = PressJudge(self.panel, self.robot, guard_of(self.panel, self.robot), arrivals)
         messages = HoldMessages(INTERFACES, self.robot, self.way, checked)
         self.holds = HoldController(
-            self.panel, self.robot, judge, messages, self.loop, changed=lambda: None
+            self.panel, self.robot, judge, messages, self.loop, changed=lambda: None, **more
         )
 
     def take(self) -> None:
@@ -539,6 +539,44 @@ def test_a_lease_that_is_over_is_over() -> None:
     assert lease.end_code(NOW + LEASE_S + 0.2) == "hold_by_stall"
     assert not lease.beat(1, NOW + LEASE_S, NOW + LEASE_S)
     assert not lease.take_due(NOW + LEASE_S)
+
+
+def test_a_late_message_is_not_followed_by_another_at_once() -> None:
+    lease = Lease.begun("one", 0.125, 0.0, 0.0)
+    assert lease.take_due(0.125)  # the message of 0.0, a whole period late
+    assert not lease.take_due(0.125)
+    assert lease.take_due(0.25 - 2**-20) is False
+    assert lease.next_at == 0.25
+
+
+class Recorder:
+    """Keeps what a recording of holds is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, str]] = []
+
+    def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
+        assert (widget, who) == ("jog", WHO)
+        self.told.append(("press", press_id))
+
+    def record_receipt(self, receipt: Receipt) -> None:
+        self.told.append((receipt.outcome, receipt.id))
+
+
+def test_begin_end_and_refusal_of_a_hold_are_recorded() -> None:
+    recorder = Recorder()
+    bench = Bench(recorder=recorder)
+    holding = bench.begun()
+    again = bench.begin()
+    bench.holds.end(holding, RELEASED)
+    hold_id = holding.press.id
+    assert isinstance(again, Receipt)
+    assert recorder.told == [
+        ("press", hold_id),
+        ("press", again.id),
+        ("refused", again.id),
+        ("published", hold_id),
+    ]
 
 
 AGES: Final = st.sampled_from([0.0, 0.0, 0.01, 0.1, 0.2, 0.249, 0.25, 0.4])  # seconds
