@@ -117,3 +117,11 @@ def test_requests_without_a_known_token_have_no_number() -> None:
 def test_a_program_has_a_title_with_its_address_also_at_the_cell() -> None:
     assert str(anonymous("192.0.2.7").title) == "A program (192.0.2.7)"
     assert str(anonymous("127.0.0.1").title) == "A program (127.0.0.1)"
+
+
+def test_a_browser_that_moves_off_the_cell_gets_a_free_number() -> None:
+    browsers = Clients()
+    browsers.identify(token(1), "192.0.2.7")
+    assert browsers.identify(token(2), "127.0.0.1").number == 1
+    assert browsers.identify(token(2), "192.0.2.8").number == 2
+    assert browsers.identify(token(2), "192.0.2.9").number == 2

@@ -135,6 +135,15 @@ def test_constants_are_shown_by_their_names() -> None:
     assert texts(state_of(full, robot)) == ("DISCHARGING", "FULL", False)
 
 
+def test_a_field_that_is_missing_in_the_message_locks() -> None:
+    floats, path = "std_msgs/msg/Float32MultiArray", {"field": "data[1]", "min": 5.0}
+    robot = robot_there(panel_on(floats, path))
+    says(robot, ENABLED, [6.0], floats)
+    state = state_of(Condition.model_validate({"topic": ENABLED, "type": floats, **path}), robot)
+    missing = locked("interlock_field_missing", field="data[1]", topic=ENABLED)
+    assert (state.value, state.verdict) == ("", missing)
+
+
 def test_a_value_that_never_arrived_is_unknown() -> None:
     state = state_of(air(), robot_there(panel_on(FLOAT, {"min": 5.0})))
     assert texts(state) == ("", "5 bar or more", False)
