@@ -22,7 +22,7 @@ from app.panel.widgets.kinds import KINDS
 LAYERS: Final = (
     "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
 )  # fmt: skip
-SHARED: Final = ("entries", "marks")  # by several kinds of widgets
+SHARED: Final = ("entries", "marks", "facts")  # by several kinds of widgets
 OWN_PAGES: Final = ("log",)
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it

@@ -60,6 +60,8 @@ SCRIPTS: Final = {
     "inputs": "recipe",
     "number-text": "recipe",
     "kinds/hold": "cell",
+    "kinds/pallet": "cell",
+    "kinds/conditions": "cell",
     "kinds/parameter": "recipe",
     "kinds/gauge": "robot",
     "kinds/joints": "robot",

@@ -31,7 +31,7 @@ from app.panel.widgets.table import Table
 from app.panel.widgets.tiles import Tile
 from app.panel.widgets.trend import Trend
 
-Stylesheet = Literal["entries", "marks", "own"]
+Stylesheet = Literal["entries", "marks", "facts", "own"]
 
 
 class WidgetKind(NamedTuple):
@@ -65,9 +65,9 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script=True),
     "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
     "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
-    "figure": WidgetKind(Figure, tiles.FIGURE, styles=("own",), script=False),
-    "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("own",), script=True),
-    "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("own",), script=True),
+    "figure": WidgetKind(Figure, tiles.FIGURE, styles=("facts",), script=False),
+    "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("facts",), script=True),
+    "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("facts",), script=True),
     "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),
