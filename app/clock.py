@@ -5,7 +5,7 @@ from datetime import datetime
 from functools import lru_cache
 from typing import Final
 
-from app.i18n import Text, date_and_time, say, time_of_day
+from app.i18n import Text, date_and_time, say, short_day, time_of_day
 
 _START_WALL: Final = time.time()
 _START_BOOTTIME: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
@@ -30,6 +30,11 @@ def age_changes_at(at: float, now: float) -> float:
     """When the text of the age of what happened at `at` changes next; all in monotonic seconds."""
     step = 1 if now - at < 60 else 60
     return at + ((now - at) // step + 1) * step
+
+
+def format_day(wall: float) -> Text:
+    """The day of `wall` (seconds since the epoch) in the server's time zone, as short as it is read."""
+    return short_day(time.strftime("%Y-%m-%d", time.localtime(wall)))
 
 
 def format_datetime(wall: float) -> Text:

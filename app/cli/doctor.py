@@ -16,9 +16,9 @@ from app.cli.parser import Parser
 from app.diagnose.doctor import Diagnosis, Options, diagnose
 from app.diagnose.findings import SEVERITIES, Finding, Report
 from app.diagnose.robot import LISTEN_S
-from app.diagnose.versions import installed_version
 from app.errors import KioskError
 from app.settings import Settings
+from app.version import installed_version
 
 PROG: Final = "python -m app.cli doctor"
 WELL, FINDINGS, FAILED = range(3)

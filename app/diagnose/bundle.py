@@ -24,9 +24,10 @@ from app.diagnose.journal import LAST_S, harmless_journal
 from app.diagnose.machine import MB, ask_server
 from app.diagnose.screen import displays
 from app.diagnose.server_state import harmless_metrics, harmless_ready, harmless_snapshot
-from app.diagnose.versions import installed_version, versions
+from app.diagnose.versions import versions
 from app.errors import LogError
 from app.settings import PACKAGE, PREFIX, VARIABLES, Settings, shipped_path
+from app.version import installed_version
 
 MOST_BYTES: Final = 4 * MB  # of one file; of a longer one the end is kept
 MOST_PRESSES: Final = 20_000  # rows of the operator's log

@@ -1,20 +1,12 @@
 """The versions of the panel, of what it is made with, and of the system under it."""
 
 import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 from app.settings import APP
+from app.version import installed_version
 
 PACKAGES: Final = ("eclipse-zenoh", "fastapi", "uvicorn", "starlette", "pydantic", "mcap")
-CHECKOUT: Final = "(a checkout, not installed)"
-
-
-def installed_version(package: str = APP) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return CHECKOUT
 
 
 def versions() -> dict[str, str]:

@@ -1,6 +1,6 @@
 """The table `[state]` of a panel file: what the machine is doing, in one word, as the robot says it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -20,9 +20,11 @@ MAX_DETAILS: Final = 2
 
 
 class StateDetail(TopicField):
-    """What stands beside the state, such as the mode or the order: a field, after its `label`."""
+    """What stands beside the state, such as the mode or the order: a field, after its `label`. `words`
+    are what is shown for its values."""
 
     label: Label | None = None
+    words: Mapping[str, Label] = Field(default_factory=dict)
 
 
 class StateRules(TopicField):

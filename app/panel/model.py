@@ -30,7 +30,7 @@ from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
 from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
-from app.panel.rules import ControlRules, EmbedRules, LogRules, RecordRules
+from app.panel.rules import BrandRules, ControlRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.stories import StoryName
 from app.panel.texts import panel_texts
@@ -90,6 +90,7 @@ class Panel(Description):
     pictures: PictureFolder | None = None
     keyboard: Keyboard = "auto"
     screen: ScreenRules = ScreenRules()
+    brand: BrandRules | None = None
     frame: Frame = Frame.model_validate({})
     state: StateRules | None = None
     control: ControlRules = ControlRules(required=False)

@@ -1,10 +1,27 @@
-"""The tables `[control]`, `[embed]`, `[log]` and `[record]` of a panel file."""
+"""The tables `[brand]`, `[control]`, `[embed]`, `[log]` and `[record]` of a panel file."""
 
 from typing import Annotated, Final
 
 from pydantic import Field
 
-from app.panel.base import Description, Seconds, TopicName
+from app.panel.base import Description, Note, Seconds, TopicName
+from app.pictures import PICTURE
+
+
+class BrandRules(Description):
+    """What stands in the corner above the tabs: a `logo` from the panel's pictures, or a `text`, on a
+    `colour`, which is nowhere else."""
+
+    logo: Annotated[str, Field(pattern=PICTURE)] | None = None
+    text: Note | None = None
+    colour: Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")] | None = None
+
+    @property
+    def ink(self) -> str:
+        """The colour of a text on it: the one of black and white with the higher contrast."""
+        levels = [int((self.colour or "#d3d8dc")[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+        red, green, blue = (level**2.2 for level in levels)
+        return "#12171b" if 0.2126 * red + 0.7152 * green + 0.0722 * blue > 0.18 else "#fff"
 
 
 class ControlRules(Description):

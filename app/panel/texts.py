@@ -1,6 +1,6 @@
 """The texts of a panel in several languages, wherever they are in its descriptions."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -15,6 +15,9 @@ def panel_texts(value: Any, place: str = "") -> Iterator[tuple[str, PanelText]]:
     elif isinstance(value, tuple):
         for i, element in enumerate(value):
             yield from panel_texts(element, f"{place}[{i}]")
+    elif isinstance(value, Mapping):
+        for key, element in value.items():
+            yield from panel_texts(element, f"{place}.{key}")
     elif isinstance(value, BaseModel):
         for name, about in type(value).model_fields.items():
             key = about.alias or name

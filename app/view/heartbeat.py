@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from app import clock
-from app.clock import format_time, iso_time
+from app.clock import format_day, format_time, iso_time
 from app.i18n import ENGLISH, render
 
 BEAT_S: Final = 0.5  # a page locks itself after 1.75 s without any event
@@ -71,12 +71,13 @@ class Heartbeat:
 def beat(language: str = ENGLISH) -> bytes:
     """The `beat` event, without an id. A page that misses it locks itself.
 
-    `clock` is the time as the page shows it, `at` the same as ISO 8601; `now` is the
+    `clock` and `day` are the time as the page shows it, `at` the same as ISO 8601; `now` is the
     server's own time, in milliseconds.
     """
     wall = time.time()
     data = {
         "clock": render(format_time(wall), language),
+        "day": render(format_day(wall), language),
         "at": iso_time(wall),
         "now": round(clock.server_now() * 1000),
     }

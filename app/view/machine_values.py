@@ -53,6 +53,7 @@ def _detail(detail: StateDetail, robot: RobotState, now: float) -> tuple[TextLik
     """The label and the value; a dash in place of a value that is not known now."""
     field = field_state(detail, robot, now)
     value = shown_value(field.value) if field.state == "live" else NOTHING
+    value = detail.words.get(str(value), value)
     if not detail.label:
         return value, field.until
     return say("machine_state_detail", label=detail.label, value=value), field.until

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from app.errors import KindError
+from app.panel.rules import BrandRules
 from app.panel.widgets.kinds import KINDS
 
 LAYERS: Final = (
@@ -100,16 +101,21 @@ def load_assets(
     pictures: Mapping[str, Path] = NO_PICTURES,
     styles: Collection[Path] = (),
     own_templates: Collection[Path] = (),
+    brand: BrandRules | None = None,
 ) -> Assets:
     """Reads `static`, and the templates for the revision only.
 
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
     widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
-    layer, so that they win, and as they are written.
+    layer, so that they win, and as they are written. `brand` gives the colour of its
+    corner.
     """
     needed = [name for name in SHARED if any(name in KINDS[kind].styles for kind in kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
-    millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
+    own = f"--mm:{1 / mm_per_px:.4f}px"
+    if brand is not None and brand.colour:
+        own += f";--brand:{brand.colour};--brand-ink:{brand.ink}"
+    millimetre = f":root{{{own}}}\n".encode()
     sheet = asset(b"".join([*layers, millimetre]), ".css")
     files = {"kiosk.css": _with_styles(sheet, styles)}
     of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}

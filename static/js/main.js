@@ -103,9 +103,9 @@ class Screen {
     attempt(root, () => showAttributes(root, attributes));
   }
 
-  /** @param {{ clock: string, at: string }} now */
+  /** @param {Record<string, string>} now */
   #beat(now) {
-    setText(this.#clock, now.clock);
+    for (const name of ["clock", "day"]) setText(document.getElementById(name), now[name]);
     this.#clock.dateTime = now.at;
     if (this.#reconnected) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
     this.#reconnected = false;

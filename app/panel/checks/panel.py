@@ -10,6 +10,7 @@ from app.interfaces import Interfaces
 from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.languages import language_faults
+from app.panel.checks.look import brand_faults, grow_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.story import story_faults
@@ -70,7 +71,8 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _trend_faults(panel)
     yield from page_template_faults(panel)
     yield from _scan_faults(panel)
-    yield from _grow_faults(panel)
+    yield from grow_faults(panel)
+    yield from brand_faults(panel)
     yield from language_faults(panel)
     if not (faults or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
@@ -85,19 +87,6 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:
             yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_RULE}: choose another id')
-
-
-def _grow_faults(panel: Panel) -> Iterator[Fault]:
-    """One widget of a group takes the height that is left."""
-    for p, page in enumerate(panel.pages):
-        growing: dict[str, str] = {}
-        for place, widget in page.placed():
-            group = place.rpartition("widget[")[0]
-            if widget.grow and group in growing:
-                message = f'"{growing[group]}" has it already: one widget of a group grows'
-                yield Fault(f"page[{p}].{place}.grow", message)
-            elif widget.grow:
-                growing[group] = widget.id
 
 
 def _scan_faults(panel: Panel) -> Iterator[Fault]:

@@ -17,7 +17,8 @@ HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
 FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
     "log", "control", "record", "demo", "robot", "interlock", "alarm", "alarms", "page", "group",
-    "frame", "state", "detail", "widget", "qos", "confirm", "options", "states", *FREE_FORM_TABLES,
+    "frame", "brand", "state", "detail", "widget", "qos", "confirm", "options", "states",
+    *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8
 # Messages of Python's TOML reader about duplicate keys and tables → plainer ones.

@@ -10,7 +10,7 @@ from fastapi import Request
 from markupsafe import Markup
 
 from app import clock
-from app.clock import format_datetime, format_time, iso_time
+from app.clock import format_datetime, format_day, format_time, iso_time
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike
@@ -58,6 +58,7 @@ class PageContext(TypedDict):
     sections: Sequence[Section]
     event_id: str
     clock: Text
+    day: Text
     clock_at: str
     loaded: Text
     press_id: str
@@ -121,6 +122,7 @@ def page_context(
         sections=SECTIONS,
         event_id=publisher.id,
         clock=format_time(wall),
+        day=format_day(wall),
         clock_at=iso_time(wall),
         loaded=format_datetime(wall),
         press_id=secrets.token_hex(8),

@@ -22,6 +22,7 @@ from app.panel.number_range import decimal_text
 from app.panel.screen import CLEANING_S
 from app.panel.widgets.families import BaseWidget
 from app.printable import printable
+from app.version import installed_version
 from app.web.page_guard import PAGE_GUARD
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class PageTemplates:
         self._base.globals["icon"] = icon
         self._base.globals["cleaning_s"] = CLEANING_S
         self._base.globals["failure"] = FAILURE
+        self._base.globals["version"] = installed_version()
         self._base.globals["page_guard"] = PAGE_GUARD
         self._environments: dict[str, Environment] = {}
         self._failing: set[str] = set()  # ids of widgets whose failure was logged

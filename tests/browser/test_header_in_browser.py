@@ -1,0 +1,105 @@
+"""The header: brand, titles, date and language, at each size and in each language."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.browser.browsers import sized
+from tests.support.browser.pages import DRAWN
+from tests.support.parts import ROOT, SHIPPED, Server
+from tests.support.servers import ready
+
+PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
+SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480))
+LOGO: Final = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 4"><path d="M0 0h9v4z"/></svg>'
+BRAND: Final = """
+[brand]
+logo = "acme.svg"
+text = "ACME"
+colour = "#0b6b57"
+"""
+CONTROL: Final = """
+[control]
+required = true
+"""
+# Parts of the header that are beyond it or over one another.
+CROWDED: Final = """() => {
+  const parts = [...document.querySelectorAll("header > *")].filter((part) => part.checkVisibility());
+  const boxes = parts.map((part) => [part.className || part.tagName, part.getBoundingClientRect()]);
+  return boxes.flatMap(([name, { left, right }], number) => {
+    const before = number ? boxes[number - 1][1].right : 0;
+    return left < before - 1 || right > innerWidth ? [`${name}: ${left} to ${right}`] : [];
+  });
+}"""
+
+
+@pytest.fixture(scope="module")
+def branded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("branded")
+    (folder / "pictures").mkdir()
+    (folder / "pictures/acme.svg").write_text(LOGO)
+    panel = SHIPPED.read_text().replace("distro", 'pictures = "pictures"\ndistro', 1) + BRAND
+    with ready(Server(ROOT, KIOSK_PANEL=str(written(folder, panel)))) as mine:
+        yield mine
+
+
+@pytest.fixture(scope="module")
+def controlled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    panel = PALLETIZER.read_text() + CONTROL
+    path = written(tmp_path_factory.mktemp("controlled"), panel)
+    with ready(Server(ROOT, KIOSK_PANEL=str(path))) as mine:
+        yield mine
+
+
+def written(folder: Path, panel: str) -> Path:
+    path = folder / "panel.toml"
+    path.write_text(panel)
+    return path
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_parts_of_the_header_have_room(
+    branded: Server, controlled: Server, page: Page, language: str
+) -> None:
+    for server in (branded, controlled):
+        cookie = {"name": "kiosk_language", "value": language, "url": server.url}
+        page.context.add_cookies([cookie])  # type: ignore[list-item]
+        page.goto(server.url)
+        expect(page.locator("html[data-floor]")).to_be_attached()
+        for width, height in SIZES:
+            sized(page, width, height).evaluate(DRAWN)
+            assert page.evaluate(CROWDED) == [], (server is branded, width)
+            expect(page.locator("#clock")).to_be_visible()
+            expect(page.locator("#day")).to_be_visible(visible=width >= 900)
+
+
+def test_who_has_control_is_said_in_words_of_their_own_width(controlled: Server, page: Page) -> None:
+    cookie = {"name": "kiosk_language", "value": "de", "url": controlled.url}
+    page.context.add_cookies([cookie])  # type: ignore[list-item]
+    page.goto(controlled.url)
+    sized(page, 800, 480).evaluate(DRAWN)
+    who = page.locator(".control > div").bounding_box()
+    assert who is not None
+    assert who["width"] > 100
+
+
+def test_the_brands_colour_is_in_its_corner_only(branded: Server, page: Page) -> None:
+    page.goto(branded.url)
+    corner = page.locator(".brand")
+    expect(corner).to_have_css("background-color", "rgb(11, 107, 87)")
+    assert corner.locator("img").evaluate("(logo) => logo.complete && logo.naturalWidth > 0")
+    rail = page.locator("nav.pages").bounding_box()
+    box = corner.bounding_box()
+    assert rail is not None
+    assert box is not None
+    assert abs(box["width"] - rail["width"]) < 2
+    expect(page.locator("#day")).to_have_text(re.compile(r"\w{3} \d+ \w{3}"))
+    expect(page.locator(".machine-state .details")).to_contain_text("Automatic")
+    page.locator(".language").click()
+    page.locator("#menu").get_by_role("button", name="Deutsch").click()
+    expect(page.locator(".language")).to_have_text("Deutsch")
+    expect(page.locator(".machine-state .details")).to_contain_text("Automatik")
