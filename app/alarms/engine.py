@@ -9,12 +9,13 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from app.alarms.delays import DelayedCondition
 from app.alarms.entries import AlarmEntry
+from app.alarms.evaluation import levels_of, read_alarm
 from app.alarms.instance import AlarmInstance, Definition, define
 from app.alarms.records import entry_in, status_in
-from app.alarms.sources import UNKNOWN, SourceReading, read_source
-from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level
+from app.alarms.sources import read_suppression
+from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level, update_suppression
+from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
 
@@ -64,6 +65,7 @@ class AlarmEngine:
         self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
         self._refused = 0  # entries beyond `MAX_ENTRIES`
         self.alarms: dict[str, AlarmInstance] = {}
+        self.lock_changes = 0  # how often the lock of an alarm's controls has changed
 
     def add_robot(self, robot_id: str, robot: RobotState) -> None:
         """Adds the alarms of a robot by its id, "" for the only one without an id."""
@@ -78,9 +80,13 @@ class AlarmEngine:
             self._entries[robot, alarm.id] = []
             return
         self._keep(definition)
-        if alarm.topic is not None:
-            for key in self._robots[robot].possible_keys(alarm.topic):
-                self._by_topic.setdefault((robot, key), []).append(definition.id)
+        for topic in alarm.evaluated_topics:
+            self._listen(definition, topic)
+
+    def _listen(self, definition: Definition, topic: str) -> None:
+        """Evaluates an alarm after each message of a topic."""
+        for key in self._robots[definition.robot].possible_keys(topic):
+            self._by_topic.setdefault((definition.robot, key), []).append(definition.id)
 
     def _keep(self, definition: Definition) -> AlarmInstance:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
@@ -132,29 +138,43 @@ class AlarmEngine:
         self._emit([t for alarm_id in turn for t in self._evaluated(self.alarms[alarm_id], now)])
 
     def entries_received(
-        self, robot: str, alarm_id: str, entries: Iterable[AlarmEntry], at: float
+        self,
+        robot: str,
+        alarm_id: str,
+        entries: Iterable[AlarmEntry],
+        at: float,
+        is_whole: bool = True,
     ) -> None:
         """A robot published entries of an alarm with `diagnostics` or a list; `at` in monotonic
-        seconds. A list without `active` has all of its active entries."""
+        seconds. A list without `active` has all of its active entries, if it was read as a whole."""
         source = self._sources[robot, alarm_id]
         named = {entry.name: entry for entry in entries}
         for entry in named.values():
-            definition = source.of_entry(entry)
-            alarm = self.alarms.get(definition.id)
+            alarm = self.alarms.get(f"{source.id}:{entry.name}")
             if alarm is None and entry.level:
-                alarm = self._new_entry(definition)
+                alarm = self._new_entry(source.of_entry(entry))
             if alarm is not None:
-                alarm.definition, alarm.entry, alarm.heard_at = definition, entry, at
-                self._waiting[definition.id] = None
+                self._receive_entry(alarm, source, entry, at)
         listed = source.alarm.listed
-        if listed is not None and listed.active is None:
+        if listed is not None and listed.active is None and is_whole:
             self._end_missing(source, named)
+
+    def _receive_entry(
+        self, alarm: AlarmInstance, source: Definition, entry: AlarmEntry, at: float
+    ) -> None:
+        is_new = alarm.entry != entry or alarm.status.unknown_since or not alarm.is_evaluated
+        alarm.heard_at = at
+        if is_new:
+            alarm.definition, alarm.entry = source.of_entry(entry), entry
+            self._waiting[alarm.definition.id] = None
 
     def _new_entry(self, definition: Definition) -> AlarmInstance | None:
         if sum(map(len, self._entries.values())) >= MAX_ENTRIES:
             self._refused += 1
             return None
         alarm = self._keep(definition)
+        if definition.alarm.suppressed_while is not None:
+            self._listen(definition, definition.alarm.suppressed_while.topic)
         self._entries[definition.robot, definition.alarm.id].append(alarm)
         return alarm
 
@@ -168,28 +188,21 @@ class AlarmEngine:
     def _evaluated(self, alarm: AlarmInstance, now: Moment) -> Iterator[Transition]:
         """Evaluates one alarm; returns its transitions."""
         definition, before = alarm.definition, alarm.status
-        reading = self._read(alarm, now.monotonic)
+        lock, robot = alarm.lock, self._robots.get(definition.robot)
+        reading = read_alarm(alarm, robot, now.monotonic, self._began_at)
         status = expire(before, definition.rules, now)
-        levels, conditions = _levels(alarm, reading, now.monotonic)
+        levels, conditions = levels_of(alarm, reading, now.monotonic)
         alarm.set_conditions(conditions)
         for level in levels:
             status = update_level(status, definition.rules, level, now)
-        alarm.status, alarm.value = status, reading.value if reading.is_known else alarm.value
-        self._set_due(alarm, reading.until)
+        suppression = read_suppression(definition.alarm, robot, now.monotonic)
+        status = update_suppression(status, definition.rules, suppression.met is True, now)
+        alarm.status, alarm.is_evaluated = status, True
+        alarm.value = reading.value if reading.is_known else alarm.value
+        self._set_due(alarm, min(reading.until, suppression.until))
+        self._note_lock(alarm, lock)
         if not status.is_same_to_operators(before):
             yield self._transition(alarm, before, now)
-
-    def _read(self, alarm: AlarmInstance, now: float) -> SourceReading:
-        definition, robot = alarm.definition, self._robots[alarm.definition.robot]
-        if alarm.entry is None:
-            return read_source(definition.alarm, robot, now, self._began_at)
-        if not robot.link_up or not robot.graph.peers or alarm.heard_at == -math.inf:
-            return UNKNOWN
-        max_age_s = definition.alarm.max_age_s
-        stale_at = math.inf if max_age_s is None else alarm.heard_at + max_age_s
-        if now >= stale_at:
-            return UNKNOWN
-        return SourceReading(met=alarm.entry.level > 0, until=stale_at)
 
     def _set_due(self, alarm: AlarmInstance, until: float) -> None:
         delays = alarm.definition.delays
@@ -211,9 +224,10 @@ class AlarmEngine:
         alarm = self.alarms.get(alarm_id)
         if alarm is None:
             return None
-        before = alarm.status
+        before, lock = alarm.status, alarm.lock
         result = apply(before, alarm.definition)
         alarm.status = result.status
+        self._note_lock(alarm, lock)
         if result.status.shelf and result.status.shelf != before.shelf:
             self._waiting[alarm_id] = None  # its end is a time
         if result.status != before:
@@ -255,6 +269,19 @@ class AlarmEngine:
         alarms = self._inhibitors.get((robot, widget), ())
         yield from (alarm for alarm in alarms if alarm.inhibits)
 
+    def inhibited(self, robot: str) -> Mapping[str, AlarmInstance]:
+        """The controls of a robot that alarms lock now, each with the most urgent of them."""
+        locks: dict[str, AlarmInstance] = {}
+        for (known, widget), alarms in self._inhibitors.items():
+            inhibiting = [alarm for alarm in alarms if alarm.inhibits] if known == robot else []
+            if inhibiting:
+                locks[widget] = min(inhibiting, key=lambda alarm: alarm.order)
+        return locks
+
+    def _note_lock(self, alarm: AlarmInstance, before: tuple[bool, bool, TextLike]) -> None:
+        if alarm.definition.alarm.inhibits and alarm.lock != before:
+            self.lock_changes += 1
+
     def _transition(
         self, alarm: AlarmInstance, before: AlarmStatus, now: Moment, act: str = "", actor: str = ""
     ) -> Transition:
@@ -266,28 +293,3 @@ class AlarmEngine:
     def _emit(self, transitions: Sequence[Transition]) -> None:
         if transitions:
             self._on_transitions(transitions)
-
-
-def _levels(
-    alarm: AlarmInstance, reading: SourceReading, now: float
-) -> tuple[tuple[int | None, ...], tuple[DelayedCondition, ...]]:
-    """The levels that the condition has in turn, None for unknown, and its conditions after them. From
-    one end of the range to the other it returns in between."""
-    if not reading.is_known:
-        return (None,), alarm.conditions
-    definition = alarm.definition
-    pairs = tuple(zip(definition.thresholds, alarm.conditions, strict=True))
-    conditions = tuple(
-        condition.heard(reading.exceeds(limit, condition.met), now, definition.delays)
-        for limit, condition in pairs
-    )
-    before = {limit for limit, condition in pairs if condition.active}
-    after = {
-        limit
-        for limit, condition in zip(definition.thresholds, conditions, strict=True)
-        if condition.active
-    }
-    level = max((alarm.level_of(limit) for limit in after), default=0)
-    sides = {limit.is_high for limit in (*before, *after) if limit is not None}
-    crossed = before and after and not before & after and len(sides) > 1
-    return ((0, level) if crossed else (level,)), conditions

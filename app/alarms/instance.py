@@ -67,6 +67,7 @@ class AlarmInstance:
     limit: float | None = None
     entry: AlarmEntry | None = None
     heard_at: float = -math.inf
+    is_evaluated: bool = False
     due: float = math.inf
     timer: float = math.inf
 
@@ -106,6 +107,11 @@ class AlarmInstance:
         return self.definition.alarm.text or self.definition.id
 
     @property
+    def action(self) -> TextLike:
+        """What the operator does: by the fault catalogue, or the panel file."""
+        return (self.entry and self.entry.action) or self.definition.alarm.action or ""
+
+    @property
     def priority(self) -> int:
         """That of the highest level since it was raised and not acknowledged."""
         return self.definition.rules.priority(max(self.status.level, self.status.raised_level))
@@ -119,10 +125,22 @@ class AlarmInstance:
     @property
     def inhibits(self) -> bool:
         """Whether it locks the controls that it names: it is active or latched, or its source is
-        unknown. One that has returned does not."""
-        status = self.status
-        is_latched = self.definition.alarm.latched and not status.is_normal
+        unknown or was not read yet. One that has returned does not."""
+        status, alarm = self.status, self.definition.alarm
+        if not self.is_evaluated:
+            return True
+        if status.suppressed_since and not alarm.inhibits_when_suppressed:
+            return False
+        is_latched = alarm.latched and not status.is_normal
         return status.level > 0 or is_latched or status.unknown_since is not None
+
+    @property
+    def lock(self) -> tuple[bool, bool, TextLike]:
+        """What decides the lock of its controls: whether it locks, whether it is because its source is
+        unknown, and its text."""
+        status = self.status
+        is_unknown = not self.is_evaluated or bool(status.unknown_since and not status.level)
+        return self.inhibits, is_unknown, self.text
 
     @property
     def order(self) -> tuple[bool, int, float]:

@@ -28,7 +28,7 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
         "value": alarm.value if alarm.value is not None and abs(alarm.value) < 1e300 else None,
         "about": {
             "text": _as_json(alarm.text),
-            "action": _as_json(described.action or ""),
+            "action": _as_json(alarm.action),
             "group": _as_json(described.group or ""),
             "priority": alarm.priority,
             "unit": _as_json(described.unit),
@@ -40,6 +40,9 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
             "level": entry.level,
             "text": _as_json(entry.text),
             "priorities": entry.priorities,
+            "cause": _as_json(entry.cause),
+            "consequence": _as_json(entry.consequence),
+            "action": _as_json(entry.action),
         }
     return json.dumps(record, ensure_ascii=False)
 
@@ -75,8 +78,10 @@ def entry_in(record: str) -> AlarmEntry | None:
     values = json.loads(record).get("entry")
     if values is None:
         return None
-    text = text_of(values["text"])
-    return AlarmEntry(values["name"], int(values["level"]), text, tuple(values["priorities"]))
+    keys = ("text", "cause", "consequence", "action")
+    text, cause, consequence, action = (text_of(values.get(key, "")) for key in keys)
+    name, priorities = values["name"], tuple(values["priorities"])
+    return AlarmEntry(name, int(values["level"]), text, priorities, cause, consequence, action)
 
 
 def _wall(moment: Moment | None) -> float | None:

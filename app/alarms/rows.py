@@ -39,7 +39,6 @@ PRIORITY_WORDS: Final = (
     "alarm_priority_3",
     "alarm_priority_4",
 )
-LONGEST_TEXT: Final = 500
 DIGITS: Final = 6  # of a value
 
 
@@ -57,9 +56,10 @@ class TakenOutRow(TypedDict):
 class AlarmRow(TypedDict):
     """An alarm at its last change. `state` is that of the public contract, `before_unknown` the same as
     if its source were known. `since` (RFC 3339) is when it was raised, "" if it was not. `value` is
-    that of its last change, null without one; `limit` the limit that it exceeds. `acts` are the acts
-    that are possible now. `follows` is the id of the alarm of its group that was raised first, "" for
-    none. `order` sorts rows: the most urgent first. Keys that end with `_text` are for people."""
+    that of its last change, null without one; `limit` the limit that it exceeds. `details` are key
+    values of a diagnostic status. `acts` are the acts that are possible now. `follows` is the id of the
+    alarm of its group that was raised first, "" for none. `order` sorts rows: the most urgent first.
+    Keys that end with `_text` are for people."""
 
     id: str
     robot: str
@@ -79,6 +79,7 @@ class AlarmRow(TypedDict):
     cause: TextLike
     consequence: TextLike
     action: TextLike
+    details: str
     picture: str
     topic: str
     field: str
@@ -96,7 +97,7 @@ class AlarmRow(TypedDict):
 def row_of(alarm: AlarmInstance, now: Moment, follows: str = "") -> AlarmRow:
     """The row of an alarm as it is now."""
     status, definition = alarm.status, alarm.definition
-    described, raised_at = definition.alarm, status.raised_at
+    described, entry, raised_at = definition.alarm, alarm.entry, status.raised_at
     limit = alarm.limit
     return AlarmRow(
         id=definition.id,
@@ -113,10 +114,11 @@ def row_of(alarm: AlarmInstance, now: Moment, follows: str = "") -> AlarmRow:
         occurrence=status.occurrence,
         since=iso_time(raised_at.wall) if raised_at else "",
         since_text=format_time(raised_at.wall) if raised_at else "",
-        text=_cut(alarm.text),
-        cause=_cut(described.cause or ""),
-        consequence=_cut(described.consequence or ""),
-        action=_cut(described.action or ""),
+        text=alarm.text,
+        cause=(entry and entry.cause) or described.cause or "",
+        consequence=(entry and entry.consequence) or described.consequence or "",
+        action=alarm.action,
+        details=entry.details if entry else "",
         picture=described.picture or "",
         topic=described.topic_name or "",
         field=described.field if described.source == "limits" else "",
@@ -187,8 +189,3 @@ def _taken_out(taken: TakenOut | None, now: Moment) -> TakenOutRow | None:
         reason=taken.reason,
         who=taken.actor,
     )
-
-
-def _cut(text: TextLike) -> TextLike:
-    """A text of a robot in a bounded length."""
-    return text[:LONGEST_TEXT] if isinstance(text, str) else text

@@ -6,6 +6,9 @@ from typing import Any, Final, NamedTuple
 
 from app.alarms.delays import Limit
 from app.panel.alarm import Alarm, SourceKind
+from app.panel.condition import Condition
+from app.panel.widgets.parameter import GET
+from app.permission.conditions import fresh_since, permits
 from app.permission.interlocks import link_verdict
 from app.robot.keyed_values import kept_s
 from app.robot.state import RobotState
@@ -53,6 +56,45 @@ def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> Source
     return SourceReading(value=value, until=stale_at) if now < stale_at else UNKNOWN
 
 
+def _read_node(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
+    """A node is there while its parameter services are."""
+    link = link_verdict(robot, now)
+    if alarm.node is None or not (link.permitted or link.code == CATCHING_UP):
+        return SourceReading(until=link.until)
+    key = robot.key(f"{alarm.node}/{GET[0]}")
+    return SourceReading(met=robot.graph.server_type("SS", key) is None)
+
+
+def _read_condition(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
+    return UNKNOWN if alarm.when is None else read_condition(alarm.when, robot, now)
+
+
+def read_condition(condition: Condition, robot: RobotState, now: float) -> SourceReading:
+    """Whether a condition is met; unknown while its value is not known, or too old. A value that may
+    have been replayed can raise an alarm, but not say that there is none."""
+    link = link_verdict(robot, now)
+    if not (link.permitted or link.code == CATCHING_UP):
+        return SourceReading(until=link.until)
+    reading = robot.reading(condition.topic).of_field(condition.field, kept_s(condition.max_age_s))
+    value = reading.value(condition.field) if reading.status in ("message", "reading") else None
+    if value is None or value != value:
+        return UNKNOWN
+    stale_at = math.inf if condition.max_age_s is None else reading.at + condition.max_age_s
+    met, key = permits(condition, value), robot.key(condition.topic)
+    is_aged = condition.max_age_s is not None and reading.at < fresh_since(robot, key)
+    is_doubtful = is_aged or robot.silent_publishers.has_silent(key, robot.peers_of(key))
+    if now >= stale_at or (not met and is_doubtful):
+        return UNKNOWN
+    return SourceReading(met=met, until=stale_at)
+
+
+def read_suppression(alarm: Alarm, robot: RobotState | None, now: float) -> SourceReading:
+    """Whether the condition of `while` is met; unknown without one."""
+    if alarm.suppressed_while is None or robot is None:
+        return UNKNOWN
+    return read_condition(alarm.suppressed_while, robot, now)
+
+
 def _read_age(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
     if alarm.topic is None or alarm.stale_s is None:
         return UNKNOWN
@@ -69,7 +111,9 @@ def _read_loss(alarm: Alarm, robot: RobotState, _: float, __: float) -> SourceRe
 
 READERS: Final[Mapping[SourceKind, Callable[[Alarm, RobotState, float, float], SourceReading]]] = {
     "limits": _read_field,
+    "condition": _read_condition,
     "stale": _read_age,
+    "node": _read_node,
     "lost": _read_loss,
 }
 

@@ -4,7 +4,7 @@ They are the same for presses as JSON, as forms and for holds.
 """
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
 from app import clock
@@ -34,13 +34,16 @@ class PressGuard:
         operators_log: Log,
         expires_s: float,
         instance_ids: Callable[[], Collection[str]],
+        inhibited: Callable[[], Mapping[str, Verdict]] = dict,
     ) -> None:
-        """`instance_ids`: those of the views of all robots. A press with another robot's is refused."""
+        """`instance_ids`: those of the views of all robots. A press with another robot's is refused.
+        `inhibited` returns the locks by alarms, by the widgets' ids."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
         self._expires_s = expires_s
         self._instance_ids = instance_ids
+        self._inhibited = inhibited
         self._ended = False
 
     def close(self) -> None:
@@ -55,8 +58,9 @@ class PressGuard:
         self._control.touch(press.principal)
 
     def conditions(self, who: Principal) -> ServerConditions:
-        """The server's own locks for a client: shutdown, log, control."""
-        return ServerConditions(self._control.verdict(who), self._log.lock, self._ended, who)
+        """The server's own locks for a client: shutdown, log, control, alarms."""
+        control, lock = self._control.verdict(who), self._log.lock
+        return ServerConditions(control, lock, self._ended, who, self._inhibited())
 
     def stale_reason(self, press: Press[Command]) -> TextLike:
         """Why the view that the operator saw is stale, "" if it is not. It is not if the press has

@@ -20,6 +20,7 @@ from app.panel.base import (
     Type,
     panel_text,
 )
+from app.panel.condition import Condition
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
 from app.panel.widgets.parameter import NodeName
@@ -28,12 +29,13 @@ from app.panel.widgets.table import MAX_ENTRIES, READ_BY_DEFAULT, ListPath
 Priority = Annotated[int, Field(ge=1, le=4)]
 Delay = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
 Limit = Annotated[float, Field(allow_inf_nan=False)]
-SourceKind = Literal["limits", "stale", "node", "lost", "diagnostics", "list"]
+SourceKind = Literal["limits", "condition", "stale", "node", "lost", "diagnostics", "list"]
 
 LIMIT_KEYS: Final = ("low_low", "low", "high", "high_high")
 # The keys that decide from what an alarm is raised, and the source that they stand for.
 SOURCE_KEYS: Final[Mapping[str, SourceKind]] = {
     **dict.fromkeys(LIMIT_KEYS, "limits"),
+    "when": "condition",
     "stale_s": "stale",
     "node": "node",
     "lost": "lost",
@@ -42,6 +44,7 @@ SOURCE_KEYS: Final[Mapping[str, SourceKind]] = {
 }
 DIAGNOSTICS: Final = "/diagnostics"
 DIAGNOSTIC_ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
+DIAGNOSTICS_AGE_S: Final = 30.0
 SHIFT_S: Final = 8 * 3600.0
 
 if TYPE_CHECKING:
@@ -80,10 +83,6 @@ LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
 Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
 Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
 
-NOT_RAISED: Final = (
-    "this version checks nodes, diagnostics, lists and inhibits, but does not use them yet"
-)
-
 
 class AlarmList(Description):
     """Alarms that a robot publishes as a list: the `field` of the message that is the list, and the
@@ -105,6 +104,14 @@ class AlarmList(Description):
         """The fields of an entry that are read."""
         named = (self.code, self.text, self.level, self.active)
         return tuple(dict.fromkeys(path for path in named if path is not None))
+
+
+class RaisingCondition(Condition):
+    """`[alarm.when]`: raises an alarm while it is met."""
+
+
+class SuppressingCondition(Condition):
+    """`[alarm.while]`: suppresses an alarm by design while it is met."""
 
 
 class Alarm(Description):
@@ -139,6 +146,9 @@ class Alarm(Description):
     high: Limit | None = None
     high_high: Limit | None = None
     deadband: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    when: RaisingCondition | None = None
+    suppressed_while: SuppressingCondition | None = Field(None, alias="while")
+    inhibits_when_suppressed: bool = True
     stale_s: Seconds | None = None
     node: NodeName | None = None
     lost: Literal["link", "robot"] | None = None
@@ -161,6 +171,23 @@ class Alarm(Description):
         """Key → value of the given limits."""
         values = {key: getattr(self, key) for key in LIMIT_KEYS}
         return {key: value for key, value in values.items() if value is not None}
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """What it judges beside its own source."""
+        return tuple(condition for condition in (self.when, self.suppressed_while) if condition)
+
+    @property
+    def evaluated_topics(self) -> tuple[str, ...]:
+        """The topics after whose messages it is evaluated."""
+        own = (self.topic,) if self.topic is not None else ()
+        return (*own, *(condition.topic for condition in self.conditions))
+
+    @property
+    def entry_max_age_s(self) -> float | None:
+        """After which time an alarm that the robot publishes is not known: for diagnostics, which come
+        again and again, also by default."""
+        return self.max_age_s or (DIAGNOSTICS_AGE_S if self.diagnostics else None)
 
     @property
     def topic_name(self) -> str | None:

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
 from app.i18n import ENGLISH
 from app.interfaces import Interfaces, load_interfaces
+from app.panel.alarm import Alarm
 from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_condition
@@ -87,9 +88,26 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
     interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
     conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
+    alarms = tuple(_resolve_alarm(alarm, interfaces) for alarm in panel.alarms)
     state = panel.state and panel.state.with_constants(interfaces)
-    resolved_parts = {"interlocks": interlocks, "own_conditions": conditions, "state": state}
+    resolved_parts = {
+        "interlocks": interlocks,
+        "own_conditions": conditions,
+        "alarms": alarms,
+        "state": state,
+    }
     return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
+
+
+def _resolve_alarm(alarm: Alarm, interfaces: Interfaces) -> Alarm:
+    """The alarm with values in place of constants' names in its conditions."""
+    conditions = {"when": alarm.when, "suppressed_while": alarm.suppressed_while}
+    resolved = {
+        key: resolve_condition(condition, interfaces)
+        for key, condition in conditions.items()
+        if condition is not None
+    }
+    return alarm.model_copy(update=resolved) if resolved else alarm
 
 
 def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:

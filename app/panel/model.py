@@ -24,7 +24,7 @@ from app.panel.base import (
     catalogue_default,
     parse_namespace,
 )
-from app.panel.condition import NamedCondition
+from app.panel.condition import Condition, NamedCondition
 from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
@@ -180,11 +180,13 @@ class Panel(Description):
 
     @cached_property
     def uniform_buttons(self) -> Mapping[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]:
-        """Buttons that publish, by their interlocks and whether they stop: these and the graph decide
-        whether they lock, the lock is all that is shown of them, and many are judged as one."""
+        """Buttons that publish and that no alarm locks, by their interlocks and whether they stop: many
+        are judged as one, as these and the graph decide their lock, which is all that is shown."""
+        inhibited = {widget for alarm in self.alarms for widget in alarm.inhibits}
         groups: dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]] = {}
         for widget in self.commands:
-            if isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time):
+            alike = isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time)
+            if alike and isinstance(widget, PublishPress) and widget.id not in inhibited:
                 key = widget.interlocks, widget.role == "stop"
                 groups[key] = (*groups.get(key, ()), widget)
         return groups
@@ -201,14 +203,18 @@ class Panel(Description):
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
     @property
-    def conditions(self) -> tuple[NamedCondition, ...]:
-        """All conditions that are judged, interlocks first: each message on their topics counts, and a
-        value of unknown age is known to be one."""
+    def named_conditions(self) -> tuple[NamedCondition, ...]:
+        """Those with an id, interlocks first."""
         return (*self.interlocks, *self.own_conditions)
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All that are judged: each message counts, and a value of unknown age is known to be one."""
+        return (*self.named_conditions, *(c for alarm in self.alarms for c in alarm.conditions))
 
     def shown_topics(self, widget: DisplayWidget) -> frozenset[str]:
         """The topics that a display shows: its own, and those of the conditions that it names."""
-        named = {c.topic for c in self.conditions if c.id in widget.named_conditions}
+        named = {c.topic for c in self.named_conditions if c.id in widget.named_conditions}
         return frozenset(named | {source.topic for source in widget.sources()})
 
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
@@ -218,9 +224,7 @@ class Panel(Description):
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all subscriptions."""
-        own = {
-            confirm.topic: confirm.type for confirm in self.confirmations() if confirm.type is not None
-        }
+        own = {confirm.topic: confirm.type for confirm in self.confirmations() if confirm.type}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
         return (
             own
@@ -287,8 +291,7 @@ class Panel(Description):
         publisher."""
         needed = [source for command in self.commands for source in command.sources()]
         explicit = [source for source in self.monitored() if source.qos.reliability is not None]
-        strict = {condition.topic for condition in self.conditions}
-        strict |= {source.topic for source in (*needed, *explicit)}
+        strict = {source.topic for source in (*needed, *explicit)} | {c.topic for c in self.conditions}
         return frozenset(source.topic for source in self.monitored()) - strict
 
     def qos(self, topic: str) -> TopicQos:

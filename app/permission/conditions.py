@@ -88,7 +88,7 @@ def value_verdict(
         return refusal(condition, value, is_ambiguous=reading.is_ambiguous(condition.field))
     if condition.max_age_s is None:
         return PERMITTED
-    if reading.at < _fresh_since(robot, key):
+    if reading.at < fresh_since(robot, key):
         return locked("interlock_waiting", topic=topic)
     stale_at = reading.at + condition.max_age_s
     if now >= stale_at:
@@ -126,7 +126,7 @@ def _reading(condition: Condition, robot: RobotState, *, single_publisher: bool 
     return robot.reading(condition.topic).of_field(condition.field, lacking_s)
 
 
-def _fresh_since(robot: RobotState, key: str) -> float:
+def fresh_since(robot: RobotState, key: str) -> float:
     """From when on a received message is a new one, not one that was replayed on joining. Where a
     publisher is, or may be, transient local, that is known only some time after its first message."""
     joined_at = robot.settled_at + HISTORY_S

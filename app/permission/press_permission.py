@@ -7,7 +7,7 @@ it does not apply.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from app.errors import Cause
@@ -33,13 +33,15 @@ class ServerConditions:
     """Why the server itself locks a press.
 
     `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
-    whether the client has control. `who` is None in a question for all clients.
+    whether the client has control. `who` is None in a question for all clients. `inhibited`: the locks
+    by alarms, by the widgets' ids.
     """
 
     control: Verdict = PERMITTED
     log_lock: TextLike = ""
     ending: bool = False
     who: Principal | None = None
+    inhibited: Mapping[str, Verdict] = field(default_factory=dict, hash=False)
 
 
 NO_CONDITIONS: Final = ServerConditions()
@@ -90,6 +92,13 @@ CHECKS: Final = (
     Check(
         "command",
         lambda request: command_blocked(request.widget, request.robot, request.now),
+        alone=False,
+        alike=True,
+    ),
+    # Uniform buttons are those that no alarm locks.
+    Check(
+        "alarms",
+        lambda request: request.grounds.inhibited.get(request.widget.id),
         alone=False,
         alike=True,
     ),

@@ -15,7 +15,7 @@ ROLE_ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
 def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
     """The endpoints that the panel needs, as (role, ROS name). Without the topic of parameter events,
     which every node publishes."""
-    for condition in panel.conditions:
+    for condition in panel.named_conditions:
         yield "MP", condition.topic
     of_widgets = (end for widget in panel.widgets() for end in widget.endpoints())
     yield from sorted(of_widgets, key=lambda end: ROLE_ORDER[end[0]])

@@ -21,6 +21,7 @@ from app.interfaces import Interfaces, has_key
 from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of, possible_keys
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
+from app.panel.widgets.parameter import GET
 from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatus
 from app.robot.definitions import Difference, difference
@@ -84,12 +85,20 @@ class RobotState:
         self._keys |= {topic: keys[0] for topic, keys in self._shared.items()}
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
-        named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
+        # A node is there while its parameter services are.
+        nodes = [f"{alarm.node}/{GET[0]}" for alarm in panel.alarms if alarm.node]
+        named = (
+            *nodes,
+            *panel.listened(),
+            *panel.publications(),
+            *(n for _, n in needed),
+            ROSOUT_TOPIC,
+        )
         self.required_keys = frozenset(key for name in named for key in self.possible_keys(name))
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
-        self.conditions = {condition.id: condition for condition in panel.conditions}
+        self.conditions = {condition.id: condition for condition in panel.named_conditions}
         self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
         self.silent_publishers = SilentPublishers(self._condition_keys, traits)
         self.topic_publishers = TopicPublishers()

@@ -6,21 +6,21 @@ import logging
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from app.alarms.disk import AlarmDisk, Change, DiskEvents
 from app.alarms.engine import AlarmEngine, Transition
 from app.alarms.records import record_of
 from app.alarms.rows import AlarmRow, row_of, state_of
 from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms
-from app.alarms.sources import link_state
 from app.alarms.status import Moment
 from app.alarms.store import HistoryFilter, HistoryRow
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.runtime.robot_alarms import RobotAlarms
 
 log = logging.getLogger("kiosk.alarms")
 
@@ -62,7 +62,8 @@ class Alarms:
         self._fault: TextLike = ""
         self._shown = ShownAlarms()
         self._view: AlarmsView | None = NO_ALARMS  # None: to be made
-        self._listeners: list[Callable[[], None]] = []
+        self._robots: list[RobotAlarms] = []
+        self._lock_changes = 0
         self._show_timer: asyncio.TimerHandle | None = None
         self._shown_at = -math.inf
         self._slow_timer: asyncio.TimerHandle | None = None
@@ -71,13 +72,12 @@ class Alarms:
         self._waiters: list[tuple[int, asyncio.Future[None]]] = []
         self._stopped = False
 
-    def add_robot(
-        self, robot_id: str, robot: RobotState, on_shown: Callable[[], None]
-    ) -> "RobotAlarms":
-        """Adds a robot; `on_shown` is called when `view` has changed."""
+    def add_robot(self, robot_id: str, robot: RobotState) -> RobotAlarms:
+        """Adds a robot."""
         self.engine.add_robot(robot_id, robot)
-        self._listeners.append(on_shown)
-        return RobotAlarms(self, robot_id, robot)
+        robot_alarms = RobotAlarms(self.engine, robot_id, robot, self.evaluate)
+        self._robots.append(robot_alarms)
+        return robot_alarms
 
     async def start(self, folder: Path) -> None:
         """Loads the alarms that stood when the server ended, from a folder. Does nothing for a panel
@@ -141,6 +141,10 @@ class Alarms:
         except Exception:
             log.exception("alarms were not evaluated")
         self._plan()
+        if self.engine.lock_changes != self._lock_changes:
+            self._lock_changes = self.engine.lock_changes
+            for robot in self._robots:
+                robot.locks_changed.emit()
 
     def _plan(self) -> None:
         due = self.engine.due
@@ -239,8 +243,8 @@ class Alarms:
 
     def _notify(self) -> None:
         self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
-        for on_shown in self._listeners:
-            on_shown()
+        for robot in self._robots:
+            robot.shown.emit()
 
     # Restart, and a new file.
 
@@ -272,23 +276,3 @@ class Alarms:
             stands = alarm is not None and not alarm.is_unlisted
             record = record_of(alarm, at) if alarm and stands else None
             self._put(alarm_id, None, record, row_of(alarm, at) if alarm and stands else None)
-
-
-class RobotAlarms:
-    """What a robot's turn tells the alarms."""
-
-    def __init__(self, alarms: Alarms, robot_id: str, robot: RobotState) -> None:
-        self._alarms = alarms
-        self._robot_id = robot_id
-        self._robot = robot
-        self._link: tuple[Any, ...] = ()
-
-    def update(self, topics: Collection[str]) -> None:
-        """Messages arrived on topics with these keys, or something else has changed."""
-        engine = self._alarms.engine
-        engine.topics_changed(self._robot_id, topics)
-        link = link_state(self._robot, time.monotonic())
-        if link != self._link:
-            self._link = link
-            engine.robot_changed(self._robot_id)
-        self._alarms.evaluate()

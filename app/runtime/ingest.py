@@ -85,6 +85,8 @@ class Ingest:
         permitting = self._interlocks.keys() | {
             robot.key(confirmation.topic) for confirmation in panel.confirmations()
         }
+        self._conditions = frozenset(robot.key(condition.topic) for condition in panel.conditions)
+        permitting |= self._conditions
         self.lossless = permitting | robot.keyed_topics
         self.immediate = permitting | {*handlers.immediate}
         self._by_key: dict[str, list[SampleListener]] = {}
@@ -110,6 +112,8 @@ class Ingest:
                 passed = sample._replace(payload=payload, at=at, wall=wall, skipped_payloads=())
                 if self._ingest(key, passed, updates) == "now":
                     yield updates.step()
+                elif key in self._conditions:  # alarms see each value
+                    yield Updates(topics={key})
             change = self._ingest(key, sample, updates)
             updates.urgent |= change == "now"
             updates.other |= change == "soon"

@@ -15,8 +15,8 @@ from typing import Final
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import Reading
 from app.ros_logging import RobotLog
-from app.runtime.alarms import RobotAlarms
 from app.runtime.ingest import Ingest, Updates
+from app.runtime.robot_alarms import RobotAlarms
 from app.runtime.robot_commands import RobotCommands
 from app.transport.peer import Peer, RobotContext
 from app.view.refresh import ViewRefresher

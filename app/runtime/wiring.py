@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from app.alarms.published import PublishedAlarms
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
 from app.commands.alarm_acts import ALARM_ACTS
@@ -25,6 +26,7 @@ from app.runtime.alarms import Alarms
 from app.runtime.frames import Frames
 from app.runtime.ingest import Ingest
 from app.runtime.renewal import Renewal
+from app.runtime.robot_alarms import RobotAlarms
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.robot_session import RobotSession, SessionRecorder
 from app.runtime.turn import Turn
@@ -79,13 +81,25 @@ def wire_session(
         on_hand_over=signals.handed_over.emit,
     )
     alarms = server.alarms or Alarms(panel)
+    robot_alarms = alarms.add_robot(entry.id if entry else "", robot)
     sources = ViewSources(
-        control, operators_log, others, server.recordings, server.simulated, alarms.view
+        control,
+        operators_log,
+        others,
+        server.recordings,
+        server.simulated,
+        alarms.view,
+        robot_alarms.inhibited,
     )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
     press_guard = PressGuard(
-        publisher, control, operators_log, panel.press_expires_s, others.instance_ids
+        publisher,
+        control,
+        operators_log,
+        panel.press_expires_s,
+        others.instance_ids,
+        robot_alarms.inhibited,
     )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
     act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)
@@ -93,13 +107,20 @@ def wire_session(
     recorder = _recorder(server, context, entry)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
     commands = RobotCommands(context, peer, press_guard, press_log, recorder)
+    published_alarms = PublishedAlarms(
+        panel,
+        entry.id if entry else "",
+        context.interfaces,
+        robot.possible_keys,
+        robot.slices,
+        robot_alarms.entries_received,
+    )
     ingest = Ingest(
         panel,
         robot,
         commands.sample_handlers,
-        [robot.table_entries, LogListener(robot.log_lines), *recorders],
+        [robot.table_entries, LogListener(robot.log_lines), published_alarms, *recorders],
     )
-    robot_alarms = alarms.add_robot(entry.id if entry else "", robot, refresher.refresh_alarms)
     own_line = partial(_show_own_line, robot, refresher)
     session = RobotSession(
         context=context,
@@ -121,7 +142,7 @@ def wire_session(
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),
         recorders=recorders,
     )
-    _connect(signals, session)
+    _connect(signals, robot_alarms, session)
     return session
 
 
@@ -147,11 +168,13 @@ def _context(
     return RobotContext(panel, interfaces, robot, link, signals)
 
 
-def _connect(signals: RobotSignals, session: RobotSession) -> None:
+def _connect(signals: RobotSignals, robot_alarms: RobotAlarms, session: RobotSession) -> None:
     turn, refresher = session.turn, session.refresher
     signals.arrived.connect(turn.wake)
     signals.judging.connect(turn.run)
     signals.changed.connect(turn.changed)
+    robot_alarms.shown.connect(refresher.refresh_alarms)
+    robot_alarms.locks_changed.connect(turn.changed)
     signals.graph_read.connect(turn.on_graph_read)
     signals.late_reading.connect(turn.run_late_reading)
     signals.entries_decoded.connect(lambda key: refresher.refresh_values({key}))

@@ -137,7 +137,9 @@ def _hz(
         return rate_hz
     still = made and not any(signal.moving for signal in made)
     hz = OTHERS_HZ if still or type_name in SLOW else MOVING_HZ
-    locks = (interlock.max_age_s for interlock in fields.panel.conditions if interlock.topic == topic)
+    locks = (
+        interlock.max_age_s for interlock in fields.panel.named_conditions if interlock.topic == topic
+    )
     ages = [
         age for age in (*locks, *(shown_field.max_age_s for shown_field in shown)) if age is not None
     ]

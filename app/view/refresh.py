@@ -17,6 +17,7 @@ from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority import ControlAuthority
+from app.permission.verdict import Verdict
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.view.link_status import Lamp, LinkTimes
@@ -75,6 +76,7 @@ class ViewSources:
     recordings: Recorded | None = None
     simulated: bool = False
     alarms: Callable[[], AlarmsView] = no_alarms
+    inhibited: Callable[[], Mapping[str, Verdict]] = dict
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -89,6 +91,7 @@ class ViewSources:
             control_lock=self.control.lock,
             control_until=self.control.until,
             alarms=self.alarms(),
+            inhibited=self.inhibited(),
         )
 
 

@@ -81,7 +81,8 @@ class ViewContext(NamedTuple):
 
     `robots` has the lamp of each robot if the panel has several. `fault` is shown above the page,
     `log_lock` locks all commands; "" for none. `control_lock` locks for clients without control; time
-    alone changes `control` at `control_until` (monotonic seconds).
+    alone changes `control` at `control_until` (monotonic seconds). `inhibited` has the locks by alarms,
+    by the widgets' ids.
     """
 
     robots: Mapping[str, Lamp] = {}
@@ -92,6 +93,7 @@ class ViewContext(NamedTuple):
     control_lock: Verdict = PERMITTED
     control_until: float = math.inf
     alarms: AlarmsView = NO_ALARMS
+    inhibited: Mapping[str, Verdict] = {}
 
 
 ALONE: Final = ViewContext()  # one robot, its log is written, and control is not required
@@ -103,7 +105,9 @@ def build_view(
     """The view at `now` (monotonic seconds)."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
-    grounds = ServerConditions(log_lock=context.log_lock) if context.log_lock else NO_CONDITIONS
+    grounds = NO_CONDITIONS
+    if context.log_lock or context.inhibited:
+        grounds = ServerConditions(log_lock=context.log_lock, inhibited=context.inhibited)
     verdicts = permissions(panel, robot, now, passable, interlocks, grounds)
     failures: dict[str, Exception] = {}
     uniform = _uniform(panel, robot, now, verdicts, failures)

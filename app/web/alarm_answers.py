@@ -114,6 +114,7 @@ class AlarmAnswer(BaseModel):
     cause: str
     consequence: str
     action: str
+    details: str
     picture: str
     topic: str
     field: str

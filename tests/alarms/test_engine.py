@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.alarms import engine as engine_module
+from app.alarms import evaluation
 from app.alarms.engine import MAX_ENTRIES, MAX_EVALUATED, AlarmEngine, Transition
 from app.alarms.entries import entries_of
 from app.alarms.instance import Definition
@@ -109,9 +109,18 @@ class Cell:
         self.engine.topics_changed("", [key])
         self.engine.evaluate()
 
+    def publish_bool(self, topic: str, data: bool) -> None:
+        payload = INTERFACES.encode("std_msgs/msg/Bool", {"data": data})
+        key = self.robot.key(topic)
+        self.robot.update(key, Sample(payload, 1, self.now, self.now, BRIDGE))
+        self.engine.topics_changed("", [key])
+        self.engine.evaluate()
+
     def publish_entries(self, alarm: str, *rows: tuple[object, ...]) -> None:
         described = next(definition for definition in self.panel.alarms if definition.id == alarm)
-        self.engine.entries_received("", alarm, entries_of(described, rows), self.now)
+        if described.diagnostics:
+            rows = tuple((*row, ()) for row in rows)
+        self.engine.entries_received("", alarm, list(entries_of(described, rows)), self.now)
         self.engine.evaluate()
 
     def wait_until_due(self) -> float:
@@ -329,7 +338,7 @@ def test_an_evaluation_reads_only_alarms_that_may_have_changed(
         read.append(alarm.id)
         return read_source(alarm, *about)
 
-    monkeypatch.setattr(engine_module, "read_source", counted)
+    monkeypatch.setattr(evaluation, "read_source", counted)
     air.publish(4.5, "/air3")
     assert len(read) == len(air.transitions) == 500
     air.engine.robot_changed("")

@@ -212,6 +212,30 @@ def test_what_stood_is_not_known_after_a_kill_and_is_normal_when_it_is_heard(tmp
         assert listed(server) == {}
 
 
+def test_an_alarm_locks_its_controls_with_its_text_and_action(tmp_path: Path) -> None:
+    start = """
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Empty"
+message = {}
+[demo]"""
+    panel = PANEL.replace("[demo]", start).replace("latched = true", 'inhibits = ["start"]') % LOW
+    with demo_server(tmp_path, panel) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        lock = server.widget("start")
+        assert (lock["enabled"], lock["reason"]) == (False, "Alarm: Air was lost.")
+        refused = server.http.post("/widgets/start", json={"inputs": {}})
+        assert (refused.status_code, refused.json()["code"]) == (409, "alarm_inhibits")
+        assert act(server, "air_latched", "acknowledge", occurrence=1).status_code == 200
+        assert not server.widget("start")["enabled"]
+    with demo_server(tmp_path, panel.replace("4.5", "6.0")) as server:
+        until(lambda: server.widget("start")["enabled"], "the control opens")
+        assert server.http.post("/widgets/start", json={"inputs": {}}).status_code == 200
+
+
 def test_every_row_is_json_that_the_description_has(cell: Server) -> None:
     described = cell.http.get("/openapi.json").json()["components"]["schemas"]["AlarmAnswer"]
     (alarm, _) = listed(cell).values()

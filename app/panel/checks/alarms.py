@@ -7,6 +7,7 @@ from typing import Any, Final
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces, has_key
 from app.panel.alarm import DIAGNOSTIC_ARRAY, LIMIT_KEYS, Alarm, AlarmList, SourceKind
+from app.panel.checks.conditions import condition_faults
 from app.panel.checks.types import field_faults, type_fault
 from app.panel.constants import NUMBERS
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
@@ -16,13 +17,14 @@ from app.panel.values import number_text
 
 RESERVED: Final = "panel_"  # begins the ids of the panel's own alarms
 NO_SOURCE: Final = (
-    "has no source: give it topic, type and a limit (low_low, low, high, high_high), or stale_s, node, "
-    "lost, diagnostics or [alarm.list]"
+    "has no source: give it topic, type and a limit (low_low, low, high, high_high), or [alarm.when], "
+    "stale_s, node, lost, diagnostics or [alarm.list]"
 )
 TOPIC: Final = ("topic", "type", "qos")
 # The keys that only some sources read.
 OWN_KEYS: Final[Mapping[SourceKind, tuple[str, ...]]] = {
     "limits": (*TOPIC, "field", "unit", "max_age_s", "deadband", "critical_priority", *LIMIT_KEYS),
+    "condition": ("when",),
     "stale": (*TOPIC, "stale_s"),
     "node": ("node",),
     "lost": ("lost",),
@@ -42,9 +44,23 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
             message = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
             yield Fault(f"{place}.id", f"{message}: choose another id")
         yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
+        yield from _stop_faults(place, alarm, panel)
+        for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
+            if condition is not None:
+                yield from condition_faults(f"{place}.{key}", condition, interfaces)
         yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
         yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
         yield from _source_faults(place, alarm, interfaces, panel.language)
+
+
+def _stop_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
+    """A stop button is never locked by an alarm."""
+    stops = {widget.id for widget in panel.stops}
+    for i, widget in enumerate(alarm.inhibits):
+        if widget in stops:
+            yield Fault(
+                f"{place}.inhibits[{i}]", f'"{widget}" stops the machine: an alarm may not lock it'
+            )
 
 
 def _reference_faults(
@@ -177,6 +193,7 @@ def _no_faults(*_: Any) -> Iterator[Fault]:
 
 CHECKS: Final[Mapping[SourceKind, Callable[[str, Alarm, Interfaces, str], Iterator[Fault]]]] = {
     "limits": _limit_faults,
+    "condition": _no_faults,
     "stale": _stale_faults,
     "node": _no_faults,
     "lost": _no_faults,

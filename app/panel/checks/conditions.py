@@ -29,7 +29,7 @@ NEEDS: Final = "needs a bool, or conditions: equals, not_equals, min and max, or
 
 def condition_id_faults(panel: Panel) -> Iterator[Fault]:
     """Interlocks and conditions are named in the same places."""
-    ids = [condition.id for condition in panel.conditions]
+    ids = [condition.id for condition in panel.named_conditions]
     for number, condition in enumerate(panel.own_conditions, len(panel.interlocks)):
         if condition.id in ids[:number]:
             message = f'"{condition.id}" is already the id of an interlock or a condition'

@@ -5,7 +5,6 @@ from typing import Final
 
 from app.errors import Note
 from app.interfaces import Interfaces
-from app.panel.alarm import NOT_RAISED
 from app.panel.checks.fit import fit_notes
 from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
@@ -19,7 +18,6 @@ MOVING: Final = (HoldCommand, Action)
 
 def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """All notes with their places in the panel file, without ids and lines."""
-    yield from _alarm_notes(panel)
     yield from _stop_notes(panel)
     yield from _unbounded_trust_notes(panel)
     yield from _embedded_controls_notes(panel)
@@ -29,13 +27,6 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from fit_notes(panel)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)
-
-
-def _alarm_notes(panel: Panel) -> Iterator[Note]:
-    """Alarms whose source is not read yet, or that don't lock yet."""
-    for i, alarm in enumerate(panel.alarms):
-        if alarm.source in ("node", "diagnostics", "list") or alarm.inhibits:
-            yield Note(f"alarm[{i}]", NOT_RAISED)
 
 
 def _stop_notes(panel: Panel) -> Iterator[Note]:

@@ -16,7 +16,7 @@ from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
-from app.panel.condition import NamedCondition
+from app.panel.condition import Condition
 from app.panel.faults.wording import list_names
 from app.panel.machine_state import STATE_ID
 from app.panel.model import Panel, RobotEntry
@@ -139,7 +139,7 @@ def _check_context(
         inputs={w.id: w for w in widgets if isinstance(w, Input)},
         all_inputs=[w.id for w in panel.widgets() if isinstance(w, Input)],
         interlocks=[interlock.id for interlock in panel.interlocks],
-        conditions=[condition.id for condition in panel.conditions],
+        conditions=[condition.id for condition in panel.named_conditions],
         types=panel.subscriptions(),
         faulty=faulty,
         pages=[page.id for page in panel.pages],
@@ -253,12 +253,14 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     """Faults of topics with several types or QoS in the panel. Places that are `reported` already are
     skipped: their type may be the mistake."""
-    places: list[tuple[str, NamedCondition | TopicWidget | TopicSource | Confirm]] = []
+    places: list[tuple[str, Condition | TopicWidget | TopicSource | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", interlock) for i, interlock in enumerate(panel.interlocks)]
     places += [(f"condition[{c}]", condition) for c, condition in enumerate(panel.own_conditions)]
     for i, alarm in enumerate(panel.alarms):
         places.extend((f"alarm[{i}]", source) for source in alarm.sources())
+        conditions = {"when": alarm.when, "while": alarm.suppressed_while}
+        places.extend((f"alarm[{i}].{key}", part) for key, part in conditions.items() if part)
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())
@@ -267,7 +269,7 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
             places.append((place, widget))
         if isinstance(widget, PublishPress) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
-    firsts: dict[str, tuple[str, NamedCondition | TopicWidget | TopicSource | Confirm]] = {}
+    firsts: dict[str, tuple[str, Condition | TopicWidget | TopicSource | Confirm]] = {}
     for place, topic_user in (*places, *confirms):
         above, first = firsts.setdefault(topic_user.topic, (place, topic_user))
         if topic_user.type != first.type:

@@ -45,7 +45,9 @@ class PanelFields:
         self.confirmed = {
             (confirmation.topic, confirmation.field) for confirmation in panel.confirmations()
         }
-        locked = dict.fromkeys((interlock.topic, interlock.field) for interlock in panel.conditions)
+        locked = dict.fromkeys(
+            (interlock.topic, interlock.field) for interlock in panel.named_conditions
+        )
         self.offsets: Mapping[tuple[str, str], float] = {
             field: offset_of(number, len(locked)) for number, field in enumerate(locked)
         }
@@ -96,7 +98,7 @@ class _Field:
             return None
         interlocks = [
             interlock
-            for interlock in self._panel_fields.panel.conditions
+            for interlock in self._panel_fields.panel.named_conditions
             if (interlock.topic, interlock.field) == (self._topic, self._path)
         ]
         if interlocks:

@@ -1,0 +1,123 @@
+"""Alarms that a robot publishes: every message of diagnostics and lists, decoded in slices.
+
+Messages are queued as they arrive. The queue, the entries of a message and the alarms are bounded, and
+no size that a message claims is trusted.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from app.alarms.entries import DIAGNOSTIC_FIELDS, AlarmEntry, entries_of
+from app.bounded import BoundedQueue
+from app.errors import DecodeError
+from app.interfaces import Interfaces, RowReader, Rows, Walk
+from app.panel.alarm import Alarm
+from app.panel.fault_catalogue import Catalogue, read_catalogue
+from app.panel.model import Panel
+from app.robot.sample import Sample
+from app.robot.slices import Slices
+
+MAX_QUEUED: Final = 256  # messages of one alarm's topic; the oldest go
+MAX_QUEUED_BYTES: Final = 8_000_000
+MAX_STATUSES: Final = 2_000  # of one message of diagnostics
+STATUS: Final = "status"  # the field of a DiagnosticArray
+
+# (the alarm's id, its entries, when they were received in monotonic seconds, whether the whole list was
+# read)
+OnEntries = Callable[[str, Sequence[AlarmEntry], float, bool], None]
+
+
+@dataclass(slots=True, eq=False)
+class _Source:
+    """One alarm of the panel file with what it has received."""
+
+    alarm: Alarm
+    reader: RowReader
+    catalogue: Catalogue
+    queued: BoundedQueue[Sample] = field(
+        default_factory=lambda: BoundedQueue(MAX_QUEUED, MAX_QUEUED_BYTES)
+    )
+    walk: tuple[Walk[Rows], Sample] | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        return self.walk is not None or len(self.queued) > 0
+
+    def decode_one(self, slices: Slices, until: float) -> tuple[Rows, Sample] | None:
+        """Decodes the oldest message, or as much of it as the time allows: its rows when it is done."""
+        if self.walk is None:
+            sample = self.queued.take()
+            self.walk = self.reader.walk(bytes(sample.payload)), sample
+        walk, sample = self.walk
+        try:
+            rows = slices.read_until(walk, until)
+        except DecodeError:
+            self.walk = None  # counted where the topic is read
+            return None
+        if rows is None:
+            return None
+        self.walk = None
+        return rows, sample
+
+
+def _sources(panel: Panel, robot: str, interfaces: Interfaces) -> Iterator[_Source]:
+    for alarm in panel.alarms:
+        type_name, listed = alarm.topic_type, alarm.listed
+        if not alarm.is_for(robot or None) or type_name is None:
+            continue
+        if listed is not None:
+            path, fields, most = listed.field, listed.own_fields, listed.entries_read
+        elif alarm.diagnostics:
+            path, fields, most = STATUS, DIAGNOSTIC_FIELDS, MAX_STATUSES
+        else:
+            continue
+        reader = interfaces.row_reader(type_name, path, fields, most)
+        catalogue: Catalogue = {}
+        if listed is not None and listed.catalogue is not None:
+            catalogue = read_catalogue(listed.catalogue, panel.language)
+        yield _Source(alarm, reader, catalogue)
+
+
+class PublishedAlarms:
+    """The alarms that one robot publishes; a `SampleListener`. Used on the event loop only."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        robot: str,
+        interfaces: Interfaces,
+        possible_keys: Callable[[str], Sequence[str]],
+        slices: Slices,
+        on_entries: OnEntries,
+    ) -> None:
+        """`robot` is its id, "" for the only one. `possible_keys` returns the keys of a topic."""
+        self._slices = slices
+        self._on_entries = on_entries
+        self._scheduled = False
+        self._sources = list(_sources(panel, robot, interfaces))
+        by_key: dict[str, list[_Source]] = {}
+        for source in self._sources:
+            for key in possible_keys(source.alarm.topic_name or ""):
+                by_key.setdefault(key, []).append(source)
+        self._by_key: Mapping[str, Sequence[_Source]] = by_key
+        self.keys = frozenset(by_key)
+
+    def record_sample(self, key: str, sample: Sample) -> None:
+        """A sample was received: it is decoded in the next turns."""
+        for source in self._by_key[key]:
+            source.queued.add(sample, len(sample.payload))
+        if not self._scheduled:
+            self._scheduled = True
+            self._slices.schedule(self._decode)
+
+    def _decode(self, until: float) -> bool:
+        """Decodes until a time (monotonic seconds); returns whether nothing is left."""
+        for source in self._sources:
+            if source.is_pending and (decoded := source.decode_one(self._slices, until)):
+                rows, sample = decoded
+                is_whole = rows.total <= len(rows.values)
+                entries = list(entries_of(source.alarm, rows.values, source.catalogue))
+                self._on_entries(source.alarm.id, entries, sample.at, is_whole)
+        self._scheduled = any(source.is_pending for source in self._sources)
+        return not self._scheduled

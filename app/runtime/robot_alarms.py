@@ -1,0 +1,68 @@
+"""The alarms as a robot's session has them: what its turn tells them, and which controls they lock."""
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+from app.alarms.engine import AlarmEngine
+from app.alarms.entries import AlarmEntry
+from app.alarms.instance import AlarmInstance
+from app.alarms.sources import link_state
+from app.i18n import say
+from app.permission.verdict import Verdict, locked
+from app.robot.state import RobotState
+from app.transport.robot_signals import Signal
+
+
+class RobotAlarms:
+    """The alarms of one robot. Used on the event loop only."""
+
+    def __init__(
+        self, engine: AlarmEngine, robot_id: str, robot: RobotState, evaluate: Callable[[], None]
+    ) -> None:
+        """`evaluate` is called when alarms may be due."""
+        self.shown = Signal[[]]()  # the alarms that pages show have changed
+        self.locks_changed = Signal[[]]()  # alarms lock other controls than before
+        self._engine = engine
+        self._robot_id = robot_id
+        self._robot = robot
+        self._evaluate = evaluate
+        self._link: tuple[Any, ...] = ()
+        self._locks: Mapping[str, Verdict] = {}
+        self._locks_version = -1
+
+    def update(self, topics: Collection[str]) -> None:
+        """Messages arrived on topics with these keys, or something else has changed."""
+        self._engine.topics_changed(self._robot_id, topics)
+        link = link_state(self._robot, time.monotonic())
+        if link != self._link:
+            self._link = link
+            self._engine.robot_changed(self._robot_id)
+        self._evaluate()
+
+    def entries_received(
+        self, alarm_id: str, entries: Sequence[AlarmEntry], at: float, is_whole: bool
+    ) -> None:
+        """The robot published alarms itself."""
+        self._engine.entries_received(self._robot_id, alarm_id, entries, at, is_whole)
+        self._evaluate()
+
+    def inhibited(self) -> Mapping[str, Verdict]:
+        """The locks by alarms, by the widgets' ids."""
+        if self._locks_version != self._engine.lock_changes:
+            self._locks_version = self._engine.lock_changes
+            inhibited = self._engine.inhibited(self._robot_id)
+            self._locks = {widget: _lock(alarm) for widget, alarm in inhibited.items()}
+        return self._locks
+
+
+def _lock(alarm: AlarmInstance) -> Verdict:
+    """The lock with the alarm's text and what to do."""
+    name, action = alarm.text, alarm.action
+    _, is_unknown, _ = alarm.lock
+    if is_unknown:
+        return locked("alarm_inhibits_unknown", name=name)
+    if not action:
+        return locked("alarm_inhibits", name=name)
+    reason = say("alarm_inhibits_action", name=name, action=action)
+    return Verdict(False, "alarm_inhibits", reason)

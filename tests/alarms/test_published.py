@@ -1,0 +1,90 @@
+"""Messages of diagnostics and lists become alarms, whatever a robot sends."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from app.alarms.entries import AlarmEntry
+from app.alarms.published import MAX_QUEUED, MAX_STATUSES, PublishedAlarms
+from app.i18n import render
+from app.panel import load_panel
+from app.panel.model import Panel
+from app.robot.sample import Sample
+from app.robot.slices import Slices
+from tests.alarms.test_engine import FAULTS, HEALTH, PANEL
+from tests.support.builders import INTERFACES
+
+ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+
+
+class Received:
+    """What a robot's messages become."""
+
+    def __init__(self, panel: Panel) -> None:
+        self.entries: list[AlarmEntry] = []
+        self.whole: list[bool] = []
+        self.listener = PublishedAlarms(
+            panel, "", INTERFACES, lambda topic: [topic.lstrip("/")], Slices(), self.receive
+        )
+
+    def receive(self, _: str, entries: Sequence[AlarmEntry], __: float, is_whole: bool) -> None:
+        self.entries += entries
+        self.whole.append(is_whole)
+
+    def send(self, *statuses: Mapping[str, Any], topic: str = "diagnostics") -> None:
+        self.send_bytes(INTERFACES.encode(ARRAY, {"status": list(statuses)}), topic)
+
+    def send_bytes(self, payload: bytes, topic: str = "diagnostics") -> None:
+        self.listener.record_sample(topic, Sample(payload, 1, 0.0, 0.0, "b1"))
+
+
+def received(folder: Path, alarms: str) -> Received:
+    path = folder / "cell.toml"
+    path.write_text(PANEL + alarms)
+    return Received(load_panel(path))
+
+
+def test_a_status_has_its_message_and_key_values(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    values = [{"key": "rpm", "value": "1200"}, {"key": "load", "value": "80 %"}]
+    robot.send(
+        {"name": "motor 7", "level": 2, "message": "Hot\x1b[31m", "values": values},
+        {"name": "lamp", "level": 2, "message": "Dark"},
+    )
+    (entry,) = robot.entries
+    assert (entry.name, entry.level, entry.text) == ("motor 7", 2, "Hot")
+    assert entry.details == "rpm: 1200, load: 80 %"
+
+
+def test_a_message_with_more_statuses_than_are_read_is_bounded(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    robot.send(*({"name": f"motor {i}", "level": 1} for i in range(MAX_STATUSES + 3)))
+    assert len(robot.entries) == MAX_STATUSES
+    assert robot.whole == [False]
+
+
+def test_bytes_that_are_no_message_raise_nothing(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    whole = INTERFACES.encode(ARRAY, {"status": [{"name": "motor 1", "level": 2}] * 3})
+    huge = whole[:16] + b"\xff\xff\xff\x7f" + whole[20:]
+    for payload in (b"", whole[:-5], huge, *(whole[:n] for n in range(0, len(whole), 7))):
+        robot.send_bytes(payload)
+    robot.send({"name": "motor 1", "level": 2})
+    assert {entry.name for entry in robot.entries} <= {"motor 1"}
+    assert robot.entries[-1].level == 2
+    assert MAX_QUEUED > 1
+
+
+def test_a_fault_catalogue_has_texts_and_actions_by_code(tmp_path: Path) -> None:
+    catalogue = "code,text,text:ja,cause,action,action:ja\nE1,Axis hot,軸過熱,Fan,Clean it,掃除する\n"
+    (tmp_path / "faults.csv").write_text(catalogue)
+    robot = received(tmp_path, FAULTS + 'catalogue = "faults.csv"\n')
+    robot.send(
+        {"hardware_id": "E1", "message": "?", "level": 2},
+        {"hardware_id": "E9", "message": "Other", "level": 1},
+        topic="faults",
+    )
+    known, other = robot.entries
+    assert (render(known.text, "ja"), render(known.action, "ja")) == ("軸過熱", "掃除する")
+    assert (render(known.cause, "de"), known.priorities) == ("Fan", (1,))
+    assert (other.text, other.action, other.priorities) == ("Other", "", (3,))
