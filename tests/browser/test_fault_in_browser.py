@@ -6,7 +6,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browser.browsers import opened
-from tests.support.browser.pages import widget
+from tests.support.browser.pages import place, widget
+from tests.support.browser.touch import SIZES
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
 
@@ -57,3 +58,16 @@ def test_a_visitor_clears_the_fault_of_an_open_door_by_the_screen(cell: Server, 
     expect(checks).to_have_attribute("data-shape", "met")
     press(tab, "start")
     expect(state).to_contain_text("RUNNING")
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_the_buttons_of_the_cell_are_whole_on_each_screen(
+    cell: Server, tab: Page, width: int, height: int
+) -> None:
+    tab.set_viewport_size({"width": width, "height": height})
+    tab.goto(f"{cell.url}/pages/cell")
+    assert place(widget(tab, "plan").locator(".board"))["height"] > 40
+    for name in ("plan", "pause"):
+        box = place(widget(tab, name))
+        assert box["y"] + box["height"] <= height
+        assert box["x"] + box["width"] <= width
