@@ -76,8 +76,8 @@ def act(server: Server, alarm: str, act: str, **body: Any) -> httpx.Response:
 
 
 def history(server: Server, **query: Any) -> dict[str, Any]:
-    found: dict[str, Any] = server.http.get("/alarms", params={"history": "true", **query}).json()
-    return found
+    response: dict[str, Any] = server.http.get("/alarms", params={"history": "true", **query}).json()
+    return response
 
 
 def test_an_alarm_is_listed_with_its_text_and_value_in_the_readers_language(cell: Server) -> None:
@@ -183,8 +183,8 @@ def test_the_history_has_pages_and_a_search(cell: Server) -> None:
     second = history(cell, limit=2, before=first["older"])
     assert {row["id"] for row in second["history"]} == {"air_low", "air_latched"}
     assert second["history"][0]["seq"] < first["history"][-1]["seq"]
-    found = history(cell, text="was lost")["history"]
-    assert [(row["id"], row["text"], row["priority"]) for row in found] == [
+    events = history(cell, text="was lost")["history"]
+    assert [(row["id"], row["text"], row["priority"]) for row in events] == [
         ("air_latched", "Air was lost", 1)
     ]
 

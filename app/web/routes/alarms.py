@@ -146,8 +146,8 @@ async def acknowledge(request: Request, state: CurrentState) -> Response:
 )
 async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
     is_form, content = await _body(request)
-    given = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
-    body = as_model(AlarmActBody, given if is_form else content)
+    filled = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
+    body = as_model(AlarmActBody, filled if is_form else content)
     return await _answer(request, state, act, {alarm: body}, content if is_form else None)
 
 
