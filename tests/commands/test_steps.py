@@ -127,6 +127,15 @@ def test_step_without_a_known_value_is_locked_with_a_reason() -> None:
     assert desk.sent() == []
 
 
+@pytest.mark.parametrize("speed", [0.0, 100.0])
+def test_step_at_a_limit_is_not_locked_and_a_value_without_an_age_stays(speed: float) -> None:
+    desk = Desk(value={"topic": "/speed", "type": FLOAT})
+    desk.reports(speed)
+    desk.now += 1e6
+    assert desk.reason() is None
+    assert desk.shown()["enabled"]
+
+
 def test_step_locks_if_its_value_is_missing_in_the_message() -> None:
     source = {"topic": "/speeds", "type": FLOATS, "field": "data[1]"}
     desk = Desk(value=source)
