@@ -6,11 +6,12 @@ from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
-from app.i18n import TextLike
+from app.i18n import PanelText, TextLike
 from app.interfaces.validation import format_value
 from app.panel.base import Description, FieldPath, Id, Label, Seconds, TopicName, TopicQos, Type
 from app.panel.widgets.numbers import Unit
 
+VALUE: Final = "{value}"  # in `own_sentence`: the value that does not meet the condition
 COMPARISONS: Final = ("equals", "not_equals", "min", "max", "one_of")
 
 
@@ -59,6 +60,11 @@ class Condition(Description):
     def name(self) -> TextLike:
         """What sentences call it."""
         return self.label or self.topic
+
+    @property
+    def own_sentence(self) -> str | PanelText | None:
+        """The panel file's sentence for a value that does not meet the condition, if it has one."""
+        return None
 
     @cached_property
     def comparisons(self) -> Mapping[str, Any]:

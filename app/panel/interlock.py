@@ -2,17 +2,25 @@
 
 from typing import ClassVar, Literal
 
-from app.i18n import TextLike
+from app.i18n import PanelText, TextLike
+from app.panel.base import Label
 from app.panel.condition import NamedCondition
 
 
 class Interlock(NamedCondition):
-    """A condition that permits the commands which name it, and locks them while it is not met."""
+    """A condition that permits the commands which name it, and locks them while it is not met.
+    `locked` is its own sentence then, and `picture` shows what to do."""
 
     noun: ClassVar[str] = "an interlock"
 
     require_publisher: bool = False
     publishers: Literal["any", "one"] = "any"
+    locked: Label | None = None
+    picture: str | None = None
+
+    @property
+    def own_sentence(self) -> str | PanelText | None:
+        return self.locked
 
     @property
     def name(self) -> TextLike:

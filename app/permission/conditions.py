@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.i18n import PanelText, Text, TextLike, joined, number, render, say
-from app.i18n.values import after_space, with_unit
+from app.i18n.values import after_space, each_language, filled_in, together, with_unit
 from app.interfaces import has_key
-from app.panel.condition import Condition
+from app.panel.condition import VALUE, Condition
 from app.panel.number_range import decimal_text, shortest_float
 from app.panel.values import same_value
 from app.permission.mismatches import topic_mismatch
@@ -108,9 +108,26 @@ def refusal(condition: Condition, value: Any, *, is_ambiguous: bool = False) -> 
         return locked("interlock_field_ambiguous", field=condition.field, topic=condition.topic)
     if value is None:
         return locked("interlock_field_missing", field=condition.field, topic=condition.topic)
-    if not condition.comparisons:
-        return locked("interlock_not_permitted", name=condition.name)
-    return Verdict(False, "interlock_condition_unmet", unmet(condition, value))
+    sentence = _own_sentence(condition, value)
+    if condition.comparisons:
+        return Verdict(False, "interlock_condition_unmet", sentence or unmet(condition, value))
+    if sentence is not None:
+        return Verdict(False, "interlock_not_permitted", sentence)
+    return locked("interlock_not_permitted", name=condition.name)
+
+
+def _own_sentence(condition: Condition, value: Any) -> TextLike | None:
+    """The panel file's sentence for a value that does not meet the condition, if it has one."""
+    sentence = condition.own_sentence
+    if sentence is None or not any(VALUE in text for text in each_language(sentence).values()):
+        return sentence
+    value_text = _received_text(condition, value, need(condition))
+
+    def fill(text: str) -> TextLike:
+        before, place, after = text.partition(VALUE)
+        return together([before, value_text, after]) if place else text
+
+    return filled_in(sentence, fill) if isinstance(sentence, PanelText) else fill(sentence)
 
 
 def stale(topic: str, field: str, max_age_s: float) -> Verdict:

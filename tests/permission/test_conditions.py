@@ -1,14 +1,16 @@
 """The state of a condition without an interlock: its value, what the value must be, and the verdict."""
 
 import math
+from collections.abc import Mapping
 
 import pytest
 
 from app.i18n import TextLike, render
 from app.panel.condition import Condition
 from app.panel.constants import resolve_condition
+from app.panel.interlock import Interlock
 from app.panel.model import Panel
-from app.permission.conditions import ConditionState, condition_state
+from app.permission.conditions import ConditionState, condition_state, refusal
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.verdict import Verdict, locked
 from app.robot.state import RobotState, Sample
@@ -37,6 +39,11 @@ def air(**keys: object) -> Condition:
     """An air pressure of 5 bar or more."""
     pressure = {"label": "Air pressure", "topic": ENABLED, "type": FLOAT, "min": 5, "unit": "bar"}
     return Condition.model_validate(pressure | keys)
+
+
+def air_interlock(sentence: object) -> Interlock:
+    keys = {"id": "air", "topic": ENABLED, "type": FLOAT, "min": 5, "unit": "bar", "locked": sentence}
+    return Interlock.model_validate(keys)
 
 
 def panel_on(type_name: str, comparison: Table = NOTHING) -> Panel:
@@ -189,3 +196,32 @@ def test_an_interlock_has_the_verdict_of_its_condition(value: bool, age: float) 
     condition = Condition(topic=ENABLED, label="Operation", max_age_s=2.0)
     verdict = interlock_verdict(panel.interlocks[0], robot, NOW + age)
     assert state_of(condition, robot, NOW + age).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("sentence", "english", "german"),
+    [
+        ("Air is low.", "Air is low.", "Air is low."),
+        ("Air is at {value}.", "Air is at 4.5 bar.", "Air is at 4,5 bar."),
+        ({"en": "Air: {value}", "de": "Ventil öffnen."}, "Air: 4.5 bar", "Ventil öffnen."),
+    ],
+)
+def test_a_panels_own_sentence_is_the_reason(
+    sentence: str | Mapping[str, str], english: str, german: str
+) -> None:
+    verdict = refusal(air_interlock(sentence), 4.5)
+    assert verdict.code == "interlock_condition_unmet"
+    assert verdict.reason is not None
+    assert (render(verdict.reason), render(verdict.reason, "de")) == (english, german)
+
+
+def test_a_bools_own_sentence_keeps_its_code() -> None:
+    verdict = refusal(Interlock(id="guard", topic="/guard", locked="Close the guard door."), False)
+    assert verdict == Verdict(False, "interlock_not_permitted", "Close the guard door.")
+
+
+def test_a_panels_own_sentence_is_only_for_a_value_that_is_known() -> None:
+    state = state_of(
+        Interlock(id="guard", topic=ENABLED, locked="Close the guard door."), robot_there(small_panel())
+    )
+    assert state.verdict.code == "interlock_waiting"

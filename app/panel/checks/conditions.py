@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from app.errors import Fault, FieldError
+from app.i18n.values import each_language
 from app.interfaces import INTEGER_RANGES, Interfaces, Type
 from app.interfaces.validation import format_value, scalar_check, unknown_constant
 from app.panel.checks.types import field_faults
-from app.panel.condition import Condition
+from app.panel.condition import VALUE, Condition
 from app.panel.constants import (
     NUMBERS,
     comparison_value,
@@ -48,6 +49,7 @@ def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -
     """Faults of one condition, which is the table at `place`."""
     if condition.qos.reliability == "best_effort" and condition.max_age_s is None:
         yield Fault(f"{place}.max_age_s", BEST_EFFORT)
+    yield from _sentence_faults(place, condition)
     faults = list(field_faults(place, condition.type, condition.field, interfaces))
     yield from faults
     if faults:
@@ -61,6 +63,17 @@ def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -
         yield Fault(f"{place}.field", reason)
     else:
         yield from _comparison_faults(place, condition, kind, interfaces)
+
+
+def _sentence_faults(place: str, condition: Condition) -> Iterator[Fault]:
+    """Faults of the panel file's own sentence for a value that does not meet the condition."""
+    sentence = condition.own_sentence
+    texts = each_language(sentence).values() if sentence is not None else ()
+    for text in texts:
+        if re.search("[{}]", text.replace(VALUE, "", 1)):
+            message = f'"{text}" may have {VALUE} once and no other braces, like "Air is at {VALUE}."'
+            yield Fault(f"{place}.locked", message)
+            return
 
 
 def _comparison_faults(
