@@ -52,6 +52,8 @@ class Alarms:
         self._panel = panel
         self.engine = AlarmEngine(panel, now, self._receive)
         self.raised = 0  # since the start
+        self.acknowledged = 0  # since the start
+        self.acknowledge_s = 0.0  # from the raises to these acknowledgements together
         self._loop = asyncio.get_running_loop()
         self._disk: AlarmDisk | None = None
         self._loaded: asyncio.Future[None] = self._loop.create_future()
@@ -169,6 +171,9 @@ class Alarms:
             if after.occurrence != before.occurrence:
                 self.raised += 1
                 self._shown.count_raise(transition.at.monotonic)
+            if before.raised_at and after.is_acknowledged and transition.act == "acknowledge":
+                self.acknowledged += 1
+                self.acknowledge_s += transition.at.monotonic - before.raised_at.monotonic
             alarm = self.engine.alarms[transition.id]
             record = record_of(alarm, transition.at)
             row = HistoryRow(

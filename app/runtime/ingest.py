@@ -88,7 +88,9 @@ class Ingest:
         self._conditions = frozenset(robot.key(condition.topic) for condition in panel.conditions)
         permitting |= self._conditions
         self.lossless = permitting | robot.keyed_topics
-        self.immediate = permitting | {*handlers.immediate}
+        published = (alarm for alarm in panel.alarms if alarm.diagnostics or alarm.listed)
+        alarming = {key for alarm in published for key in robot.possible_keys(alarm.topic_name or "")}
+        self.immediate = permitting | alarming | {*handlers.immediate}
         self._by_key: dict[str, list[SampleListener]] = {}
         for listener in listeners:
             for key in listener.keys:

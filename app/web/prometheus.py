@@ -1,11 +1,18 @@
 """The counts in Prometheus's text format, gathered when it asks."""
 
+from collections import Counter
 from collections.abc import Iterator
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    Metric,
+    SummaryMetricFamily,
+)
 from prometheus_client.registry import Collector
 
+from app.runtime.alarms import Alarms
 from app.runtime.fleet import Fleet
 from app.web.metrics import Metrics
 
@@ -34,6 +41,26 @@ class _Of(Collector):
         yield GaugeMetricFamily("kiosk_streams", "Open event streams", value=metrics.streams.count)
         if metrics.fleet is not None:
             yield from _of_fleet(metrics.fleet)
+            yield from _of_alarms(metrics.fleet.alarms)
+
+
+def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
+    listed = GaugeMetricFamily(
+        "kiosk_alarms", "Alarms that are not normal, or shelved", labels=["priority", "state"]
+    )
+    counts = Counter((str(row["priority"]), row["state"]) for row in alarms.rows())
+    for (priority, state), count in sorted(counts.items()):
+        listed.add_metric([priority, state], count)
+    yield listed
+    yield CounterMetricFamily(
+        "kiosk_alarms_raised", "How often alarms were raised", value=alarms.raised
+    )
+    yield SummaryMetricFamily(
+        "kiosk_alarm_acknowledge_seconds",
+        "From the raise of an alarm to its acknowledgement",
+        count_value=alarms.acknowledged,
+        sum_value=alarms.acknowledge_s,
+    )
 
 
 def _of_fleet(fleet: Fleet) -> Iterator[Metric]:

@@ -124,6 +124,14 @@ def test_an_act_is_idempotent_checked_and_logged(cell: Server) -> None:
     assert "Acknowledged: Air pressure low." in page
 
 
+def test_metrics_count_alarms_raises_and_times_to_acknowledge(cell: Server) -> None:
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    text = cell.http.get("/metrics").text
+    assert 'kiosk_alarms{priority="1",state="active"} 1.0' in text
+    assert "kiosk_alarms_raised_total 2.0" in text
+    assert "kiosk_alarm_acknowledge_seconds_count 1.0" in text
+
+
 def test_shelving_has_a_reason_and_an_end(cell: Server) -> None:
     until_text = (datetime.now(UTC) + timedelta(minutes=10)).isoformat()
     assert act(cell, "air_low", "shelve", until=until_text).json()["code"] == "alarm_reason_missing"
