@@ -34,6 +34,7 @@ class SourceReading(NamedTuple):
 
 
 UNKNOWN: Final = SourceReading()
+CONNECTS_WITHIN_S: Final = 10.0  # after the start of the server
 CATCHING_UP: Final = "link_catching_up"  # for a moment, after the event loop stalled
 
 
@@ -102,10 +103,13 @@ def _read_age(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> S
     return SourceReading(met=True) if now >= stale_at else SourceReading(met=False, until=stale_at)
 
 
-def _read_loss(alarm: Alarm, robot: RobotState, _: float, __: float) -> SourceReading:
+def _read_loss(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
+    """Whether the link is lost; unknown while the server connects after its start."""
     lost = not robot.link_up
     if alarm.lost == "robot":
         lost = lost or not robot.graph.peers or robot.graph.has_silent_peer or not robot.is_responding
+    if lost and now < began_at + CONNECTS_WITHIN_S:
+        return SourceReading(until=began_at + CONNECTS_WITHIN_S)
     return SourceReading(met=lost)
 
 
