@@ -198,7 +198,15 @@ async def _app_state(
         static_files, templates = shipped_path("static"), shipped_path("templates")
         require_files(static_files, templates)
         own = (panel.picture_files, panel.styles, panel.templates)
-        assets = load_assets(static_files, templates, panel.mm_per_px, kinds, *own, panel.brand)
+        assets = load_assets(
+            static_files,
+            templates,
+            panel.mm_per_px,
+            kinds,
+            *own,
+            panel.brand,
+            has_alarms=panel.has_alarms,
+        )
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart

@@ -164,6 +164,11 @@ class Panel(Description):
         return pages | {FRAME_ONLY: frozenset(frame)}
 
     @property
+    def has_alarms(self) -> bool:
+        """Whether its pages have the line of alarms."""
+        return bool(self.alarms)
+
+    @property
     def has_rail(self) -> bool:
         """Whether tabs or buttons of the frame stand at the side of its pages."""
         return len(self.pages) > 1 or bool(self.frame.widgets)

@@ -77,7 +77,7 @@ SECTIONS: Final = (
     Section(
         "control", whole, "sections/control.html", lambda control: control["required"], place="header"
     ),
-    Section("alarms", _alarms, on_page=False),
+    Section("alarms", _alarms, "sections/alarms.html", lambda _: True),
 )
 
 

@@ -24,6 +24,7 @@ LAYERS: Final = (
     "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
 )  # fmt: skip
 SHARED: Final = ("entries", "marks", "facts")  # by several kinds of widgets
+ALARMS: Final = "alarm-line"  # of panels with alarms
 OWN_PAGES: Final = ("log",)
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
@@ -102,15 +103,17 @@ def load_assets(
     styles: Collection[Path] = (),
     own_templates: Collection[Path] = (),
     brand: BrandRules | None = None,
+    has_alarms: bool = False,
 ) -> Assets:
     """Reads `static`, and the templates for the revision only.
 
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
     widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
     layer, so that they win, and as they are written. `brand` gives the colour of its
-    corner.
+    corner; `has_alarms`: pages have the line of alarms.
     """
     needed = [name for name in SHARED if any(name in KINDS[kind].styles for kind in kinds)]
+    needed += [ALARMS] if has_alarms else []
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     own = f"--mm:{1 / mm_per_px:.4f}px"
     if brand is not None and brand.colour:

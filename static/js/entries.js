@@ -109,3 +109,12 @@ export function followEntries() {
   if (hasKept()) keep();
   else addEventListener("input", keep, { once: true });
 }
+
+// The keypad and the keyboard, where the screen is touched.
+/** @param {string} keyboard */
+export function loadTouchEntry(keyboard) {
+  const coarse = matchMedia("(pointer: coarse)");
+  const open = () => void import("./entry/touch-entry.js").catch(pageGuard.fail);
+  if (keyboard === "on" || coarse.matches) open();
+  else coarse.addEventListener("change", open, { once: true });
+}

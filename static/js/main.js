@@ -1,9 +1,10 @@
 // Connects the event stream to the page: each event updates its section of the markup.
-import { followEntries } from "./entries.js";
+import { followEntries, loadTouchEntry } from "./entries.js";
 import { Presser } from "./press.js";
 import { addHooks, find, lockWidget, setText, showAttributes, showFailed } from "./show.js";
 import { Source } from "./source.js";
 
+/** @type {(data?: Data) => void} */
 const noop = () => {};
 
 // What is shown of a section that is the same on every page.
@@ -18,15 +19,19 @@ class Screen {
   );
   #source;
   #presser;
-  /** @type {{ show(state: Data): void, lost(): void, beat(): void }} */
   #control = { show: noop, lost: noop, beat: noop }; // a page without the bar does not require control
+  #alarms = { show: noop, control: noop, lost: noop }; // of a panel without alarms
 
   constructor() {
     /** @type {Handlers} */
     const shown = {
       ...COMMON,
       widgets: (changes) => this.#showWidgets(changes),
-      control: (state) => this.#control.show(state),
+      control: (state) => {
+        this.#control.show(state);
+        this.#alarms.control(state.role);
+      },
+      alarms: (alarms) => this.#alarms.show(alarms),
     };
     // The sections of a snapshot, by the server's table. Each is an event by itself when it changes.
     const sections = Object.fromEntries(this.#data.sections.map((name) => [name, shown[name]]));
@@ -71,6 +76,8 @@ class Screen {
         }
       });
     }
+    if (document.querySelector(".alarm-line"))
+      source.load(import("./alarm-line.js"), ({ AlarmLine }) => (this.#alarms = new AlarmLine(source)));
     if (document.querySelector(".group-tab")) source.load(import("./tabs.js"), noop);
     source.load(import("./full-text.js"), noop);
     if (document.querySelector("template:is(#keypad, #keyboard)")) loadTouchEntry(this.#data.keyboard);
@@ -117,6 +124,7 @@ class Screen {
     this.#presser.close();
     document.body.dataset.cut = "";
     this.#control.lost();
+    this.#alarms.lost();
     const { lostShort: text, locksAll: locks, lost, unknown } = this.#data.sentences;
     showState({ state: "lost", text });
     showLamp("server", { state: "bad", text, since: this.#clock.textContent, locks, reason: lost });
@@ -147,14 +155,6 @@ function attempt(root, work) {
     showFailed(root, pageGuard.page.sentences.broken);
     console.error(`widget "${root.dataset.widget}" can not be shown`, error);
   }
-}
-
-/** @param {string} keyboard */
-function loadTouchEntry(keyboard) {
-  const coarse = matchMedia("(pointer: coarse)");
-  const open = () => void import("./entry/touch-entry.js").catch(pageGuard.fail);
-  if (keyboard === "on" || coarse.matches) open();
-  else coarse.addEventListener("change", open, { once: true });
 }
 
 /** @param {Record<string, Lamp>} lamps */

@@ -59,8 +59,14 @@ def reason(panel: Panel, page: Page, screen: Screen) -> str:
 
 def page_height(panel: Panel, page: Page, screen: Screen) -> float:
     """What the frame leaves for the groups."""
+    return screen.height - frame_top(panel, screen) - 2 * screen.pad
+
+
+def frame_top(panel: Panel, screen: Screen) -> float:
+    """The height of the header, the line of alarms and the robots' tabs."""
+    alarms = screen.header if panel.has_alarms else 0.0
     robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
-    return screen.height - screen.header - robots - 2 * screen.pad
+    return screen.header + alarms + robots
 
 
 def page_width(panel: Panel, screen: Screen) -> float:
@@ -79,8 +85,7 @@ def long_rail(panel: Panel, screen: Screen) -> str:
     ]
     gaps = (LOW_GAP_MM if low else GAP_MM) * screen.mm * (len(keys) - 1) if keys else 0.0
     needed = tabs * TOUCH + sum(keys) + gaps + (8 + screen.pad if keys else 0.0)
-    robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
-    space = screen.height - screen.header - robots
+    space = screen.height - frame_top(panel, screen)
     if needed <= space:
         return ""
     return f"tabs and buttons of the frame need {needed:.0f} px of height and have {space:.0f}"

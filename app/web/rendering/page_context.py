@@ -13,7 +13,7 @@ from app import clock
 from app.clock import format_datetime, format_day, format_time, iso_time
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.receipts import Receipt
-from app.i18n import Text, TextLike
+from app.i18n import Text, TextLike, say
 from app.panel.layout import FRAME_ONLY, Page
 from app.panel.model import Panel
 from app.permission.principal import Principal
@@ -37,6 +37,7 @@ from app.web.rendering.display_choice import (
 from app.web.rendering.page_data import page_json, panel_data
 from app.web.rendering.page_words import page_words
 
+TOO_SOON: Final = say("press_too_soon")
 RELOADED: Final = "reloaded"  # by itself, without a tap
 RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a press on it is refused
 
@@ -72,6 +73,8 @@ class PageContext(TypedDict):
     until: float
     browser: str
     refused: TextLike
+    back: str
+    alarm_refused: TextLike
 
 
 def page_context(
@@ -139,6 +142,8 @@ def page_context(
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
         refused=_refused(session, request.query_params.get("control", "")),
+        back=f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}",
+        alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
 
 
@@ -148,3 +153,12 @@ def _refused(session: RobotSession, query: str) -> TextLike:
         return TOO_OFTEN
     receipt = session.control_acts.receipt(query)
     return receipt.reason if receipt else ""
+
+
+def _alarm_refused(state: AppState, query: str) -> TextLike:
+    """What the receipt of an act on alarms says: `query` is its id, or the code where it is not
+    kept."""
+    if query in (TOO_OFTEN.code, TOO_SOON.code):
+        return say(query)
+    receipts = (session.alarm_acts.receipt(query) for session in state.fleet.sessions)
+    return next((receipt.reason for receipt in receipts if receipt), "")

@@ -49,6 +49,17 @@ TREND_WORDS: Final = (
     "trend_live",
     "trend_paused",
 )
+ALARM_WORDS: Final = (
+    "alarm_line",
+    "alarm_none",
+    "alarm_none_unacknowledged",
+    "alarm_unacknowledged",
+    "alarm_standing",
+    "alarm_acknowledge",
+    "alarm_needs_control",
+    "alarms_cut",
+    "lost",
+)
 LINK_WORDS: Final = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS: Final = ("take", "ask", "give", "keep", "release", "withdraw")
 
@@ -68,7 +79,8 @@ def page_words(session: RobotSession, page: Page, pictures: str, language: str) 
     own |= {"asks": asks_of(session, page)}
     own |= {"stop_lost": joined((say("server_lost"), session.panel.stop_hint))}
     own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
-    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
+    named = (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS, *ALARM_WORDS)
+    plain = {word: say(word) for word in named}
     return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 

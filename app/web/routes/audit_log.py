@@ -68,8 +68,8 @@ A_TIME: Final[dict[str, JsonValue]] = {
 
 class Wanted(BaseModel):
     """The filter as a form sends it; times are `2026-11-21T10:00`, in the server's zone where they
-    have none of their own. `robot` is the id of the robot whose frame is around the page: it leaves no
-    entry out."""
+    have none of their own. `robot` is the id of the robot whose frame is around the page, `act`
+    that of an act on an alarm, whose receipt is shown: they leave no entry out."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -82,11 +82,12 @@ class Wanted(BaseModel):
     every: bool = False
     before: Annotated[int, Field(ge=1, lt=2**63)] | None = None
     robot: Annotated[str, Field(max_length=64)] = ""
+    act: Annotated[str, Field(max_length=400)] = ""
 
     @property
     def is_narrowed(self) -> bool:
         """Whether entries are left out."""
-        return any(self.model_dump(exclude={"before", "robot", "every"}).values())
+        return any(self.model_dump(exclude={"before", "robot", "act", "every"}).values())
 
     def filter(self) -> Filter:
         """Raises InputError for what is no time."""
@@ -98,7 +99,7 @@ class Wanted(BaseModel):
 
     def query(self, before: int | None = None) -> str:
         """The same filter as the query of an address."""
-        fields = {k: v for k, v in self.model_dump(exclude={"before"}).items() if v}
+        fields = {k: v for k, v in self.model_dump(exclude={"before", "act"}).items() if v}
         if before is not None:
             fields["before"] = before
         return urlencode(fields)

@@ -1,0 +1,180 @@
+"""The line of alarms below the header: it shows the most urgent, and acknowledges what it shows."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.panel import load_panel
+from app.panel.checks.fit import page_height
+from app.panel.widgets.tiles import Screen
+from tests.browser.test_accessibility import violations
+from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import DRAWN, HIDE, middle, place
+from tests.support.parts import Server, until
+from tests.support.servers import panel_file
+from tests.web.test_alarms import LOW, PANEL, act, listed, server_with
+
+SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
+LINE: Final = ".alarm-line"
+BUTTON: Final = ".alarm-line button"
+NOW_AND_THEN: Final = "values = [6.0, 4.5], period_s = 1.0"
+CONTROL: Final = "\n[control]\nrequired = true\n"
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Server]:
+    """Both of its alarms are active: `air_latched` of high priority, and `air_low`."""
+    with server_with(tmp_path) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        yield server
+
+
+@pytest.fixture
+def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page to which axe may be added."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    with mine.taken(request.node) as page:
+        yield page
+    mine.close()
+
+
+def started(page: Page, url: str) -> Page:
+    page.goto(url)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    return page
+
+
+def test_the_line_shows_the_most_urgent_alarm_with_what_to_do_first(cell: Server, page: Page) -> None:
+    act(cell, "air_latched", "acknowledge", occurrence=1)
+    started(page, cell.url)
+    line = page.locator(LINE)
+    expect(line).to_have_attribute("data-priority", "2")
+    expect(line.locator("b[data-text=text]")).to_have_text("Air pressure low")
+    expect(line.locator("[data-text=action]")).to_have_text("Open valve V1")
+    expect(line.locator("b[data-text=unacknowledged]")).to_have_text("1")
+    expect(line.locator("[data-text=standing]")).to_have_text("2")
+    assert page.locator(BUTTON).is_enabled()
+    started(page, f"{cell.url}/log")
+    expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_low")
+
+
+def test_an_alarm_that_came_under_the_finger_is_not_acknowledged(
+    cell: Server, touch_page: Page
+) -> None:
+    page = started(touch_page, cell.url)
+    expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_latched")
+    touch = Touch(page)
+    with page.expect_response("**/acknowledge") as answer:
+        touch.send("touchStart", middle(page.locator(BUTTON)))
+        act(cell, "air_latched", "acknowledge", occurrence=1)
+        expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_low")
+        touch.send("touchEnd")
+    assert answer.value.url == f"{cell.url}/alarms/air_latched/acknowledge"
+    assert not listed(cell)["air_low"]["acknowledged"]
+
+
+def test_a_tap_acknowledges_the_alarm_and_every_browser_shows_the_next(
+    cell: Server, touch_page: Page, page: Page
+) -> None:
+    started(page, cell.url)
+    started(touch_page, cell.url)
+    for width, height in SIZES:
+        sized(touch_page, width, height).evaluate(DRAWN)
+        assert place(touch_page.locator(BUTTON))["height"] >= 44
+    touch_page.locator(BUTTON).tap()
+    for shown in (touch_page, page):
+        expect(shown.locator(LINE)).to_have_attribute("data-alarm", "air_low")
+    assert listed(cell)["air_latched"]["acknowledged"]
+    assert not listed(cell)["air_low"]["acknowledged"]
+
+
+def test_nothing_moves_when_an_alarm_comes(tmp_path: Path, page: Page) -> None:
+    with server_with(tmp_path, NOW_AND_THEN) as server:
+        started(page, server.url)
+        line, places = page.locator(LINE), ("main", LINE, ".group", ".menu-key")
+
+        def acknowledged(alarm: str) -> bool:
+            row = listed(server).get(alarm)
+            if row and not row["acknowledged"]:
+                act(server, alarm, "acknowledge", occurrence=row["occurrence"])
+            return not any(not row["acknowledged"] for row in listed(server).values())
+
+        def is_quiet() -> bool:
+            return acknowledged("air_low") and acknowledged("air_latched") and not shown()
+
+        def shown() -> str:
+            return line.get_attribute("data-alarm") or ""
+
+        until(is_quiet, "no alarm is unacknowledged")
+        before = [place(page.locator(part).first) for part in places]
+        until(lambda: bool(shown()), "an alarm comes again", within_s=20)
+        assert [place(page.locator(part).first) for part in places] == before
+
+
+def test_without_a_connection_alarms_are_not_known_and_acknowledge_is_locked(
+    cell: Server, page: Page
+) -> None:
+    started(page, cell.url)
+    expect(page.locator(BUTTON)).to_be_enabled()
+    page.evaluate(HIDE)
+    expect(page.locator(f"{LINE} .cut")).to_be_visible()
+    expect(page.locator(f"{LINE} .by-loss")).to_be_visible()
+    expect(page.locator(f"{LINE} b[data-text=text]")).to_be_hidden()
+    expect(page.locator(BUTTON)).to_be_disabled()
+    page.evaluate(HIDE, False)
+    expect(page.locator(f"{LINE} .cut")).to_be_hidden()
+    expect(page.locator(BUTTON)).to_be_enabled()
+
+
+def test_acknowledge_is_locked_without_control(tmp_path: Path, own_page: Page, page: Page) -> None:
+    with server_with(tmp_path, more=CONTROL) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        started(own_page, server.url)
+        started(page, server.url)
+        expect(own_page.locator(BUTTON)).to_be_enabled()
+        expect(page.locator(BUTTON)).to_be_disabled()
+        expect(page.locator(f"{LINE} .by-control")).to_be_visible()
+
+
+def test_without_scripts_a_form_acknowledges_what_it_showed(
+    cell: Server, without_scripts: Page
+) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/?reloaded=1")
+    page.locator(BUTTON).click()
+    expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_low")
+    assert listed(cell)["air_latched"]["acknowledged"]
+    assert not listed(cell)["air_low"]["acknowledged"]
+    # The next page is too new to be read: a second tap on it is refused, and the line says so.
+    page.locator(BUTTON).click()
+    expect(page.locator(f"{LINE} .refused")).not_to_be_empty()
+
+
+def test_axe_finds_nothing_on_the_line(cell: Server, axe_page: Page) -> None:
+    started(axe_page, cell.url)
+    assert violations(axe_page) == []
+    for alarm in ("air_latched", "air_low"):
+        act(cell, alarm, "acknowledge", occurrence=1)
+    expect(axe_page.locator(f"{LINE} .known")).to_be_visible()
+    assert violations(axe_page) == []
+
+
+def test_the_line_takes_its_height_from_the_page_and_none_without_alarms(
+    cell: Server, tmp_path: Path, page: Page
+) -> None:
+    described = load_panel(panel_file(tmp_path, PANEL % LOW))
+    started(page, cell.url)
+    for width, height in SIZES:
+        sized(page, width, height).evaluate(DRAWN)
+        screen = Screen.from_size(f"{width}x{height}", described.mm_per_px)
+        main = place(page.locator("main"))
+        assert main["y"] == 2 * screen.header
+        assert main["height"] - 2 * screen.pad == page_height(described, described.pages[0], screen)
+    quiet = described.model_copy(update={"alarms": ()})
+    for size in SIZES:
+        screen = Screen.from_size(f"{size[0]}x{size[1]}", quiet.mm_per_px)
+        assert page_height(quiet, quiet.pages[0], screen) == size[1] - screen.header - 2 * screen.pad
