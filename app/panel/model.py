@@ -217,11 +217,6 @@ class Panel(Description):
         """All that are judged: each message counts, and a value of unknown age is known to be one."""
         return (*self.named_conditions, *(c for alarm in self.alarms for c in alarm.conditions))
 
-    def shown_topics(self, widget: DisplayWidget) -> frozenset[str]:
-        """The topics that a display shows: its own, and those of the conditions that it names."""
-        named = {c.topic for c in self.named_conditions if c.id in widget.named_conditions}
-        return frozenset(named | {source.topic for source in widget.sources()})
-
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """The interlocks that must permit a press, in the widget's order."""
         known = {interlock.id: interlock for interlock in self.interlocks}
@@ -231,11 +226,8 @@ class Panel(Description):
         """Topic → type of all subscriptions."""
         own = {confirm.topic: confirm.type for confirm in self.confirmations() if confirm.type}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        return (
-            own
-            | {source.topic: source.type for source in self.monitored() if not source.on_demand}
-            | events
-        )
+        shown = {source.topic: source.type for source in self.monitored() if not source.on_demand}
+        return own | shown | events
 
     def on_demand(self) -> dict[str, str]:
         """Topic → type of all topics that are subscribed to only while a browser shows them."""

@@ -106,10 +106,7 @@ class ViewRefresher:
         self._log = RobotLog(log, robot.name)
         self._link_times = LinkTimes()
         self._frame_s = 1 / panel.display_hz
-        self._displays = [
-            (frozenset(key for topic in panel.shown_topics(w) for key in robot.possible_keys(topic)), w)
-            for w in panel.displays
-        ]
+        self._displays = [(_shown_keys(widget, panel, robot), widget) for widget in panel.displays]
         self._current = self._build()
         self.lamp = self._current.robot
         self.publisher = ViewPublisher(
@@ -219,3 +216,10 @@ class ViewRefresher:
         built = build_view(self._panel, self._robot, time.monotonic(), self._sources.context())
         built.view["link"] = self._link_times.dated(built.view["link"])
         return built
+
+
+def _shown_keys(widget: DisplayWidget, panel: Panel, robot: RobotState) -> frozenset[str]:
+    """The keys of the topics that a display shows, also of the conditions that it names."""
+    topics = {source.topic for source in widget.sources()}
+    topics |= {c.topic for c in panel.named_conditions if c.id in widget.named_conditions}
+    return frozenset(key for topic in topics for key in robot.possible_keys(topic))

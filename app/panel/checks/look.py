@@ -12,7 +12,7 @@ def brand_faults(panel: Panel) -> Iterator[Fault]:
     if panel.brand and panel.brand.logo and panel.brand.logo not in panel.picture_files:
         names = list_names(panel.picture_files) if panel.picture_files else "none"
         message = f'no picture "{panel.brand.logo}" in the folder `pictures`; there is {names}'
-        yield Fault("brand.logo", message)
+        yield Fault("brand.logo", message, cause=f"picture {panel.brand.logo}")
 
 
 def grow_faults(panel: Panel) -> Iterator[Fault]:

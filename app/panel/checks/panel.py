@@ -57,8 +57,8 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     }
     faults = [
         *condition_faults_of(panel, interfaces),
-        *_picture_faults(panel),
         *_widget_faults(panel, interfaces, faulty),
+        *_picture_faults(panel),
         *alarm_faults(panel, interfaces, faulty),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}

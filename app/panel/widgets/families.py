@@ -173,6 +173,10 @@ class DisplayWidget(BaseWidget):
     def sources(self) -> Iterator[TopicSource]:
         """The topics that it shows."""
 
+    def endpoints(self) -> Iterator[tuple[Role, str]]:
+        for topic in dict.fromkeys(source.topic for source in self.sources()):
+            yield "MP", topic
+
     @property
     def named_conditions(self) -> tuple[str, ...]:
         """The ids of the interlocks and conditions that it shows."""
