@@ -9,14 +9,13 @@ from app.panel.condition import NamedCondition
 
 class Interlock(NamedCondition):
     """A condition that permits the commands which name it, and locks them while it is not met.
-    `locked` is its own sentence then, and `picture` shows what to do."""
+    `locked` is its own sentence then."""
 
     noun: ClassVar[str] = "an interlock"
 
     require_publisher: bool = False
     publishers: Literal["any", "one"] = "any"
     locked: Label | None = None
-    picture: str | None = None
 
     @property
     def own_sentence(self) -> str | PanelText | None:

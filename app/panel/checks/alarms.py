@@ -43,13 +43,13 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
         if alarm.id.startswith(RESERVED):
             message = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
             yield Fault(f"{place}.id", f"{message}: choose another id")
-        yield from reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
+        yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
         yield from _stop_faults(place, alarm, panel)
         for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
             if condition is not None:
                 yield from condition_faults(f"{place}.{key}", condition, interfaces)
-        yield from reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
-        yield from reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
+        yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
+        yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
         yield from _source_faults(place, alarm, interfaces, panel.language)
 
 
@@ -63,7 +63,7 @@ def _stop_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
             )
 
 
-def reference_faults(
+def _reference_faults(
     place: str, kind: str, names: tuple[str, ...] | str | None, known: Any
 ) -> Iterator[Fault]:
     """Faults of names of things that the panel does not have."""

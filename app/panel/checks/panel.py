@@ -7,7 +7,7 @@ from itertools import islice
 from app.errors import Fault, InterfaceError
 from app.i18n.values import alike
 from app.interfaces import Interfaces
-from app.panel.checks.alarms import alarm_faults, reference_faults
+from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.look import brand_faults, grow_faults
@@ -58,7 +58,6 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     faults = [
         *condition_faults_of(panel, interfaces),
         *_widget_faults(panel, interfaces, faulty),
-        *_picture_faults(panel),
         *alarm_faults(panel, interfaces, faulty),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
@@ -153,12 +152,6 @@ def _input_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, Input):
             yield from widget.faults(place, checking)
-
-
-def _picture_faults(panel: Panel) -> Iterator[Fault]:
-    for i, interlock in enumerate(panel.interlocks):
-        place, picture = f"interlock[{i}].picture", interlock.picture
-        yield from reference_faults(place, "picture", picture, panel.picture_files)
 
 
 def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
