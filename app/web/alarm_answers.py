@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
@@ -22,7 +22,8 @@ Occurrence = Annotated[int, Field(ge=0, le=MAX_OCCURRENCE)]
 class AlarmQuery(BaseModel):
     """`history`: transitions, the newest first, instead of what is not normal now. The other fields are
     for the history: of transitions before the number `before`, from `since` on and before `until`, with
-    `text` in the alarm's id, text, action or group."""
+    `text` in the alarm's id, text, action or group. For the page only: `show` chooses what is listed,
+    `alarm` whose details are shown, `act` the act whose receipt is shown."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -32,6 +33,9 @@ class AlarmQuery(BaseModel):
     since: AwareDatetime | None = None
     until: AwareDatetime | None = None
     text: Annotated[str, Field(max_length=100)] = ""
+    show: Literal["all", "unacknowledged", "shelved"] = "all"
+    alarm: Annotated[str, Field(max_length=300)] = ""
+    act: Annotated[str, Field(max_length=400)] = ""
 
     def filter(self) -> HistoryFilter:
         return HistoryFilter(

@@ -24,8 +24,8 @@ LAYERS: Final = (
     "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
 )  # fmt: skip
 SHARED: Final = ("entries", "marks", "facts")  # by several kinds of widgets
-ALARMS: Final = "alarm-line"  # of panels with alarms
-OWN_PAGES: Final = ("log",)
+ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
+OWN_PAGES: Final = ("log", "alarms")
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
@@ -113,7 +113,7 @@ def load_assets(
     corner; `has_alarms`: pages have the line of alarms.
     """
     needed = [name for name in SHARED if any(name in KINDS[kind].styles for kind in kinds)]
-    needed += [ALARMS] if has_alarms else []
+    needed += ALARMS if has_alarms else ()
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     own = f"--mm:{1 / mm_per_px:.4f}px"
     if brand is not None and brand.colour:

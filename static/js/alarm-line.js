@@ -24,11 +24,16 @@ export class AlarmLine {
   /** @type {{ id: string, occurrence: number, seen: string | null } | null} */
   #touched = null; // the alarm that the line showed when the finger went down on an enabled button
   #refusedFor = "";
+  #isSnapshot = true; // the next section is whole: the first of a stream
   #busy = false;
+  /** @type {(alarms: Data, isSnapshot: boolean) => void} */
+  #showRows = () => {}; // of a page without the list
 
   /** @param {import("./source.js").Source} source */
   constructor(source) {
     this.#source = source;
+    if (document.querySelector("ol.alarms"))
+      source.load(import("./alarm-list.js"), ({ showRows }) => (this.#showRows = showRows));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     this.#button.addEventListener("click", (event) => {
       event.preventDefault();
@@ -50,6 +55,10 @@ export class AlarmLine {
     for (const name of TEXTS) setText(this.#text(name), row?.[name] ?? "");
     setText(this.#text("unacknowledged"), String(alarms.unacknowledged));
     setText(this.#text("standing"), String(alarms.standing));
+    const badge = document.querySelector(".pages .badge");
+    if (badge) badge.dataset.priority = dataset.priority;
+    this.#showRows(alarms, this.#isSnapshot);
+    this.#isSnapshot = false;
     if (this.#refusedFor !== this.#shown) setText(find(this.#line, ".refused"), "");
     this.#lock();
   }
@@ -62,6 +71,7 @@ export class AlarmLine {
 
   lost() {
     this.#line.dataset.cut = "";
+    this.#isSnapshot = true;
     this.#touched = null;
     this.#lock();
   }

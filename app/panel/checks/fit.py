@@ -76,7 +76,8 @@ def page_width(panel: Panel, screen: Screen) -> float:
 
 def long_rail(panel: Panel, screen: Screen) -> str:
     """Why not all tabs are seen beside the buttons of the frame; "" where they are."""
-    tabs = len(panel.pages) + panel.log.enabled if panel.has_rail else 0
+    more = panel.log.enabled + panel.has_alarms
+    tabs = len(panel.pages) + more if panel.has_rail else 0
     low = screen.height <= LOW_SCREEN
     stops = {widget.id for widget in panel.stops}
     keys = [

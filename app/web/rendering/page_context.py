@@ -52,6 +52,7 @@ class PageContext(TypedDict):
     page: Page
     railed: bool
     is_log: bool
+    is_alarms: bool
     inside: Markup | None
     base: str
     robot: str
@@ -85,8 +86,10 @@ def page_context(
     who: Principal,
     refresh_s: int,
     embedded: bool = False,
+    alarms_query: str | None = None,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
+    `alarms_query`: the query of the page of alarms, for that page.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
@@ -100,7 +103,9 @@ def page_context(
         of_client = audience_of(who, publisher.view["control"], rules, language)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
-    is_log = page.id == FRAME_ONLY
+    is_alarms = alarms_query is not None
+    is_log = page.id == FRAME_ONLY and not is_alarms
+    back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -116,8 +121,9 @@ def page_context(
         choices=[*language_choice(panel, language), *choices(display)],
         panel=panel,
         page=page,
-        railed=panel.has_rail or is_log,
+        railed=panel.has_rail or is_log or is_alarms,
         is_log=is_log,
+        is_alarms=is_alarms,
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
@@ -142,7 +148,7 @@ def page_context(
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
         refused=_refused(session, request.query_params.get("control", "")),
-        back=f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}",
+        back=f"{state.root}/alarms?{alarms_query}" if is_alarms else back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
 

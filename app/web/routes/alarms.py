@@ -8,10 +8,10 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Final
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, urlencode, urlsplit
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
 from app import clock
@@ -38,8 +38,10 @@ from app.web.alarm_answers import (
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, Described, described_body, errors, fields
+from app.web.openapi_parts import FORM, JSON, PAGE, Described, described_body, errors, fields
+from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.routes.audit_log import page_frame
 from app.web.routes.press_forms import TAP_AGAIN_S
 from app.web.routes.presses import STATUS
 
@@ -90,12 +92,14 @@ ACT_FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
     "/alarms",
     response_model=AlarmsAnswer | HistoryAnswer,
     summary="The alarms that are not normal now, or the history of all alarms",
-    responses=errors(403, 422, 503),
+    responses=errors(403, 422, 503) | {200: {"content": PAGE}},
 )
 async def alarms(
     request: Request, state: CurrentState, query: Annotated[AlarmQuery, Query()]
 ) -> Response:
     content: dict[str, Any]
+    if not query.history and "text/html" in request.headers.get("accept", ""):
+        return _page(request, state, query)
     if query.history:
         rows = await state.fleet.alarms.history(query.filter(), query.limit)
         older = rows[-1].seq if len(rows) == query.limit else None
@@ -104,6 +108,18 @@ async def alarms(
         content = {"alarms": [finite(row) for row in state.fleet.alarms.rows()]}
     answer = localized(content, language_of(request))
     return JSONResponse(answer, headers={"cache-control": "no-store"})
+
+
+def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
+    """The page of alarms, for a browser."""
+    language = language_of(request)
+    shown = {"show": query.show, "alarm": query.alarm}
+    again = urlencode({name: value for name, value in shown.items() if value})
+    frame, token = page_frame(request, state, word("title"), alarms_query=again)
+    context = alarms_context(state, query.show, query.alarm, language)
+    html = state.templates.render("alarms.html", language, **frame, **context, word=word)
+    headers = {"cache-control": "no-store", "vary": "accept"}
+    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
 
 
 @router.post(

@@ -152,7 +152,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
-    frame, token = log_frame(request, state, wanted.robot)
+    frame, token = page_frame(request, state, say("log_page_title"), wanted.robot)
     html = state.templates.render(
         "log.html",
         language,
@@ -170,17 +170,20 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
     return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
 
 
-def log_frame(request: Request, state: AppState, robot: str) -> tuple[PageContext, str]:
-    """The frame around the log, of a robot or else the first; and the token of a new client."""
+def page_frame(
+    request: Request, state: AppState, title: Text, robot: str = "", alarms_query: str | None = None
+) -> tuple[PageContext, str]:
+    """The frame around the log or the alarms, of a robot or else the first; and the token of a new
+    client."""
     entry_of = {session.entry.id: session for session in state.fleet.sessions if session.entry}
     session = entry_of.get(robot, state.fleet.first)
     who, token = principal_with_new_token(request, state, embedded=False)
     if session.control.rules.required:
         session.control.loaded(who, REFRESH_S, opened_by_person(request))
         session.show()
-    title = say("log_page_title")
     shown = Page.model_construct(None, id=FRAME_ONLY, title=title, own=(), groups=())
-    return page_context(request, state, session, shown, who, REFRESH_S), token
+    context = page_context(request, state, session, shown, who, REFRESH_S, alarms_query=alarms_query)
+    return context, token
 
 
 @router.get(

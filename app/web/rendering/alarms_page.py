@@ -1,0 +1,60 @@
+"""The page of alarms: its list, and the details of one alarm."""
+
+from typing import Final, Literal, TypedDict
+
+from app.alarms.rows import AlarmRow
+from app.alarms.shown import MAX_ROWS
+from app.i18n import Text, TextLike, number, render, say
+from app.web.app_state import AppState
+
+Show = Literal["all", "unacknowledged", "shelved"]
+SHELF_MINUTES: Final = (15, 60, 120)
+REASONS: Final = ("maintenance", "repair", "sensor", "known")
+
+
+class AlarmsContext(TypedDict):
+    """The variables of `alarms.html`, beside those of the frame. `chosen` is the alarm whose details
+    are shown, None for none; `gone`: it was asked for and is no longer listed. `leader` is the text of
+    the alarm that it follows."""
+
+    rows: list[AlarmRow]
+    show: Show
+    chosen: AlarmRow | None
+    gone: bool
+    leader: TextLike
+    more: TextLike
+    steps: list[str]
+    reasons: list[Text]
+    shelf_times: list[tuple[int, Text]]
+
+
+def word(name: str) -> Text:
+    return say(f"alarms_{name}")
+
+
+def alarms_context(state: AppState, show: Show, chosen: str, language: str) -> AlarmsContext:
+    """The alarms as they are now."""
+    rows = state.fleet.alarms.rows()
+    of_id = {row["id"]: row for row in rows}
+    row = of_id.get(chosen)
+    leader = of_id.get(row["follows"]) if row else None
+    shown = rows[:MAX_ROWS]
+    return AlarmsContext(
+        rows=shown,
+        show=show,
+        chosen=row,
+        gone=bool(chosen) and row is None,
+        leader=leader["text"] if leader else "",
+        more=say("alarms_more", count=number(str(len(rows) - len(shown)))) if rows != shown else "",
+        steps=_lines(row["action"], language) if row else [],
+        reasons=[word(f"reason_{name}") for name in REASONS],
+        shelf_times=[
+            (60 * minutes, say("alarms_minutes", count=number(str(minutes))))
+            for minutes in SHELF_MINUTES
+        ],
+    )
+
+
+def _lines(text: TextLike, language: str) -> list[str]:
+    """The lines of what to do: its steps."""
+    return [line.strip() for line in render(text, language).splitlines() if line.strip()]

@@ -1,0 +1,51 @@
+// The list on the page of alarms: a row for each alarm, kept in the server's order.
+import { copyOf, find, setText } from "./show.js";
+
+const TEXTS = ["priority_text", "state_text", "since_text", "text", "group", "value_text", "limit_text"];
+
+/** @type {Map<string, Data>} */
+const rows = new Map();
+const list = find(document, "ol.alarms");
+
+// A snapshot has all rows, an event those that changed; null is one that is gone.
+/** @param {Data} alarms @param {boolean} isSnapshot */
+export function showRows(alarms, isSnapshot) {
+  if (isSnapshot) rows.clear();
+  for (const [id, row] of Object.entries(alarms.rows)) {
+    if (row) rows.set(id, row);
+    else rows.delete(id);
+  }
+  const shown = new Map([...list.querySelectorAll("li")].map((item) => [item.dataset.alarm ?? "", item]));
+  for (const [id, item] of shown) if (!rows.has(id)) item.remove();
+  let next = list.firstElementChild;
+  for (const row of [...rows.values()].sort(compare)) {
+    const item = shown.get(row.id) ?? copyOf(find(document, "template#alarm-row"));
+    showRow(item, row);
+    if (item === next) next = item.nextElementSibling;
+    else list.insertBefore(item, next);
+  }
+  const details = document.querySelector("[data-alarm-details]");
+  const chosen = details && rows.get(details.dataset.alarmDetails ?? "");
+  if (details && chosen) showTexts(details, chosen);
+}
+
+/** @param {Data} one @param {Data} other */
+function compare({ order: one }, { order: other }) {
+  const at = one.findIndex((/** @type {number} */ part, /** @type {number} */ i) => part !== other[i]);
+  return at < 0 ? 0 : one[at] - other[at];
+}
+
+/** @param {HTMLElement} item @param {Data} row */
+function showRow(item, row) {
+  const link = find(item, "a");
+  if (item.dataset.alarm !== row.id) link.href += encodeURIComponent(row.id);
+  Object.assign(item.dataset, { alarm: row.id, priority: row.priority, state: row.state });
+  item.dataset.acknowledged = row.acknowledged;
+  find(item, ".of-priority").dataset.priority = row.priority;
+  showTexts(item, row);
+}
+
+/** @param {HTMLElement} root @param {Data} row */
+function showTexts(root, row) {
+  for (const name of TEXTS) setText(root.querySelector(`[data-text="${name}"]`), row[name]);
+}

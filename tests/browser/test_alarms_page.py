@@ -1,0 +1,97 @@
+"""The page of alarms: its list follows the events, its acts are forms with a receipt."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_accessibility import violations
+from tests.browser.test_alarm_line import SIZES, started
+from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.pages import DRAWN
+from tests.support.parts import Server, until
+from tests.web.test_alarms import act, listed, server_with
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Server]:
+    """Both of its alarms are active: `air_latched` of high priority, and `air_low`."""
+    with server_with(tmp_path) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        yield server
+
+
+@pytest.fixture
+def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page to which axe may be added."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    with mine.taken(request.node) as page:
+        yield page
+    mine.close()
+
+
+def ids(page: Page) -> list[str | None]:
+    return [row.get_attribute("data-alarm") for row in page.locator("li.alarm").all()]
+
+
+def test_the_list_follows_the_events_in_the_servers_order(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms?alarm=air_low")
+    assert ids(page) == ["air_latched", "air_low"]
+    expect(page.locator(".details")).to_contain_text("Open valve V1")
+    act(cell, "air_latched", "acknowledge", occurrence=1)
+    first = page.locator("li.alarm").first
+    expect(first).to_have_attribute("data-alarm", "air_low")
+    act(cell, "air_low", "shelve", reason="Tests", for_s=60)
+    expect(first).to_have_attribute("data-alarm", "air_latched")
+    expect(page.locator("li.alarm [data-text=state_text]").last).to_have_text("Shelved")
+    page.get_by_role("link", name="Shelved", exact=True).click()
+    expect(page.locator("li.alarm:visible")).to_have_count(1)
+
+
+def test_an_alarm_of_its_own_is_acknowledged_and_shelved_from_its_details(
+    cell: Server, page: Page
+) -> None:
+    started(page, f"{cell.url}/alarms")
+    page.locator("li.alarm a").last.click()
+    expect(page.locator(".details h3").first).to_have_text("Air pressure low")
+    page.locator(".acts [popovertarget=sheet-shelve]").last.click()
+    page.locator(".sheet:popover-open select[name=reason]").select_option(index=1)
+
+    def shelved() -> bool:
+        page.locator(".sheet:popover-open button[type=submit]").click()
+        return listed(cell)["air_low"]["state"] == "shelved"
+
+    until(shelved, "it is shelved")
+    assert listed(cell)["air_low"]["shelf"]["reason"] == "Repair is ordered"
+    assert not listed(cell)["air_latched"]["acknowledged"]
+    page.goto(f"{cell.url}/alarms?alarm=air_latched")
+    expect(page.get_by_role("button", name="Shelve")).to_be_disabled()
+
+
+def test_forms_without_scripts_acknowledge(cell: Server, without_scripts: Page) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/alarms?alarm=air_low")
+
+    def acknowledged() -> bool:
+        page.locator(".acts button", has_text="Acknowledge").click()
+        return bool(listed(cell)["air_low"]["acknowledged"])
+
+    until(acknowledged, "it is acknowledged", every_s=0.8)
+    assert not listed(cell)["air_latched"]["acknowledged"]
+    expect(page.locator("li.alarm")).to_have_count(2)
+
+
+def test_programs_get_json(cell: Server) -> None:
+    assert cell.http.get("/alarms").headers["content-type"] == "application/json"
+    page = cell.http.get("/alarms", headers={"accept": "text/html"})
+    assert page.headers["content-type"].startswith("text/html")
+
+
+def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page: Page) -> None:
+    for path in ("/alarms", "/alarms?alarm=air_low"):
+        started(axe_page, cell.url + path)
+        for width, height in SIZES:
+            sized(axe_page, width, height).evaluate(DRAWN)
+            assert axe_page.evaluate("document.documentElement.scrollWidth") == width
+            assert violations(axe_page) == [], (path, width)
