@@ -97,7 +97,7 @@
   }
 
   /** @param {string} selector @param {string} text */
-  function showText(selector, text) {
+  function showTexts(selector, text) {
     document.querySelectorAll(selector).forEach(function (element) {
       if (element.textContent !== text) element.textContent = text;
     });
@@ -109,16 +109,16 @@
     document.querySelectorAll("dialog[popover]").forEach(function (dialog) {
       if (dialog.hidePopover && dialog.matches(":popover-open")) dialog.hidePopover();
     });
-    showText('form.page :is([data-text="reason"], [data-text="reasons"])', words.faulty);
-    showText('form.page [data-text="more"]', "");
+    showTexts('form.page :is([data-text="reason"], [data-text="reasons"])', words.faulty);
+    showTexts('form.page [data-text="more"]', "");
     show("[data-widget][data-state]", "data-state", "old");
     show("[data-widget][data-shape]", "data-shape", "old");
     show("[data-widget][data-shape]", "data-colour", "none");
-    showText(":is([data-lamp], [data-robot]) b", words.unknown);
+    showTexts(":is([data-lamp], [data-robot]) b", words.unknown);
     show("[data-lamp], [data-robot]", "data-state", "wait");
     show("#state", "data-state", "unknown");
-    showText("#state b", words.stateUnknown);
-    showText("#fault", words.faulty);
+    showTexts("#state b", words.stateUnknown);
+    showTexts("#fault", words.faulty);
     document.querySelectorAll("#fault").forEach(function (element) {
       element.hidden = false;
     });
