@@ -29,5 +29,5 @@ def _layer(widget: Pallet, count: int) -> tuple[TextLike, str, str]:
     rows, boxes = divmod(on_it, across)
     filled = f"M0 0H{across}V{rows}H0z" if rows else ""
     filled += f"M0 {rows}H{boxes}V{rows + 1}H0z" if boxes else ""
-    numbers = {"layer": layer + 1, "layers": layers, "place": on_it + 1, "places": places}
-    return say("pallet_layer", **numbers), filled, f"{boxes} {rows}"
+    text = say("pallet_layer", layer=layer + 1, layers=layers, place=on_it + 1, places=places)
+    return text, filled, f"{boxes} {rows}"

@@ -14,7 +14,7 @@ from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, middle, place
-from tests.support.parts import Server, until
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import panel_file
 from tests.web.test_alarms import LOW, PANEL, act, listed, server_with
 
@@ -178,3 +178,17 @@ def test_the_line_takes_its_height_from_the_page_and_none_without_alarms(
     for size in SIZES:
         screen = Screen.from_size(f"{size[0]}x{size[1]}", quiet.mm_per_px)
         assert page_height(quiet, quiet.pages[0], screen) == size[1] - screen.header - 2 * screen.pad
+
+
+def test_without_a_robot_the_line_does_not_say_that_there_is_no_alarm(
+    tmp_path: Path, page: Page
+) -> None:
+    panel = str(panel_file(tmp_path, PANEL % LOW))
+    with Server(ROOT, KIOSK_MODE="live", KIOSK_PANEL=panel) as server:
+        until(server.answers, "the server is there")
+        started(page, server.url)
+        expect(page.locator(f"{LINE} .unheard")).to_have_text(
+            "Alarms are not known: no connection to the robot."
+        )
+        expect(page.locator(f"{LINE} .unheard")).to_be_visible()
+        expect(page.locator(f"{LINE} .none")).to_be_hidden()

@@ -16,6 +16,9 @@ from app.settings import PACKAGE, shipped_path
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = (
+    "alarms_",
+    "alarms_reason_",
+    "condition_",
     "gauge_",
     "joint_",
     "control_",

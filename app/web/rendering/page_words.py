@@ -52,6 +52,7 @@ TREND_WORDS: Final = (
 ALARM_WORDS: Final = (
     "alarm_line",
     "alarm_none",
+    "alarms_unheard",
     "alarm_none_unacknowledged",
     "alarm_unacknowledged",
     "alarm_standing",
