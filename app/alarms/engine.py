@@ -7,12 +7,13 @@ number of them. Used on the event loop only.
 import heapq
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 from app.alarms.entries import AlarmEntry
 from app.alarms.evaluation import levels_of, read_alarm
-from app.alarms.instance import AlarmInstance, Definition, define
+from app.alarms.instance import AlarmInstance, Definition, Transition, define
 from app.alarms.records import entry_in, status_in
+from app.alarms.source_watch import SourceWatch
 from app.alarms.sources import read_suppression
 from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level, update_suppression
 from app.i18n import TextLike
@@ -21,20 +22,6 @@ from app.robot.state import RobotState
 
 MAX_EVALUATED: Final = 2_000  # in one evaluation
 MAX_ENTRIES: Final = 10_000  # alarms that the robots publish themselves
-
-
-class Transition(NamedTuple):
-    """A change of an alarm: `seq` gives the order. `act` is the act that caused it, "" for none, and
-    `actor` its actor. `value` is that of the source."""
-
-    seq: int
-    at: Moment
-    id: str
-    before: AlarmStatus
-    after: AlarmStatus
-    act: str = ""
-    actor: str = ""
-    value: float | None = None
 
 
 Act = Callable[[AlarmStatus, Definition], ActResult]
@@ -63,9 +50,10 @@ class AlarmEngine:
         self._sources: dict[tuple[str, str], Definition] = {}  # (robot, alarm's id) → of its entries
         self._entries: dict[tuple[str, str], list[AlarmInstance]] = {}  # by the same
         self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
+        self._watch = SourceWatch()
         self._refused = 0  # entries beyond `MAX_ENTRIES`
         self.alarms: dict[str, AlarmInstance] = {}
-        self.lock_changes = 0  # how often the lock of an alarm's controls has changed
+        self._lock_changes = 0
 
     def add_robot(self, robot_id: str, robot: RobotState) -> None:
         """Adds the alarms of a robot by its id, "" for the only one without an id."""
@@ -78,6 +66,7 @@ class AlarmEngine:
         if alarm.source in ("diagnostics", "list"):
             self._sources[robot, alarm.id] = definition
             self._entries[robot, alarm.id] = []
+            self._inhibit(self._watch.add(definition))
             return
         self._keep(definition)
         for topic in alarm.evaluated_topics:
@@ -92,21 +81,29 @@ class AlarmEngine:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
         self._by_robot[definition.robot].append(definition.id)
         self._waiting[definition.id] = None
-        for widget in definition.alarm.inhibits:
-            self._inhibitors.setdefault((definition.robot, widget), []).append(alarm)
+        self._inhibit(alarm)
         return alarm
+
+    def _inhibit(self, alarm: AlarmInstance) -> None:
+        for widget in alarm.definition.alarm.inhibits:
+            self._inhibitors.setdefault((alarm.definition.robot, widget), []).append(alarm)
 
     @property
     def due(self) -> float:
         """When the next evaluation is due (monotonic seconds): 0 if alarms wait for it."""
         if self._waiting:
             return 0.0
-        return self._timers[0][0] if self._timers else math.inf
+        return min(self._timers[0][0] if self._timers else math.inf, self._watch.due)
 
     @property
     def refused_entries(self) -> int:
         """How many entries of robots were not kept, as there were too many."""
         return self._refused
+
+    @property
+    def lock_changes(self) -> int:
+        """How often a lock of controls by alarms has changed."""
+        return self._lock_changes + self._watch.changes
 
     def now(self) -> Moment:
         return self._clock()
@@ -123,6 +120,7 @@ class AlarmEngine:
     def evaluate(self, most: int = MAX_EVALUATED) -> None:
         """Evaluates the alarms that wait, and those whose time has come: `most` of them."""
         now = self._clock()
+        self._watch.expire(self._robots, now.monotonic)
         while self._timers and self._timers[0][0] <= now.monotonic:
             at, alarm_id = heapq.heappop(self._timers)
             alarm = self.alarms[alarm_id]
@@ -147,6 +145,7 @@ class AlarmEngine:
     ) -> None:
         """A robot published entries of an alarm with `diagnostics` or a list; `at` in monotonic
         seconds. A list without `active` has all of its active entries, if it was read as a whole."""
+        self._watch.heard(robot, alarm_id, at)
         source = self._sources[robot, alarm_id]
         named = {entry.name: entry for entry in entries}
         for entry in named.values():
@@ -280,7 +279,7 @@ class AlarmEngine:
 
     def _note_lock(self, alarm: AlarmInstance, before: tuple[bool, bool, TextLike]) -> None:
         if alarm.definition.alarm.inhibits and alarm.lock != before:
-            self.lock_changes += 1
+            self._lock_changes += 1
 
     def _transition(
         self, alarm: AlarmInstance, before: AlarmStatus, now: Moment, act: str = "", actor: str = ""

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import cast
+from typing import NamedTuple, cast
 
 from app.alarms.delays import LIMIT_LEVELS, DelayedCondition, Delays, Limit, LimitName
 from app.alarms.entries import AlarmEntry
 from app.alarms.states import AlarmKind
-from app.alarms.status import NORMAL, AlarmRules, AlarmStatus
+from app.alarms.status import NORMAL, AlarmRules, AlarmStatus, Moment
 from app.i18n import TextLike
 from app.panel.alarm import Alarm
 from app.panel.model import Panel
@@ -151,3 +151,17 @@ class AlarmInstance:
             self.priority,
             -(raised_at.monotonic if raised_at else 0.0),
         )
+
+
+class Transition(NamedTuple):
+    """A change of an alarm: `seq` gives the order. `act` is the act that caused it, "" for none, and
+    `actor` its actor. `value` is that of the source."""
+
+    seq: int
+    at: Moment
+    id: str
+    before: AlarmStatus
+    after: AlarmStatus
+    act: str = ""
+    actor: str = ""
+    value: float | None = None

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from app.alarms.disk import AlarmDisk, Change, DiskEvents
-from app.alarms.engine import AlarmEngine, Transition
+from app.alarms.engine import AlarmEngine
+from app.alarms.instance import Transition
 from app.alarms.records import record_of
 from app.alarms.rows import AlarmRow, row_of, state_of
 from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from app.alarms import evaluation
-from app.alarms.engine import MAX_ENTRIES, MAX_EVALUATED, AlarmEngine, Transition
+from app.alarms.engine import MAX_ENTRIES, MAX_EVALUATED, AlarmEngine
 from app.alarms.entries import entries_of
-from app.alarms.instance import Definition
+from app.alarms.instance import Definition, Transition
 from app.alarms.sources import read_source
 from app.alarms.states import State
 from app.alarms.status import (
@@ -347,3 +347,42 @@ def test_an_evaluation_reads_only_alarms_that_may_have_changed(
     air.engine.evaluate()
     assert len(read) == 500 + MAX_EVALUATED
     assert air.engine.due == 0.0
+
+
+def test_controls_are_locked_until_a_robot_has_published_its_alarms(cell: partial[Cell]) -> None:
+    motors = cell(HEALTH + 'inhibits = ["start"]\n')
+    assert motors.inhibiting() == ["health"]
+    motors.publish_entries("health", ("motor 1", OK, "runs", ""))
+    assert motors.inhibiting() == []
+    motors.publish_entries("health", ("motor 1", ERROR, "hot", ""))
+    assert motors.inhibiting() == ["health:motor 1"]
+    motors.publish_entries("health", ("motor 1", OK, "runs", ""))
+    assert motors.inhibiting() == []
+
+
+def test_controls_are_locked_when_a_robot_publishes_its_alarms_no_more(cell: partial[Cell]) -> None:
+    motors = cell(HEALTH + 'inhibits = ["start"]\n')
+    motors.publish_entries("health", ("motor 1", OK, "runs", ""))
+    locks = motors.engine.lock_changes
+    assert motors.wait_until_due() == 5.0
+    assert motors.inhibiting() == ["health"]
+    assert motors.engine.lock_changes == locks + 1
+    motors.publish_entries("health", ("motor 1", OK, "runs", ""))
+    assert motors.inhibiting() == []
+
+
+def test_controls_are_locked_when_the_robot_of_a_source_is_lost(cell: partial[Cell]) -> None:
+    motors = cell(HEALTH + 'inhibits = ["start"]\n')
+    motors.publish_entries("health", ("motor 1", OK, "runs", ""))
+    motors.robot.link_up = False
+    motors.engine.evaluate()
+    motors.robot.link_up = True
+    assert motors.inhibiting() == ["health"]
+
+
+def test_controls_are_locked_while_a_limits_topic_was_never_heard(cell: partial[Cell]) -> None:
+    air = cell(AIR)
+    air.engine.evaluate()
+    assert air.inhibiting() == ["air"]
+    air.publish(6.0)
+    assert air.inhibiting() == []
