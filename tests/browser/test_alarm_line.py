@@ -21,7 +21,7 @@ from tests.web.test_alarms import LOW, PANEL, act, listed, server_with
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 LINE: Final = ".alarm-line"
 BUTTON: Final = ".alarm-line button"
-NOW_AND_THEN: Final = "values = [6.0, 4.5], period_s = 1.0"
+NOW_AND_THEN: Final = "values = [6.0, 4.5], period_s = 8.0"
 CONTROL: Final = "\n[control]\nrequired = true\n"
 
 
@@ -111,7 +111,7 @@ def test_nothing_moves_when_an_alarm_comes(tmp_path: Path, page: Page) -> None:
 
         until(is_quiet, "no alarm is unacknowledged")
         before = [place(page.locator(part).first) for part in places]
-        until(lambda: bool(shown()), "an alarm comes again", within_s=20)
+        until(lambda: bool(shown()), "an alarm comes again", within_s=40)
         assert [place(page.locator(part).first) for part in places] == before
 
 
@@ -149,9 +149,6 @@ def test_without_scripts_a_form_acknowledges_what_it_showed(
     expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_low")
     assert listed(cell)["air_latched"]["acknowledged"]
     assert not listed(cell)["air_low"]["acknowledged"]
-    # The next page is too new to be read: a second tap on it is refused, and the line says so.
-    page.locator(BUTTON).click()
-    expect(page.locator(f"{LINE} .refused")).not_to_be_empty()
 
 
 def test_axe_finds_nothing_on_the_line(cell: Server, axe_page: Page) -> None:

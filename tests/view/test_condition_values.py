@@ -74,17 +74,6 @@ def test_what_is_not_met_comes_first(
     assert (view["shape"], view["row_states"], view["order"]) == (shape, states, order)
 
 
-def test_unmet_condition_says_what_to_do() -> None:
-    panel = panel_of(LIST, condition=[AIR | {"action": "Open valve V1."}])
-    robot = robot_there(panel)
-    endpoint(robot, "MP", "/air", FLOAT)
-    needs = []
-    for bar in (4.5, 5.5):
-        says(robot, "/air", bar, FLOAT)
-        needs.append(english(build_view(panel, robot, NOW).view["widgets"]["checks"])["row_needs"][1])
-    assert needs == ["Open valve V1.", "needs 5 bar or more"]
-
-
 def test_a_value_that_is_too_old_is_not_known() -> None:
     view = checked(permitted=True, bar=5.5, now=NOW + 6)
     assert view["row_states"] == ["met", "unknown"]
