@@ -281,12 +281,13 @@ def test_the_page_works_without_scripts(
         expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
         page.get_by_label("Text").fill("turn")
         page.get_by_role("button", name="Show").click()
-        expect(page.locator("tbody tr")).to_have_count(50)
-        newest = page.locator("tbody tr td").first.inner_text()
+        rows = page.locator("tr[data-number]")
+        expect(rows).to_have_count(50)
+        newest = rows.first.get_attribute("data-number") or ""
         page.get_by_role("link", name="Older").click()
-        assert page.locator("tbody tr td").first.inner_text() != newest
+        assert rows.first.get_attribute("data-number") != newest
         page.get_by_role("link", name="Newest").click()
-        expect(page.locator("tbody tr td").first).to_have_text(re.compile(newest.split()[0]))
+        expect(rows.first).to_have_attribute("data-number", newest)
         small = page.evaluate(
             "() => [...document.querySelectorAll('a, button, input:not([type=checkbox]), select')]"
             ".filter((e) => e.getBoundingClientRect().height < 44).map((e) => e.outerHTML)"
@@ -296,9 +297,9 @@ def test_the_page_works_without_scripts(
         assert wide <= 0
         table = page.locator(".entries")
         assert table.evaluate("(e) => e.scrollWidth - e.clientWidth") <= 0
-        row = table.locator("tbody tr").first
-        expect(row.locator("td").nth(3)).to_have_text(re.compile("^Message turn"))
-        expect(row.locator("td").nth(5)).to_have_text(re.compile("^publishedSent on"))
+        cells = rows.first.locator("td")
+        expect(cells.nth(2)).to_contain_text(re.compile("Message turn"))
+        expect(cells.nth(3)).to_contain_text(re.compile("Sent on"))
     finally:
         context.close()
 
