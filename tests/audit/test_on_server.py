@@ -290,7 +290,8 @@ def test_the_page_works_without_scripts(
         expect(rows.first).to_have_attribute("data-number", newest)
         small = page.evaluate(
             "() => [...document.querySelectorAll('a, button, input:not([type=checkbox]), select')]"
-            ".filter((e) => e.getBoundingClientRect().height < 44).map((e) => e.outerHTML)"
+            ".filter((e) => e.checkVisibility() && e.getBoundingClientRect().height < 44)"
+            ".map((e) => e.outerHTML)"
         )
         assert small == []
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
 from app.panel.widgets.tiles import LOW_SCREEN, Screen
-from tests.support.browser.pages import DRAWN, ROWS, grown, place
+from tests.support.browser.pages import DRAWN, ROWS, place
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 
@@ -72,7 +72,7 @@ def test_sizes_are_those_of_the_browser(
             described = cell.parts[group["number"]]
             assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
             rows = page.evaluate(ROWS, group["number"])
-            assert grown(rows, row_heights(described, screen)) <= 1
+            assert rows == pytest.approx(row_heights(described, screen), abs=1)
 
 
 def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(

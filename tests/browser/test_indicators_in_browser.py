@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_width, reason, row_heights
 from app.panel.widgets.tiles import Screen
-from tests.support.browser.pages import ROWS, grown, widget
+from tests.support.browser.pages import ROWS, widget
 from tests.support.parts import ROOT, Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server, panel_file
 
@@ -276,7 +276,7 @@ def test_sizes_are_those_of_the_browser(cell: Server, panel: Panel, page: Page, 
         shown = page.locator(f'.group[data-group="{number}"]')
         if not shown.is_visible():
             continue
-        assert grown(page.evaluate(ROWS, number), row_heights(group, screen)) <= 1
+        assert page.evaluate(ROWS, number) == pytest.approx(row_heights(group, screen), abs=1)
         assert group_width(group, described, screen, width) > 0
         cut = shown.evaluate(
             "(g) => g.scrollHeight > g.clientHeight + 1 || g.scrollWidth > g.clientWidth + 1"

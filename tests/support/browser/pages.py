@@ -1,6 +1,5 @@
 """Functions for any page in tests."""
 
-from collections.abc import Sequence
 from typing import Final
 
 from playwright.sync_api import FloatRect, Locator, Page
@@ -56,13 +55,3 @@ def middle(element: Locator) -> tuple[float, float]:
     """The middle of a visible element, in px of the window."""
     box = place(element)
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def grown(shown: Sequence[float], needed: Sequence[float]) -> int:
-    """How many rows of a group are higher than they need to be; none is lower."""
-    assert len(shown) == len(needed)
-    assert all(height >= least - 1 for height, least in zip(shown, needed, strict=True)), (
-        shown,
-        needed,
-    )
-    return sum(height > least + 1 for height, least in zip(shown, needed, strict=True))
