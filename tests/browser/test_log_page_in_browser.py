@@ -89,7 +89,7 @@ def test_nothing_moves_while_a_page_loads(cell: Server, own_page: Page, size: tu
         own_page.goto(cell.url + path)
         expect(own_page.locator("html[data-floor]")).to_be_attached()
         own_page.evaluate(DRAWN)
-        return own_page.evaluate("shifts") == []
+        return bool(own_page.evaluate("shifts") == [])
 
     for path in (*paths, "/log"):  # what loading moves, it moves each time; a value only now and then
         until(partial(loads_still, path), f"nothing moves on {path}")
