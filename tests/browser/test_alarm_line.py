@@ -109,7 +109,7 @@ def test_nothing_moves_when_an_alarm_comes(tmp_path: Path, page: Page) -> None:
         def shown() -> str:
             return line.get_attribute("data-alarm") or ""
 
-        until(is_quiet, "no alarm is unacknowledged")
+        until(is_quiet, "no alarm is unacknowledged", every_s=0.5)  # acts have a rate
         before = [place(page.locator(part).first) for part in places]
         until(lambda: bool(shown()), "an alarm comes again", within_s=40)
         assert [place(page.locator(part).first) for part in places] == before
