@@ -188,6 +188,8 @@ class AlarmEngine:
         """Evaluates one alarm; returns its transitions."""
         definition, before = alarm.definition, alarm.status
         lock, robot = alarm.lock, self._robots.get(definition.robot)
+        if robot is not None and not (robot.link_up and robot.graph.peers):
+            alarm.heard_at = -math.inf  # what was published before a cut does not count after it
         reading = read_alarm(alarm, robot, now.monotonic, self._began_at)
         status = expire(before, definition.rules, now)
         levels, conditions = levels_of(alarm, reading, now.monotonic)
@@ -262,11 +264,6 @@ class AlarmEngine:
         urgent first, then the newest."""
         listed = [alarm for alarm in self.alarms.values() if not alarm.is_unlisted]
         return sorted(listed, key=lambda alarm: alarm.order)
-
-    def inhibiting(self, robot: str, widget: str) -> Iterator[AlarmInstance]:
-        """The alarms of a robot that lock a control now."""
-        alarms = self._inhibitors.get((robot, widget), ())
-        yield from (alarm for alarm in alarms if alarm.inhibits)
 
     def inhibited(self, robot: str) -> Mapping[str, AlarmInstance]:
         """The controls of a robot that alarms lock now, each with the most urgent of them."""

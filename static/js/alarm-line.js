@@ -7,7 +7,7 @@ const IN_CONTROL = ["", "holding", "asked"];
 const TEXTS = ["priority_text", "since_text", "text", "action"];
 
 /** @param {string} path @param {object} body @returns {Promise<Data>} */
-export async function sendAct(path, body) {
+async function sendAct(path, body) {
   const { root } = find(document, ".alarm-line").dataset;
   try {
     const answer = await (await post(`${root}/alarms/${path}`, body, RESPONSE_TIMEOUT_MS)).json();

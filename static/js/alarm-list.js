@@ -29,10 +29,10 @@ export function showRows(alarms, isSnapshot) {
   if (details && chosen) showTexts(details, chosen);
 }
 
-/** @param {Data} one @param {Data} other */
-function compare({ order: one }, { order: other }) {
-  const at = one.findIndex((/** @type {number} */ part, /** @type {number} */ i) => part !== other[i]);
-  return at < 0 ? 0 : one[at] - other[at];
+/** @param {Data} left @param {Data} right */
+function compare({ order: left }, { order: right }) {
+  const at = left.findIndex((/** @type {number} */ part, /** @type {number} */ i) => part !== right[i]);
+  return at < 0 ? 0 : left[at] - right[at];
 }
 
 /** @param {HTMLElement} item @param {Data} row */

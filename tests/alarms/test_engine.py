@@ -139,7 +139,8 @@ class Cell:
         return self.engine.act(alarm, "acknowledge", apply, "Ann")
 
     def inhibiting(self) -> list[str]:
-        return [alarm.definition.id for alarm in self.engine.inhibiting("", "start")]
+        alarm = self.engine.inhibited("").get("start")
+        return [alarm.definition.id] if alarm else []
 
 
 @pytest.fixture
@@ -386,3 +387,17 @@ def test_controls_are_locked_while_a_limits_topic_was_never_heard(cell: partial[
     assert air.inhibiting() == ["air"]
     air.publish(6.0)
     assert air.inhibiting() == []
+
+
+def test_a_published_alarm_from_before_a_cut_is_not_known_until_it_is_published_again(
+    cell: partial[Cell],
+) -> None:
+    motors = cell(HEALTH)
+    motors.publish_entries("health", ("motor 1", ERROR, "hot", ""))
+    for link_up in (False, True):
+        motors.robot.link_up = link_up
+        motors.engine.robot_changed("")
+        motors.engine.evaluate()
+        assert motors.status("health:motor 1").unknown_since is not None
+    motors.publish_entries("health", ("motor 1", ERROR, "hot", ""))
+    assert motors.status("health:motor 1").unknown_since is None
