@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from app.alarms.store import AlarmStore, HistoryFilter, HistoryRow, read_history
-from app.audit.database import Files, as_log_error
+from app.audit.database import Files, as_log_error, make_way
 from app.disk_writer import DiskWriter
 from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, say
@@ -19,7 +19,6 @@ from app.panel.alarm import AlarmRules
 log = logging.getLogger("kiosk.alarms")
 
 NAME: Final = "alarms.sqlite3"
-SUFFIXES: Final = ("", "-wal", "-shm")
 MAX_WAITING: Final = 20_000  # changes; of those beyond, the disk gets only the last of each alarm
 STOP_TIMEOUT_S: Final = 5.0
 TIDY_EVERY_S: Final = 600.0
@@ -138,18 +137,10 @@ class AlarmDisk:
         self._report(say("alarm_not_kept", why=error.text))
 
     def _begin_again(self, error: LogError) -> None:
-        """Sets a damaged file aside, and removes what belongs to one that is gone."""
-        with suppress(OSError):
-            if isinstance(error, LogGone) and error.is_main_file:
-                for suffix in SUFFIXES[1:]:
-                    (self._folder / (NAME + suffix)).unlink(missing_ok=True)
-            elif isinstance(error, LogCorrupt):
-                stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-                name = f"alarms.damaged-{stamp}.sqlite3"
-                log.error("%s is damaged: it is kept as %s", self._folder / NAME, name)
-                for suffix in SUFFIXES:
-                    if (file := self._folder / (NAME + suffix)).exists():
-                        file.replace(self._folder / (name + suffix))
+        """Makes way for a new file, in place of one that is damaged or gone."""
+        with suppress(LogError):
+            if kept_as := make_way(self._folder, NAME, error):
+                log.error("%s is damaged: it is kept as %s", self._folder / NAME, kept_as)
         if self._is_loaded:
             self._call(self._events.emptied)
 

@@ -193,17 +193,31 @@ def make_room(folder: Path) -> str:
     return ""
 
 
-def set_aside(folder: Path, word: Literal["damaged", "found"] = "damaged") -> str:
-    """Renames files that can't be used; returns the new name, with the time. Nothing is deleted."""
+def set_aside(folder: Path, word: Literal["damaged", "found"] = "damaged", database: str = NAME) -> str:
+    """Renames a database that can't be used; returns the new name, with the time. Nothing is deleted.
+    LogError if that fails."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-    stem = NAME.removesuffix(".sqlite3")
+    stem = database.removesuffix(".sqlite3")
     number, name = 0, f"{stem}.{word}-{stamp}.sqlite3"
     while any((folder / (name + suffix)).exists() for suffix in SUFFIXES):
         number += 1
         name = f"{stem}.{word}-{stamp}.{number}.sqlite3"
     with as_log_error():
         for suffix in reversed(SUFFIXES):
-            old = folder / (NAME + suffix)
+            old = folder / (database + suffix)
             if old.exists():
                 old.rename(folder / (name + suffix))
     return name
+
+
+def make_way(folder: Path, database: str, error: LogError) -> str:
+    """Makes way for a new database, after `check` of the old one has failed: a damaged one is kept, and
+    of one that is gone the journal is removed, with which a new one must not be opened. Returns the
+    name of the one that is kept, "" without one; LogError if that fails."""
+    if isinstance(error, LogCorrupt):
+        return set_aside(folder, database=database)
+    if isinstance(error, LogGone) and error.is_main_file:
+        with as_log_error():
+            for suffix in SUFFIXES[1:]:
+                (folder / (database + suffix)).unlink(missing_ok=True)
+    return ""

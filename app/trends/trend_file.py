@@ -7,7 +7,6 @@ while it is written.
 import logging
 import math
 import sqlite3
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
@@ -40,22 +39,6 @@ FIND_FIELD: Final = "SELECT number FROM field WHERE robot = ? AND topic = ? AND 
 
 FieldName = tuple[str, str, str, str]  # robot's id, topic, type, field
 Rows = Mapping[FieldName, Mapping[int, Iterable[Bucket]]]  # of each width in seconds
-
-
-def set_aside(folder: Path) -> None:
-    """Renames a damaged file; OSError if that fails."""
-    stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-    name = f"trends.damaged-{stamp}.sqlite3"
-    log.error("%s is damaged: it is kept as %s", folder / NAME, name)
-    for suffix in SUFFIXES:
-        if (file := folder / (NAME + suffix)).exists():
-            file.replace(folder / (name + suffix))
-
-
-def remove_journal(folder: Path) -> None:
-    """Removes what belongs to a file that is gone: a new file must not be opened with it."""
-    for suffix in SUFFIXES[1:]:
-        (folder / (NAME + suffix)).unlink(missing_ok=True)
 
 
 class TrendFile:

@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
-from app.audit.database import as_log_error
+from app.audit.database import as_log_error, make_way
 from app.disk_writer import DiskWriter
 from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, say
@@ -22,7 +22,7 @@ from app.panel.model import Panel
 from app.panel.widgets.trend import disk_fields, trends_of
 from app.robot.history import Bucket, FieldHistory, History, Level
 from app.robot.state import RobotState
-from app.trends.trend_file import FieldName, Rows, TrendFile, remove_journal, set_aside
+from app.trends.trend_file import NAME, FieldName, Rows, TrendFile
 
 log = logging.getLogger("kiosk.trends")
 
@@ -248,11 +248,9 @@ class TrendWriter:
         """Shows the fault, logged once. In place of a file that is damaged or gone a new one is begun,
         with all that is in memory."""
         if isinstance(error, LogCorrupt | LogGone):
-            with suppress(OSError):
-                if isinstance(error, LogCorrupt):
-                    set_aside(self._folder)
-                elif error.is_main_file:
-                    remove_journal(self._folder)
+            with suppress(LogError):
+                if kept_as := make_way(self._folder, NAME, error):
+                    log.error("%s is damaged: it is kept as %s", self._folder / NAME, kept_as)
             self._call(self._begin_again, None)
         if not self._fault:
             log.error("trends are not written to %s: %s", self._folder, error)
