@@ -59,8 +59,7 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
 
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
 def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -> None:
-    cookie = {"name": "kiosk_language", "value": language, "url": server.url}
-    page.context.add_cookies([cookie])  # type: ignore[list-item]
+    page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": server.url}])
     page.goto(server.url)
     for path in page.locator(".pages a").evaluate_all("(tabs) => tabs.map((tab) => tab.href)"):
         page.goto(path)

@@ -66,8 +66,7 @@ def test_parts_of_the_header_have_room(
     branded: Server, controlled: Server, page: Page, language: str
 ) -> None:
     for server in (branded, controlled):
-        cookie = {"name": "kiosk_language", "value": language, "url": server.url}
-        page.context.add_cookies([cookie])  # type: ignore[list-item]
+        page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": server.url}])
         page.goto(server.url)
         expect(page.locator("html[data-floor]")).to_be_attached()
         for width, height in SIZES:
@@ -78,8 +77,7 @@ def test_parts_of_the_header_have_room(
 
 
 def test_who_has_control_is_said_in_words_of_their_own_width(controlled: Server, page: Page) -> None:
-    cookie = {"name": "kiosk_language", "value": "de", "url": controlled.url}
-    page.context.add_cookies([cookie])  # type: ignore[list-item]
+    page.context.add_cookies([{"name": "kiosk_language", "value": "de", "url": controlled.url}])
     page.goto(controlled.url)
     sized(page, 800, 480).evaluate(DRAWN)
     who = page.locator(".control > div").bounding_box()

@@ -550,17 +550,17 @@ def test_a_late_message_is_not_followed_by_another_at_once() -> None:
 
 
 class Recorder:
-    """Keeps what a recording of holds is told."""
+    """Keeps the events that a recording of holds receives."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[str, str]] = []
+        self.events: list[tuple[str, str]] = []
 
     def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
         assert (widget, who) == ("jog", WHO)
-        self.told.append(("press", press_id))
+        self.events.append(("press", press_id))
 
     def record_receipt(self, receipt: Receipt) -> None:
-        self.told.append((receipt.outcome, receipt.id))
+        self.events.append((receipt.outcome, receipt.id))
 
 
 def test_begin_end_and_refusal_of_a_hold_are_recorded() -> None:
@@ -571,7 +571,7 @@ def test_begin_end_and_refusal_of_a_hold_are_recorded() -> None:
     bench.holds.end(holding, RELEASED)
     hold_id = holding.press.id
     assert isinstance(again, Receipt)
-    assert recorder.told == [
+    assert recorder.events == [
         ("press", hold_id),
         ("press", again.id),
         ("refused", again.id),
