@@ -1,5 +1,6 @@
 """The page of alarms: its list follows the events, its acts are forms with a receipt."""
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -95,3 +96,15 @@ def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page
             sized(axe_page, width, height).evaluate(DRAWN)
             assert axe_page.evaluate("document.documentElement.scrollWidth") == width
             assert violations(axe_page) == [], (path, width)
+
+
+def test_what_is_shown_while_the_server_does_not_answer_can_be_read(
+    cell: Server, axe_page: Page
+) -> None:
+    started(axe_page, cell.url + "/alarms?alarm=air_low")
+    cell.process.send(signal.SIGSTOP)
+    try:
+        expect(axe_page.locator("[data-cut] .alarms")).to_be_attached()
+        assert violations(axe_page) == []
+    finally:
+        cell.process.send(signal.SIGCONT)

@@ -2,6 +2,8 @@
 and when it is dark."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -51,14 +53,19 @@ FEELS: Final = """(button) => new Promise((resolve) => {
 })"""
 
 
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    above = "\n[screen]\ndim_after_s = 2"
+@contextmanager
+def stop_server(folder: Path, above: str = "") -> Iterator[Server]:
     panel = PANEL.replace('\n[[page]]\nid = "other"\n', RESET) % above
     panel = panel.replace('\n[[page]]\nid = "setup"\n', PAUSE)
-    with demo_server(tmp_path_factory.mktemp("stop"), panel) as mine:
-        permit(mine)
-        yield mine
+    with demo_server(folder, panel) as server:
+        permit(server)
+        yield server
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with stop_server(tmp_path_factory.mktemp("stop")) as server:
+        yield server
 
 
 @pytest.fixture
@@ -290,13 +297,15 @@ def test_cleaning_ends_when_its_button_is_held(page: Page, cell: Server) -> None
     touch.send("touchEnd")
 
 
-def test_the_first_touch_on_a_dark_page_stops(page: Page, cell: Server) -> None:
-    before = stops(cell)
-    expect(page.locator("#dark")).to_be_visible()
-    assert uncovered(page)
-    page.touchscreen.tap(*middle(page.locator(STOP)))
-    pressed(cell, before)
-    expect(page.locator("#dark")).to_be_hidden()
+def test_the_first_touch_on_a_dark_page_stops(touchscreen: Page, tmp_path: Path) -> None:
+    with stop_server(tmp_path, "\n[screen]\ndim_after_s = 2") as cell:
+        page = touched(touchscreen, cell)
+        before = stops(cell)
+        expect(page.locator("#dark")).to_be_visible()
+        assert uncovered(page)
+        page.touchscreen.tap(*middle(page.locator(STOP)))
+        pressed(cell, before)
+        expect(page.locator("#dark")).to_be_hidden()
 
 
 @pytest.mark.real_time
