@@ -37,7 +37,7 @@ async def assume_flushed() -> bool:
 
 
 class PreparedPress(NamedTuple):
-    """A press to be sent: the checked `values` of its inputs, and the `fields` of the filled-in
+    """A press to be sent: the `values` that its inputs send, and the `fields` of the filled-in
     template."""
 
     values: dict[str, Any]
@@ -100,7 +100,7 @@ class Dispatcher:
             ),
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
-            Input: lambda widget, value: widget.check_value(value),
+            Input: lambda widget, value: widget.sent_value(widget.check_value(value)),
             Parameter: self._parameters.check_value,
             Step: self._check_step,
         }
@@ -218,7 +218,8 @@ class Dispatcher:
         )
 
     def check_inputs(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The checked values of the inputs with these ids; InputError for bad or missing ones."""
+        """The values to be sent of the inputs with these ids, checked; InputError for bad or missing
+        ones."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), EntryWidget):
                 raise InputError(f'there is no input "{name:.60}" on this panel')

@@ -8,6 +8,7 @@ from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field
 from app.interfaces.validation import fitting_constants, format_value, unknown_constant
 from app.panel.condition import Condition
 from app.panel.number_range import to_float32
+from app.panel.values import NegatedText
 
 Resolved = TypeVar("Resolved", bound=Condition)
 
@@ -51,8 +52,13 @@ def resolve_at(value: Any, type_name: str, field: str, interfaces: Interfaces) -
     """A value for a field of a type: that of a constant where it is its name."""
     kind = interfaces.type_at(type_name, field)
     return resolve_constant(
-        value, kind, interfaces.constants(_parent_type(type_name, field, interfaces))
+        _number_in(value, kind), kind, interfaces.constants(_parent_type(type_name, field, interfaces))
     )
+
+
+def _number_in(value: Any, kind: Type) -> Any:
+    """The number of `"-{id}"` where the field is none of text."""
+    return value.item() if isinstance(value, NegatedText) and kind.name not in STRING_TYPES else value
 
 
 def mismatch_at(value: Any, type_name: str, field: str, interfaces: Interfaces) -> str | None:
@@ -60,6 +66,7 @@ def mismatch_at(value: Any, type_name: str, field: str, interfaces: Interfaces) 
     can."""
     kind, holder = interfaces.type_at(type_name, field), _parent_type(type_name, field, interfaces)
     names = fitting_constants(kind, interfaces.constants(holder))
+    value = _number_in(value, kind)
     if isinstance(value, str) and names:
         return None if value in names else unknown_constant(value, kind, holder, names)
     return value_mismatch(value, kind.name)

@@ -11,6 +11,7 @@ from typing import Any, Final
 from app.errors import FieldError
 from app.i18n import TextLike
 from app.i18n.values import each_language
+from app.panel.values import negated
 from app.panel.widgets.families import Command
 
 # In texts about a response: a field's path. (In messages to send, a placeholder is an input's id.)
@@ -36,8 +37,9 @@ def add_now(values: Mapping[str, Any]) -> dict[str, Any]:
 def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     """The template with each `{id}` replaced by that input's value.
 
-    A string that is nothing but `{id}` becomes the value itself, with its type; `{{` and `}}`
-    stand for braces. Values are put in once: braces in them are only text.
+    A string that is nothing but `{id}` becomes the value itself, with its type, and `-{id}` its
+    negative in a field of numbers; `{{` and `}}` stand for braces. Values are put in once: braces in
+    them are only text.
     """
     if isinstance(template, Mapping):
         return {k: fill(v, inputs, f"{where}.{k}".strip(".")) for k, v in template.items()}
@@ -48,6 +50,10 @@ def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     parts = _parse_text(template, where)
     if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
         return inputs[parts[0][1]]
+    if len(parts) == 1 and parts[0][0] == "-" and parts[0][1] is not None:
+        value = inputs[parts[0][1]]
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return negated(value)
     return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
 
 

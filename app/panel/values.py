@@ -43,3 +43,20 @@ def split_list(text: str) -> list[str]:
         elements.append(plain.strip() if quoted is None else quoted.replace('""', '"'))
         at, more = match.end(), match["end"] == ","
     return elements
+
+
+class NegatedText(str):
+    """The text of `"-{id}"`, which in a field of numbers is the negative of the input's number."""
+
+    number: float
+
+    def item(self) -> float:
+        """The number, as scalars of array libraries give theirs."""
+        return self.number
+
+
+def negated(value: float) -> NegatedText:
+    """The negative of an input's number."""
+    text = NegatedText(f"-{value}")
+    text.number = -value
+    return text

@@ -64,6 +64,8 @@ def _text_fits(template: str, value: Any, inputs: dict[str, Any]) -> bool:
         return True
     if names and template == f"{{{names[0]}}}":
         return _learned(names[0], value, inputs)
+    if names and template == f"-{{{names[0]}}}" and not isinstance(value, str):
+        return _learned(names[0], -value, inputs)
     if not names:
         return bool(fill(template, {}) == value)
     match = re.fullmatch(_pattern(template), value, re.DOTALL) if isinstance(value, str) else None

@@ -249,6 +249,9 @@ def began(values: dict[str, Any]) -> Entry:
         ([began({})], True),
         ([pressed().follow_up("closed", "published", "Sent."), began({})], True),
         ([pressed(), began({})], False),
+        ([pressed().follow_up("closed", "published", "Sent."), began({"mode": "live"})], False),
+        ([pressed().follow_up("closed", "published", "Sent."), pressed(), began({})], False),
+        ([new_entry("corrected", FROM)], False),
     ],
 )
 def test_a_log_begins_later_only_with_an_entry_that_says_so(
@@ -260,6 +263,17 @@ def test_a_log_begins_later_only_with_an_entry_that_says_so(
     fill(store, 2)
     store.close()
     assert (verify(tmp_path, before.hash).fault == "") is good
+
+
+def test_entry_that_says_where_a_log_begins_does_not_hide_removed_entries(
+    store: Store, tmp_path: Path
+) -> None:
+    fill(store, 2)
+    store.append([began({"first": store.head.seq + 1})])
+    fill(store, 1)
+    assert verify(tmp_path).fault == ""
+    store._db.execute("DELETE FROM entry WHERE kind != 'began' AND seq < 5")
+    assert "removed" in verify(tmp_path).fault
 
 
 def test_emptied_log_is_reported_when_writing_continues(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ from tests.support.builders import (
     sending_of,
     small_panel,
 )
-from tests.support.words import coded, why
+from tests.support.words import coded, english, why
 
 PATH = "nav_msgs/msg/Path"
 
@@ -328,6 +328,35 @@ def test_an_input_with_a_default_may_be_left_out() -> None:
     assert bench.press(inputs=used) == receipt  # the same press, said in full
     bench.press(inputs={"reach": -1, "mode": 1}, press_id="p2")
     assert bench.way.texts == ["hi 0.25 2 false 5", "hi -1.0 1 false 5"]
+
+
+def test_an_input_is_sent_in_the_unit_of_the_robot_and_logged_as_it_was_entered() -> None:
+    way = {"id": "way", "kind": "slider", "label": "Way", "min": 0, "max": 500, "unit": "mm"}
+    turn = {"id": "turn", "kind": "number", "label": "Turn", "min": 0, "max": 180, "unit": "°"}
+    point = {"x": "{way}", "y": "-{way}", "z": "{turn}"}
+    panel = panel_of(
+        {**way, "send_unit": "m"},
+        {**turn, "send_unit": "rad"},
+        {**FREE, "type": "geometry_msgs/msg/Point", "message": point},
+    )
+    bench = Bench(panel)
+    receipt = bench.press(inputs={"way": 40, "turn": 180})
+    assert receipt.inputs == {"way": 40, "turn": 180}
+    ((_, payload),) = bench.way.sent
+    sent = INTERFACES.decode("geometry_msgs/msg/Point", payload)
+    assert (sent.x, sent.y, sent.z) == (0.04, -0.04, math.pi)
+    too_far = bench.press(inputs={"way": 501, "turn": 0}, press_id="p2")
+    assert too_far.outcome == "refused"
+    assert "0 to 500 mm" in english(too_far.reason)
+
+
+def test_a_whole_number_stays_whole_where_each_step_does() -> None:
+    way = {"id": "way", "kind": "number", "label": "Way", "min": -1.0, "max": 1.0, "step": 0.1}
+    table = {**FREE, "type": "std_msgs/msg/Int16", "message": {"data": "{way}"}}
+    bench = Bench(panel_of({**way, "scale": 1000, "offset": -20}, table))
+    bench.press(inputs={"way": 0.3})
+    ((_, payload),) = bench.way.sent
+    assert INTERFACES.decode("std_msgs/msg/Int16", payload).data == 280
 
 
 @pytest.mark.parametrize("table", [MESSAGE, REACH, MODE, ON, COUNT])

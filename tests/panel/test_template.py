@@ -7,6 +7,7 @@ import pytest
 
 from app.errors import FieldError
 from app.panel.template import add_now, fill, placeholder_ids, placeholders, value_at
+from tests.support.builders import INTERFACES, TEXT
 
 
 @pytest.mark.parametrize(
@@ -38,6 +39,18 @@ def test_inputs_are_put_where_their_ids_stand(template: Any, made: Any) -> None:
 def test_braces_in_a_value_are_only_text(value: str) -> None:
     assert fill("<{a}>", {"a": value, "b": "secret"}) == f"<{value}>"
     assert fill("{a}", {"a": value, "b": "secret"}) == value
+
+
+def test_negative_input_is_a_number_in_a_number_and_text_in_a_text() -> None:
+    assert (
+        INTERFACES.decode(TEXT, INTERFACES.encode(TEXT, fill({"data": "-{n}"}, {"n": 7}))).data == "-7"
+    )
+    for type_name, value in (("std_msgs/msg/Float64", 0.5), ("std_msgs/msg/Int8", 7)):
+        payload = INTERFACES.encode(type_name, fill({"data": "-{n}"}, {"n": value}))
+        assert INTERFACES.decode(type_name, payload).data == -value
+    for other in (True, "a"):
+        with pytest.raises(FieldError, match="must be a number"):
+            INTERFACES.encode("std_msgs/msg/Float64", fill({"data": "-{n}"}, {"n": other}))
 
 
 def test_keys_are_not_templates() -> None:

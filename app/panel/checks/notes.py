@@ -8,6 +8,7 @@ from app.interfaces import Interfaces
 from app.panel.checks.fit import fit_notes
 from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
+from app.panel.checks.units import unit_notes
 from app.panel.model import Panel
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.service_action import Action
@@ -24,6 +25,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from _unused_interlock_notes(panel)
     yield from _unusable_type_notes(panel, interfaces)
     yield from _trend_notes(panel)
+    yield from unit_notes(panel, interfaces)
     yield from fit_notes(panel)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)

@@ -32,8 +32,11 @@ def template_faults(
 
 
 def example_values(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
-    """Values of inputs by id; each example of each input appears at least once."""
-    tried = {name: input_widget.examples() for name, input_widget in inputs.items()}
+    """Values that inputs send, by id; each example of each input appears at least once."""
+    tried = {
+        name: [*map(input_widget.sent_value, input_widget.examples())]
+        for name, input_widget in inputs.items()
+    }
     for turn in range(max(map(len, tried.values()), default=1)):
         yield {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
 
@@ -100,7 +103,7 @@ def _fault_message(
         field = interfaces.field_type(type_name, error.field)
     except InterfaceError:  # the template has an unknown field
         return error.message
-    if written != f"{{{names[0]}}}":
+    if written not in (f"{{{names[0]}}}", f"-{{{names[0]}}}"):
         return error.message if _detail(error) else f'"{written}" makes text; the field is {field}'
     input_widget = inputs[names[0]]
     gives = input_widget.describe_value(values[input_widget.id], narrow=bool(_detail(error)))

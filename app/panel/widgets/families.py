@@ -136,7 +136,11 @@ class Input(EntryWidget):
 
     @abstractmethod
     def check_value(self, value: Any) -> Any:
-        """The value to be sent; InputError names label and limits."""
+        """The value as it is entered and logged; InputError names label and limits."""
+
+    def sent_value(self, value: Any) -> Any:
+        """The value that a message gets in place of a checked one."""
+        return value
 
     def describe_value(self, value: Any, *, narrow: bool) -> str:
         """The text for a `value` that does not fit its field; `narrow`: only the value is out of range,

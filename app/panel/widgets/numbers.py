@@ -1,6 +1,7 @@
 """The descriptions of number inputs: limits, steps, and checks of a value."""
 
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
@@ -12,6 +13,7 @@ from app.i18n.values import after_space, number_like
 from app.interfaces.validation import format_value
 from app.panel.base import Span, panel_text
 from app.panel.number_range import is_on_step
+from app.panel.units import Conversion, conversion, units_like
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 
@@ -43,7 +45,8 @@ class SteppedWidget(BaseWidget):
 
 
 class Numeric(SteppedWidget, Input):
-    """A number with limits; a whole number if `min` and `step` are whole.
+    """A number with limits; a whole number if `min` and `step` are whole. `value * scale + offset` is
+    sent, or with `send_unit` the value in that unit.
 
     Without a `step` any number between the limits is accepted. If both limits are written as whole
     numbers (0, not 0.0), the step is 1.
@@ -54,6 +57,9 @@ class Numeric(SteppedWidget, Input):
     step: Annotated[Number, Field(gt=0)] | None = None
     unit: Unit = ""
     default: Number | None = None
+    scale: Number = 1.0
+    offset: Number = 0.0
+    send_unit: Annotated[str, Field(min_length=1, max_length=20)] | None = None
     span: Span = 6
 
     @model_validator(mode="before")
@@ -81,7 +87,36 @@ class Numeric(SteppedWidget, Input):
     def comment(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
         first = f", {self.initial_text} at first" if self.initial_text else ""
-        return f"{number_text(self.min)} to {number_text(self.max)}{unit}{first}"
+        return f"{number_text(self.min)} to {number_text(self.max)}{unit}{first}{self._sent_comment}"
+
+    @property
+    def _sent_comment(self) -> str:
+        """The range that leaves the panel, where it is another one."""
+        if not self.is_converted:
+            return ""
+        low, high = sorted(map(float, map(self.sent_value, (self.min, self.max))))
+        unit = f" {self.send_unit}" if self.send_unit else ""
+        return f"; sent as {number_text(low)} to {number_text(high)}{unit}"
+
+    @property
+    def is_converted(self) -> bool:
+        """Whether another number is sent than the one that is shown."""
+        return (self.scale, self.offset) != (1.0, 0.0) or self.send_unit is not None
+
+    @property
+    def _conversion(self) -> Conversion:
+        known = conversion(str(self.unit), self.send_unit) if self.send_unit else None
+        return known or Conversion(Fraction(repr(self.scale)), Fraction(repr(self.offset)))
+
+    def sent_value(self, value: Any) -> Any:
+        """A whole number where every step is sent as one."""
+        if not self.is_converted:
+            return value
+        converted = self._conversion
+        steps = () if self.step is None else (self.min, self.min + self.step)
+        whole = steps and all(float(converted.apply(step)).is_integer() for step in steps)
+        sent = converted.apply(value)
+        return round(sent) if whole else float(sent)
 
     @property
     def html_attributes(self) -> dict[str, str]:
@@ -134,6 +169,7 @@ class Numeric(SteppedWidget, Input):
         low, high = number_text(self.min), number_text(self.max)
         step = "" if self.step is None else number_text(self.step)
         default = "" if self.default is None else number_text(self.default)
+        yield from self._conversion_faults(place)
         if self.max <= self.min:
             yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
         elif not self.is_on_step(self.max):
@@ -147,6 +183,24 @@ class Numeric(SteppedWidget, Input):
             yield Fault(
                 f"{place}.default", f"{default} {message}{any_number if self.step == 1 else ''}"
             )
+
+    def _conversion_faults(self, place: str) -> Iterator[Fault]:
+        unit = str(self.unit)
+        if self.scale == 0:
+            yield Fault(f"{place}.scale", "is 0: the same number would always be sent")
+        if self.send_unit is None:
+            return
+        if (self.scale, self.offset) != (1.0, 0.0):
+            message = "stands beside scale or offset: write the one or the others"
+            yield Fault(f"{place}.send_unit", message)
+        elif not unit:
+            yield Fault(
+                f"{place}.unit", f"is missing: {self.send_unit} is made of the unit that is entered"
+            )
+        elif conversion(unit, self.send_unit) is None:
+            known = units_like(unit)
+            right = f"{unit} can be sent as {', '.join(known)}" if known else "write scale and offset"
+            yield Fault(f"{place}.send_unit", f'from "{unit}" to "{self.send_unit}": {right}')
 
 
 class NumberInput(Numeric):
