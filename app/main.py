@@ -44,6 +44,7 @@ from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
 from app.web.root_path import RootPath, root_path_of
 from app.web.routes import (
+    alarm_history,
     alarms,
     control,
     description,
@@ -125,7 +126,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    for routes in (*ROBOT_ROUTES, alarms, static, health, display, description):
+    for routes in (*ROBOT_ROUTES, alarms, alarm_history, static, health, display, description):
         app.include_router(routes.router)
     if dev:
         _add_gallery(app)

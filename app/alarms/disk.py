@@ -9,7 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from app.alarms.store import AlarmStore, HistoryFilter, HistoryRow, read_history
+from app.alarms.history import HistoryRow
+from app.alarms.store import AlarmStore
 from app.audit.database import Files, as_log_error, make_way
 from app.disk_writer import DiskWriter
 from app.errors import LogCorrupt, LogError, LogGone
@@ -19,6 +20,7 @@ from app.panel.alarm import AlarmRules
 log = logging.getLogger("kiosk.alarms")
 
 NAME: Final = "alarms.sqlite3"
+TIDY_AFTER: Final = 5_000  # transitions; a flood is not kept until the next time
 MAX_WAITING: Final = 20_000  # changes; of those beyond, the disk gets only the last of each alarm
 STOP_TIMEOUT_S: Final = 5.0
 TIDY_EVERY_S: Final = 600.0
@@ -60,6 +62,7 @@ class AlarmDisk:
         self._is_loaded = False
         self._has_fault = False
         self._tidy_at = 0.0
+        self._untidied = 0  # transitions that were written since
 
     def start(self) -> None:
         """Starts the thread, which loads what stood."""
@@ -79,22 +82,14 @@ class AlarmDisk:
         if not await asyncio.to_thread(self._writer.close, STOP_TIMEOUT_S):
             log.error("the disk is too slow: the last changes of alarms were not written")
 
-    async def history(self, wanted: HistoryFilter, limit: int) -> list[HistoryRow]:
-        """The newest transitions of a filter first; LogError if they can't be read."""
-
-        def read() -> list[HistoryRow]:
-            with as_log_error():
-                return read_history(self._folder / NAME, wanted, limit)
-
-        return await asyncio.to_thread(read)
-
     # On the thread: `DiskFile`.
 
     def open(self) -> None:
         with as_log_error():
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            path = self._folder / NAME
-            self._store = AlarmStore(path, days=self._rules.days, size_mb=self._rules.size_mb)
+            self._store = AlarmStore(
+                self._folder / NAME, days=self._rules.days, size_mb=self._rules.size_mb
+            )
             self._files = Files(self._folder, NAME)
             if not self._is_loaded:
                 standing = self._store.standing()
@@ -108,6 +103,7 @@ class AlarmDisk:
             self._files.check()
             rows = [change.row for change in items if change.row is not None]
             self._store.write(rows, {change.id: change.record for change in items})
+            self._untidied += len(rows)
         self._call(self._events.written, items[-1].seq)
         self._report("")
 
@@ -115,8 +111,8 @@ class AlarmDisk:
         log.error("%d changes of alarms were not written: %s", len(items), error)
 
     def tidy(self, quiet: bool) -> None:
-        if (now := time.monotonic()) >= self._tidy_at:
-            self._tidy_at = now + TIDY_EVERY_S
+        if (now := time.monotonic()) >= self._tidy_at or self._untidied >= TIDY_AFTER:
+            self._tidy_at, self._untidied = now + TIDY_EVERY_S, 0
             assert self._store is not None  # it is open
             with as_log_error():
                 self._store.remove_old(time.time())

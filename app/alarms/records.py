@@ -26,6 +26,7 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
         "out_of_service": _taken_out(status.out_of_service, now),
         "suppressed_since": _wall(status.suppressed_since),
         "value": alarm.value if alarm.value is not None and abs(alarm.value) < 1e300 else None,
+        "limit": alarm.limit,
         "about": {
             "text": _as_json(alarm.text),
             "action": _as_json(alarm.action),

@@ -6,77 +6,28 @@ each commit. A write that was torn is not in it, as SQLite checks its sums.
 
 import math
 import sqlite3
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
-SCHEMA: Final = """
-CREATE TABLE IF NOT EXISTS history (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT, at REAL NOT NULL, id TEXT NOT NULL, state TEXT NOT NULL,
-    occurrence INTEGER NOT NULL, act TEXT NOT NULL, actor TEXT NOT NULL, record TEXT NOT NULL
-);
-CREATE INDEX IF NOT EXISTS history_at ON history (at);
-CREATE TABLE IF NOT EXISTS standing (id TEXT PRIMARY KEY, record TEXT NOT NULL);
-"""
+from app.alarms.history import ALL, MAX_PAGE, SCHEMA, HistoryFilter, HistoryRow, history_rows
+
 DAY_S: Final = 86_400.0
 REMOVED_AT_ONCE: Final = 10  # a tenth of the history, if the file is too large
-MAX_PAGE: Final = 500
-
-
-class HistoryRow(NamedTuple):
-    """A transition: `at` in seconds since the epoch, `record` as in `app/alarms/records.py`. `seq`
-    gives the order, also where the clock was set back; 0 before it is written."""
-
-    at: float
-    id: str
-    state: str
-    occurrence: int
-    act: str
-    actor: str
-    record: str
-    seq: int = 0
-
-
-class HistoryFilter(NamedTuple):
-    """Transitions before a `seq`, from `since` on and before `until` (seconds since the epoch), with a
-    text in the alarm's id, text or group."""
-
-    before: int = 2**62
-    since: float = -math.inf
-    until: float = math.inf
-    text: str = ""
-
-
-ALL: Final = HistoryFilter()
-
-
-def read_history(path: Path, wanted: HistoryFilter = ALL, limit: int = MAX_PAGE) -> list[HistoryRow]:
-    """The same as `AlarmStore.history` while another thread writes; nothing without a file.
-    sqlite3.Error if it can't be read."""
-    if not path.exists():
-        return []
-    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True, timeout=5.0)) as db:
-        return _history(db, wanted, limit)
-
-
-def _history(db: sqlite3.Connection, wanted: HistoryFilter, limit: int) -> list[HistoryRow]:
-    pattern = wanted.text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
-    rows = db.execute(
-        "SELECT at, id, state, occurrence, act, actor, record, seq FROM history WHERE seq < ?"
-        " AND at >= ? AND at < ? AND (? = ''"
-        " OR id || char(10) || coalesce(json_extract(record, '$.about'), '') LIKE ? ESCAPE '!')"
-        " ORDER BY seq DESC LIMIT ?",
-        (
-            wanted.before,
-            wanted.since,
-            wanted.until,
-            wanted.text,
-            f"%{pattern}%",
-            min(limit, MAX_PAGE),
-        ),
-    )
-    return [HistoryRow(*row) for row in rows]
+MIN_REMOVED: Final = 1000  # transitions that are removed at once, if they are too old
+CLOCK_BACK_S: Final = 1.0  # by so much a clock that is kept right is not set back
+WRITTEN: Final = HistoryRow._fields[:-1]  # without `seq`
+NAMES: Final = ", ".join(f'"{name}"' for name in WRITTEN)
+INSERT: Final = f"INSERT INTO history ({NAMES}) VALUES ({', '.join('?' * len(WRITTEN))})"
+# Columns that a file of an earlier version lacks.
+ADDED: Final[Mapping[str, str]] = {
+    "event": "TEXT NOT NULL DEFAULT ''",
+    "priority": "INTEGER NOT NULL DEFAULT 0",
+    "robot": "TEXT NOT NULL DEFAULT ''",
+    "group": "TEXT NOT NULL DEFAULT ''",
+    "lasted_s": "REAL",
+    "clock_back_s": "REAL NOT NULL DEFAULT 0",
+}
 
 
 class AlarmStore:
@@ -90,6 +41,11 @@ class AlarmStore:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = FULL")
         self._db.executescript(SCHEMA)
+        known = {column for _, column, *_ in self._db.execute("PRAGMA table_info(history)")}
+        for name in ADDED.keys() - known:
+            self._db.execute(f'ALTER TABLE history ADD COLUMN "{name}" {ADDED[name]}')
+        newest = self._db.execute("SELECT at FROM history ORDER BY seq DESC LIMIT 1").fetchone()
+        self._last_at = newest[0] if newest else -math.inf
 
     def close(self) -> None:
         self._db.close()
@@ -101,17 +57,23 @@ class AlarmStore:
         kept = [(alarm_id, record) for alarm_id, record in standing.items() if record is not None]
         self._db.execute("BEGIN IMMEDIATE")
         try:
-            self._db.executemany(
-                "INSERT INTO history (at, id, state, occurrence, act, actor, record)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?)",
-                [row[:-1] for row in rows],
-            )
+            self._db.executemany(INSERT, [row[:-1] for row in self._with_steps(rows)])
             self._db.executemany("DELETE FROM standing WHERE id = ?", gone)
             self._db.executemany("INSERT OR REPLACE INTO standing VALUES (?, ?)", kept)
             self._db.execute("COMMIT")
         except BaseException:
             self._db.execute("ROLLBACK")
             raise
+        if rows:
+            self._last_at = rows[-1].at
+
+    def _with_steps(self, rows: Sequence[HistoryRow]) -> Iterator[HistoryRow]:
+        """The rows with how far the clock was set back before each."""
+        last = self._last_at
+        for row in rows:
+            back = last - row.at
+            yield row._replace(clock_back_s=back if back >= CLOCK_BACK_S else 0.0)
+            last = row.at
 
     def standing(self) -> dict[str, str]:
         """The records of the alarms that stand, by their ids."""
@@ -119,23 +81,38 @@ class AlarmStore:
 
     def history(self, wanted: HistoryFilter = ALL, limit: int = MAX_PAGE) -> list[HistoryRow]:
         """The newest transitions of a filter first."""
-        return _history(self._db, wanted, limit)
+        return history_rows(self._db, wanted, limit)
 
     def remove_old(self, now: float) -> int:
-        """Removes transitions that are too old, or too many for the size; returns how many. Alarms that
-        stand are kept. `now` is in seconds since the epoch."""
-        removed = self._db.execute(
-            "DELETE FROM history WHERE at < ?", (now - self._days * DAY_S,)
-        ).rowcount
+        """Removes the first transitions if they are too old, or too many for the size; returns how
+        many. Alarms that stand are kept. `now` is in seconds since the epoch: as it may be wrong, not
+        all that seem too old go at once."""
+        removed = self._remove_to(self._last_older(now - self._days * DAY_S))
         while self._used_bytes() > self._most_bytes:
             oldest, newest = self._db.execute("SELECT min(seq), max(seq) FROM history").fetchone()
             if oldest is None:
                 break
-            upto = oldest + (newest - oldest) // REMOVED_AT_ONCE
-            removed += self._db.execute("DELETE FROM history WHERE seq <= ?", (upto,)).rowcount
+            removed += self._remove_to(oldest + (newest - oldest) // REMOVED_AT_ONCE)
         if removed:
             self._db.execute("PRAGMA incremental_vacuum").fetchall()
         return removed
+
+    def _last_older(self, limit: float) -> int:
+        """The number of the last transition before the first that is recent enough; 0 for none."""
+        first = self._db.execute("SELECT min(seq) FROM history").fetchone()[0] or 0
+        most = max(MIN_REMOVED, (self._newest() - first) // REMOVED_AT_ONCE)
+        last = 0
+        for seq, at in self._db.execute("SELECT seq, at FROM history ORDER BY seq LIMIT ?", (most,)):
+            if at >= limit:
+                break
+            last = seq
+        return last
+
+    def _newest(self) -> int:
+        return int(self._db.execute("SELECT max(seq) FROM history").fetchone()[0] or 0)
+
+    def _remove_to(self, seq: int) -> int:
+        return self._db.execute("DELETE FROM history WHERE seq <= ?", (seq,)).rowcount
 
     def _used_bytes(self) -> int:
         pages, free, size = (

@@ -33,10 +33,10 @@ def csv_chunks(
     """All entries that match before the entry number `before`, with reasons in a language; LogError."""
     cells = partial(_cells, language)
     batch = rows(folder, wanted, before, ROWS_AT_ONCE)
-    yield "\ufeff".encode() + _csv([FIELDS, *map(cells, batch)])
+    yield "\ufeff".encode() + csv_lines([FIELDS, *map(cells, batch)])
     while len(batch) == ROWS_AT_ONCE:
         batch = rows(folder, wanted, batch[-1].entry.seq, ROWS_AT_ONCE)
-        yield _csv(map(cells, batch))
+        yield csv_lines(map(cells, batch))
 
 
 def gzipped(pieces: Iterable[bytes]) -> Iterator[bytes]:
@@ -51,29 +51,32 @@ def _cells(language: str, row: Row) -> tuple[str | int | None, ...]:
     entry = row.entry
     times = (
         entry.seq,
-        _time(entry.at),
+        cell_time(entry.at),
         entry.boot,
         entry.monotonic,
         entry.kind,
         entry.of,
-        _time(row.pressed_at),
+        cell_time(row.pressed_at),
     )
     shown = entry._replace(reason=entry.reason_in(language))
-    return (*times, *(_text(getattr(shown, name)) for name in LATER), _text(entry.text))
+    return (*times, *(cell_text(getattr(shown, name)) for name in LATER), cell_text(entry.text))
 
 
-def _time(ms: int | None) -> str | None:
+def cell_time(ms: int | None) -> str | None:
+    """A time in ms since 1970 as ISO 8601 in UTC."""
     if ms is None:
         return None
     return datetime.fromtimestamp(ms / 1000, UTC).isoformat(timespec="milliseconds")
 
 
-def _text(text: str) -> str:
+def cell_text(text: str) -> str:
+    """A text that no spreadsheet takes as a formula, with escapes for what must not be shown."""
     shown = text if text.isprintable() else printable(text)
     return f"'{shown}" if shown.startswith(FORMULA) else shown
 
 
-def _csv(cells: Iterable[tuple[str | int | None, ...]]) -> bytes:
+def csv_lines(cells: Iterable[tuple[str | float | None, ...]]) -> bytes:
+    """Rows of cells as CSV."""
     text = io.StringIO()
     csv.writer(text).writerows(cells)
     return text.getvalue().encode()

@@ -9,7 +9,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -62,11 +62,15 @@ def read(request: ReadRequest) -> Iterator[bytes]:
 
 
 def main(source: BinaryIO, out: BinaryIO) -> int:
-    request = parse_request(source.read())
+    return write(read(parse_request(source.read())), out)
+
+
+def write(pieces: Iterable[bytes], out: BinaryIO) -> int:
+    """Writes the response; returns the exit status."""
     with suppress(OSError):  # the unit's filter of system calls may forbid it
         os.nice(NICE_INCREMENT)
     try:
-        for piece in read(request):
+        for piece in pieces:
             out.write(piece)
             out.flush()
     except LogError as error:
@@ -77,5 +81,10 @@ def main(source: BinaryIO, out: BinaryIO) -> int:
 
 def run() -> NoReturn:
     """The entry point of the process."""
+    run_main(main)
+
+
+def run_main(main: Callable[[BinaryIO, BinaryIO], int]) -> NoReturn:
+    """Runs `main` on stdin and stdout."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # ends the process when the server stops reading
     sys.exit(main(sys.stdin.buffer, sys.stdout.buffer))

@@ -4,11 +4,10 @@ import asyncio
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final, TypeVar
+from typing import Final, Protocol, TypeVar
 
-from app.audit.reader_main import ReadRequest
 from app.errors import LogError, os_error_text
 from app.i18n import say
 from app.settings import PACKAGE
@@ -16,15 +15,23 @@ from app.settings import PACKAGE
 PIECE_BYTES: Final = 65_536  # the capacity of a pipe
 COMMAND: Final = (sys.executable, "-P", "-c", "from app.audit.reader_main import run; run()")
 
+
+class Request(Protocol):
+    """What the process reads, as JSON on its stdin."""
+
+    def as_json(self) -> bytes: ...
+
+
 Done = TypeVar("Done")
 
 
 class ReaderProcess:
-    """Runs `app.audit.reader_main` in a process. Used on the event loop; a thread waits for the
-    process."""
+    """Runs `app.audit.reader_main`, or another command, in a process. Used on the event loop; a thread
+    waits for the process."""
 
-    def __init__(self, request: ReadRequest) -> None:
+    def __init__(self, request: Request, command: Sequence[str] = ()) -> None:
         self._request = request
+        self._command = command
         self._loop = asyncio.get_running_loop()
         self._thread = ThreadPoolExecutor(1, "operators-log-process")
         self._process: subprocess.Popen[bytes] | None = None
@@ -62,7 +69,7 @@ class ReaderProcess:
 
     def _start_process(self) -> bytes:
         try:
-            self._process = process = _popen()
+            self._process = process = _popen(self._command or COMMAND)
         except OSError as error:  # such as memory or open files that are used up
             raise LogError(say("log_unreadable", why=os_error_text(error))) from error
         if self._killed:
@@ -94,10 +101,10 @@ class ReaderProcess:
                 self._process.kill()
 
 
-def _popen() -> "subprocess.Popen[bytes]":
+def _popen(command: Sequence[str]) -> "subprocess.Popen[bytes]":
     path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
     return subprocess.Popen(
-        COMMAND,
+        command,
         bufsize=0,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

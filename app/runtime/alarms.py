@@ -10,14 +10,16 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from app.alarms.disk import AlarmDisk, Change, DiskEvents
+from app.alarms.disk import NAME, AlarmDisk, Change, DiskEvents
 from app.alarms.engine import AlarmEngine
+from app.alarms.event_names import event_of, lasted
+from app.alarms.history import HistoryRow
+from app.alarms.history_reader import HistoryReader
 from app.alarms.instance import Transition
 from app.alarms.records import record_of
 from app.alarms.rows import AlarmRow, row_of, state_of
 from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms
 from app.alarms.status import Moment
-from app.alarms.store import HistoryFilter, HistoryRow
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
@@ -52,6 +54,7 @@ class Alarms:
     def __init__(self, panel: Panel) -> None:
         self._panel = panel
         self.engine = AlarmEngine(panel, now, self._receive)
+        self.history = HistoryReader(None)
         self.raised = 0  # since the start
         self.acknowledged = 0  # since the start
         self.acknowledge_s = 0.0  # from the raises to these acknowledgements together
@@ -89,6 +92,7 @@ class Alarms:
             return
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)
         self._disk = AlarmDisk(folder, self._panel.alarm_rules, events)
+        self.history = HistoryReader(folder / NAME)
         self._disk.start()
         try:
             async with asyncio.timeout(LOAD_TIMEOUT_S):
@@ -103,6 +107,7 @@ class Alarms:
         for timer in (self._show_timer, self._slow_timer, self._due_timer):
             if timer is not None:
                 timer.cancel()
+        self.history.close()
         if self._disk is not None:
             await self._disk.stop()
 
@@ -115,10 +120,6 @@ class Alarms:
     def rows(self) -> list[AlarmRow]:
         """All rows that are shown, the most urgent first."""
         return list(self._shown.listed())
-
-    async def history(self, wanted: HistoryFilter, limit: int) -> list[HistoryRow]:
-        """Transitions on the disk, the newest first; LogError if they can't be read."""
-        return await self._disk.history(wanted, limit) if self._disk else []
 
     async def written(self, within_s: float) -> bool:
         """Waits until all changes up to now are on the disk; False if that takes longer."""
@@ -185,6 +186,11 @@ class Alarms:
                 transition.act,
                 transition.actor,
                 record,
+                event_of(before, after, transition.act),
+                alarm.priority,
+                alarm.definition.robot,
+                str(alarm.definition.alarm.group or ""),
+                lasted(before, after, transition.at),
             )
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
             self._put(transition.id, row, None if shown is None else record, shown)

@@ -7,8 +7,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from app.alarms.event_names import EVENT_NAMES
+from app.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow
 from app.alarms.records import text_of
-from app.alarms.store import MAX_PAGE, HistoryFilter, HistoryRow
 from app.clock import iso_time
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
@@ -22,8 +23,9 @@ Occurrence = Annotated[int, Field(ge=0, le=MAX_OCCURRENCE)]
 class AlarmQuery(BaseModel):
     """`history`: transitions, the newest first, instead of what is not normal now. The other fields are
     for the history: of transitions before the number `before`, from `since` on and before `until`, with
-    `text` in the alarm's id, text, action or group. For the page only: `show` chooses what is listed,
-    `alarm` whose details are shown, `act` the act whose receipt is shown."""
+    `text` in the alarm's id, texts or group or in the name of who acted, of a `priority` (0: all), a
+    `robot` and a `group`. `alarm` is the id of one alarm: of the history, or whose details the page
+    shows. For the page only: `show` chooses what is listed, `act` the act whose receipt is shown."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -33,16 +35,23 @@ class AlarmQuery(BaseModel):
     since: AwareDatetime | None = None
     until: AwareDatetime | None = None
     text: Annotated[str, Field(max_length=100)] = ""
+    priority: Annotated[int, Field(ge=0, le=4)] = 0
+    robot: Annotated[str, Field(max_length=64)] = ""
+    group: Annotated[str, Field(max_length=400)] = ""
     show: Literal["all", "unacknowledged", "shelved"] = "all"
     alarm: Annotated[str, Field(max_length=300)] = ""
     act: Annotated[str, Field(max_length=400)] = ""
 
     def filter(self) -> HistoryFilter:
         return HistoryFilter(
-            2**62 if self.before is None else self.before,
+            self.before or NEWEST,
             self.since.timestamp() if self.since else -math.inf,
             self.until.timestamp() if self.until else math.inf,
             self.text,
+            self.alarm,
+            self.priority,
+            self.robot,
+            self.group,
         )
 
 
@@ -134,15 +143,21 @@ class AlarmAnswer(BaseModel):
 
 
 class TransitionAnswer(BaseModel):
-    """A row of the history: `state` is the one after it, `act` the act that caused it, "" for none."""
+    """A row of the history: `state` is the one after it, `act` the act that caused it, "" for none.
+    `lasted_s` is the time since the alarm was raised, and `clock_back_s` by how much the clock was set
+    back since the row before; 0 if it was not."""
 
     seq: int
     at: AwareDatetime
+    clock_back_s: float
     id: str
+    robot: str
+    event: Annotated[str, Field(description=f"one of {', '.join(EVENT_NAMES)}")]
     state: str
     acknowledged: bool
     known: bool
     occurrence: int
+    lasted_s: float | None
     act: Annotated[str, Field(description=f'one of {", ".join(ALARM_ACTS)}, or ""')]
     who: str
     text: str
@@ -150,6 +165,7 @@ class TransitionAnswer(BaseModel):
     group: str
     priority: int
     value: float | None
+    limit: float | None
 
 
 class AlarmsAnswer(BaseModel):
@@ -197,11 +213,15 @@ def transition(row: HistoryRow) -> dict[str, Any]:
     return {
         "seq": row.seq,
         "at": iso_time(row.at),
+        "clock_back_s": row.clock_back_s,
         "id": row.id,
+        "robot": row.robot,
+        "event": row.event,
         "state": row.state,
         "acknowledged": record.get("state", "") in ("normal", "acknowledged", "latched_acknowledged"),
         "known": record.get("unknown_since") is None,
         "occurrence": row.occurrence,
+        "lasted_s": row.lasted_s,
         "act": row.act,
         "who": row.actor,
         "text": text_of(about.get("text", row.id)),
@@ -209,6 +229,7 @@ def transition(row: HistoryRow) -> dict[str, Any]:
         "group": text_of(about.get("group", "")),
         "priority": about.get("priority", 0),
         "value": record.get("value"),
+        "limit": record.get("limit"),
     }
 
 

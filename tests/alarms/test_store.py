@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from app.alarms.history import HistoryFilter, HistoryRow
 from app.alarms.records import record_of, status_in
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, Override, TakenOut
-from app.alarms.store import AlarmStore, HistoryFilter, HistoryRow
+from app.alarms.store import AlarmStore
 from tests.alarms.test_engine import AIR, DELAYED, HEALTH, WARN, Cell
 from tests.support.form import several
 from tests.support.parts import ROOT
@@ -21,7 +22,8 @@ LATER = Moment(5.0, NOW.wall + 60.0)  # after a restart of the computer
 WRITER = """
 import sys
 from pathlib import Path
-from app.alarms.store import AlarmStore, HistoryRow
+from app.alarms.history import HistoryRow
+from app.alarms.store import AlarmStore
 store = AlarmStore(Path(sys.argv[1]), days=1, size_mb=8)
 for n in range(10**9):
     for state, act in (("unacknowledged", ""), ("acknowledged", "acknowledge")):

@@ -26,7 +26,7 @@ from app.audit.database import NAME
 from app.audit.export import FIELDS, csv_chunks
 from app.audit.store import Store
 from app.errors import LogError, TooMany
-from app.web.routes import audit_log as routes
+from app.web import exported
 from tests.support.holds import PANEL, permit
 from tests.support.operator_log import run
 from tests.support.parts import Bridge, RosNode, Server, http_client, until
@@ -285,7 +285,7 @@ def test_two_search_at_a_time_and_the_server_itself_waits_for_none(
 def test_an_export_that_no_client_reads_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(routes, "TAKEN_WITHIN_S", 0.2)
+    monkeypatch.setattr(exported, "TAKEN_WITHIN_S", 0.2)
     large(tmp_path, 10_000)
     sent: list[Any] = []
 
@@ -300,7 +300,9 @@ def test_an_export_that_no_client_reads_is_given_up(
     async def work(log: OperatorLog) -> None:
         async with AsyncExitStack() as stack:
             export = await stack.enter_async_context(log.export(Filter(every=True), None, False))
-            answer = routes.Exported(export, await export.start(), False, stack.pop_all())
+            answer = exported.Exported(
+                export, await export.start(), False, stack.pop_all(), "operator's log"
+            )
         await answer({"type": "http"}, never, send)
         assert [message.get("more_body") for message in sent] == [None, True, True]
         assert export._process is not None

@@ -1,5 +1,7 @@
 """Alarms of a server: raised, shown on the stream, acknowledged over HTTP, and kept over a restart."""
 
+import csv
+import io
 import json
 import re
 import signal
@@ -249,3 +251,45 @@ def test_every_row_is_json_that_the_description_has(cell: Server) -> None:
     (alarm, _) = listed(cell).values()
     assert set(alarm) == set(described["properties"])
     json.dumps(alarm, allow_nan=False)
+
+
+def test_the_history_says_what_happened_and_is_filtered(cell: Server) -> None:
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    newest, *raises = history(cell)["history"]
+    assert (newest["event"], newest["id"], newest["limit"]) == ("acknowledged", "air_low", 5.0)
+    assert 0 < newest["lasted_s"] < 600
+    assert {(row["event"], row["lasted_s"], row["clock_back_s"]) for row in raises} == {
+        ("raised", None, 0.0)
+    }
+    of_priority = history(cell, priority=1)["history"]
+    assert [row["id"] for row in of_priority] == ["air_latched"]
+    assert len(history(cell, group="Air")["history"]) == 2
+    assert history(cell, alarm="air_latched", text="air")["history"] == of_priority
+    assert history(cell, robot="right")["history"] == []
+
+
+def test_the_page_of_the_history_is_read_in_the_readers_language(cell: Server) -> None:
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    page = cell.http.get("/alarms/history", headers={"accept-language": "ja"}).text
+    assert "空気圧低下" in page
+    assert "後に確認" in page
+    assert "3 件中 1–3 件" in page
+    assert "時計は戻されていません" in page
+    searched = cell.http.get("/alarms/history", params={"text": "latched", "span": "all"}).text
+    assert "Events 1–1 of 1, newest first" in searched
+    assert "raised, 4.5 bar, limit 5.0 bar" not in searched  # it has no unit
+    nothing = cell.http.get("/alarms/history?until=2020-01-01T00:00").text
+    assert "No event has this." in nothing
+    assert cell.http.get("/alarms/history?since=2020-02-31T00:00").status_code == 422
+
+
+def test_the_history_is_exported_as_the_page_shows_it(cell: Server) -> None:
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    answer = cell.http.get("/alarms/history.csv?group=Air", headers={"accept-language": "ja"})
+    assert answer.headers["content-type"].startswith("text/csv")
+    assert re.fullmatch(
+        r'attachment; filename="alarms-\d{8}-\d{6}\.csv"', answer.headers["content-disposition"]
+    )
+    rows = list(csv.DictReader(io.StringIO(answer.text.removeprefix("\ufeff"))))
+    assert [row["event"] for row in rows] == ["acknowledged", "raised"]
+    assert (rows[0]["text"], rows[0]["unit"], rows[0]["limit"]) == ("空気圧低下", "bar", "5.0")

@@ -116,7 +116,8 @@ def test_a_script_that_no_row_names_is_an_error(shipped: Path) -> None:
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
-    assert set(files) == {"kiosk.css", "alarms.css", "log.css", "keypad.css", "main.js", "press.js"}
+    styles = {f"{name}.css" for name in ("kiosk", LATER, *OWN_PAGES)}
+    assert set(files) == {*styles, "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
     assert files["log.css"].content == b"\n.log a :is(b,i){top:0}"
 

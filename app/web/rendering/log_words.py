@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterable, Iterator
-from datetime import datetime, timedelta
+from datetime import date, datetime, timedelta
 from functools import cache
 from itertools import groupby
 from typing import Any, Final
@@ -38,12 +38,16 @@ def iso_of(ms: int) -> str:
 
 def by_day(rows: Iterable[Row]) -> Iterator[tuple[Text, list[Row]]]:
     """The rows of each day in turn, below its name."""
-    now = datetime.now().astimezone().date()
     for day, entries in groupby(rows, key=lambda row: _time(row.entry.at).date()):
-        name = named_day(day.isoformat())
-        if day in (now, now - timedelta(days=1)):
-            name = word("today" if day == now else "yesterday", date=name)
-        yield name, list(entries)
+        yield day_name(day), list(entries)
+
+
+def day_name(day: date) -> Text:
+    """The name of a day, with "today" or "yesterday"."""
+    name, now = named_day(day.isoformat()), datetime.now().astimezone().date()
+    if day in (now, now - timedelta(days=1)):
+        return word("today" if day == now else "yesterday", date=name)
+    return name
 
 
 def word(name: str, **about: Param) -> Text:

@@ -86,10 +86,10 @@ def page_context(
     who: Principal,
     refresh_s: int,
     embedded: bool = False,
-    alarms_query: str | None = None,
+    alarms_page: str | None = None,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
-    `alarms_query`: the query of the page of alarms, for that page.
+    `alarms_page`: the path and query of a page of the alarms, for such a page.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
@@ -103,7 +103,7 @@ def page_context(
         of_client = audience_of(who, publisher.view["control"], rules, language)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
-    is_alarms = alarms_query is not None
+    is_alarms = alarms_page is not None
     is_log = page.id == FRAME_ONLY and not is_alarms
     back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
     data = {
@@ -148,7 +148,7 @@ def page_context(
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
         refused=_refused(session, request.query_params.get("control", "")),
-        back=f"{state.root}/alarms?{alarms_query}" if is_alarms else back,
+        back=f"{state.root}/{alarms_page}" if is_alarms else back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
 

@@ -7,6 +7,7 @@ import secrets
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any, Final
 from urllib.parse import quote, urlencode, urlsplit
 
@@ -15,6 +16,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from pydantic import BaseModel
 
 from app import clock
+from app.alarms.history import read_history
 from app.commands.acts import ActReceipt, ActRequest
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
@@ -101,7 +103,8 @@ async def alarms(
     if not query.history and "text/html" in request.headers.get("accept", ""):
         return _page(request, state, query)
     if query.history:
-        rows = await state.fleet.alarms.history(query.filter(), query.limit)
+        read = partial(read_history, wanted=query.filter(), limit=query.limit)
+        rows = await state.fleet.alarms.history.read(read)
         older = rows[-1].seq if len(rows) == query.limit else None
         content = {"history": [transition(row) for row in rows], "older": older}
     else:
@@ -115,7 +118,7 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     language = language_of(request)
     shown = {"show": query.show, "alarm": query.alarm}
     again = urlencode({name: value for name, value in shown.items() if value})
-    frame, token = page_frame(request, state, word("title"), alarms_query=again)
+    frame, token = page_frame(request, state, word("title"), alarms_page=f"alarms?{again}")
     context = alarms_context(state, query.show, query.alarm, language)
     html = state.templates.render("alarms.html", language, **frame, **context, word=word)
     headers = {"cache-control": "no-store", "vary": "accept"}

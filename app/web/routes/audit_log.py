@@ -1,23 +1,19 @@
 """The operator's log as a page with a filter, and as CSV."""
 
-import asyncio
-import logging
 from contextlib import AsyncExitStack
 from dataclasses import replace
-from datetime import datetime
 from functools import partial
 from typing import Annotated, Final, TypedDict
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, Response
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
-from starlette.types import Message, Receive, Scope, Send
+from pydantic import BaseModel, ConfigDict, Field
 
-from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
+from app.audit import Entry, Filter, OperatorLog, Row
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
-from app.errors import InputError, LogError, NotFound
+from app.errors import NotFound
 from app.i18n import Text, TextLike, number, say
 from app.panel.layout import FRAME_ONLY, Page
 from app.panel.widgets.families import Command, EntryWidget
@@ -25,6 +21,7 @@ from app.permission.verdict import WITHOUT_CONTROL
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
+from app.web.exported import Exported
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
 from app.web.rendering.log_words import (
@@ -38,8 +35,7 @@ from app.web.rendering.log_words import (
     word,
 )
 from app.web.rendering.page_context import PageContext, page_context
-
-log = logging.getLogger("kiosk.log")
+from app.web.typed_times import TypedTime, typed_ms
 
 router = APIRouter()
 
@@ -51,19 +47,6 @@ CONTROL_ACTIONS: Final = (
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
 ALARM_ACTIONS: Final = tuple(f"alarm_{act}" for act in ALARM_ACTS)
-TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
-START: Final = "http.response.start"
-BODY: Final = "http.response.body"
-
-
-# For who writes programs; what is no time of the calendar is refused with a sentence.
-A_TIME: Final[dict[str, JsonValue]] = {
-    "pattern": (
-        r"^((19[7-9]\d|20\d\d)-(0[1-9]|1[0-2])-(0[1-9]|1\d|2[0-8])"
-        r"(T([01]\d|2[0-3]):[0-5]\d(:[0-5]\d)?(Z|[+-](0\d|1[0-2]):00)?)?)?$"
-    ),
-    "examples": ["2026-11-21T10:00"],
-}
 
 
 class Wanted(BaseModel):
@@ -73,8 +56,8 @@ class Wanted(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    since: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
-    until: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
+    since: TypedTime = ""
+    until: TypedTime = ""
     widget: Annotated[str, Field(max_length=64)] = ""
     outcome: Annotated[str, Field(max_length=20)] = ""
     who: Annotated[str, Field(max_length=64)] = ""
@@ -92,8 +75,8 @@ class Wanted(BaseModel):
     def filter(self) -> Filter:
         """Raises InputError for what is no time."""
         return Filter(
-            since=_ms("since", self.since),
-            until=_ms("until", self.until, fold=1),
+            since=typed_ms("since", self.since),
+            until=typed_ms("until", self.until, fold=1),
             **self.model_dump(include={"widget", "outcome", "who", "text", "every"}),
         )
 
@@ -171,10 +154,10 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
 
 
 def page_frame(
-    request: Request, state: AppState, title: Text, robot: str = "", alarms_query: str | None = None
+    request: Request, state: AppState, title: Text, robot: str = "", alarms_page: str | None = None
 ) -> tuple[PageContext, str]:
-    """The frame around the log or the alarms, of a robot or else the first; and the token of a new
-    client."""
+    """The frame around the log, or a page of the alarms with this path and query, of a robot or else
+    the first; and the token of a new client."""
     entry_of = {session.entry.id: session for session in state.fleet.sessions if session.entry}
     session = entry_of.get(robot, state.fleet.first)
     who, token = principal_with_new_token(request, state, embedded=False)
@@ -182,7 +165,7 @@ def page_frame(
         session.control.loaded(who, REFRESH_S, opened_by_person(request))
         session.show()
     shown = Page.model_construct(None, id=FRAME_ONLY, title=title, own=(), groups=())
-    context = page_context(request, state, session, shown, who, REFRESH_S, alarms_query=alarms_query)
+    context = page_context(request, state, session, shown, who, REFRESH_S, alarms_page=alarms_page)
     return context, token
 
 
@@ -201,60 +184,7 @@ async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted
             state.log.export(wanted.filter(), wanted.before, gzip, language_of(request))
         )
         first = await export.start()
-        return Exported(export, first, gzip, opened.pop_all())
-
-
-class Exported(Response):
-    """The response with an export, sent piece by piece. An export that fails, or that no client reads,
-    is not terminated: no client takes it for complete."""
-
-    media_type = "text/csv"
-
-    def __init__(self, export: ReaderProcess, first: bytes, gzip: bool, opened: AsyncExitStack) -> None:
-        """`opened` is closed when it is over."""
-        name = f"operators-log-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
-        headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-        if gzip:
-            headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
-        self._export = export
-        self._first = first
-        self._opened = opened
-        self.status_code = 200
-        self.background = None
-        self.init_headers(headers)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async with self._opened, asyncio.TaskGroup() as group:
-            going = group.create_task(self._gone(receive))
-            try:
-                await self._send(send, going)
-            except TimeoutError:
-                log.warning("an export of the operator's log was not taken for %g s", TAKEN_WITHIN_S)
-            except LogError as error:
-                if not going.done():
-                    log.warning("an export of the operator's log broke off: %s", error)
-            going.cancel()
-
-    async def _send(self, send: Send, going: "asyncio.Task[None]") -> None:
-        await _taken(send, {"type": START, "status": 200, "headers": self.raw_headers})
-        piece = self._first
-        while piece and not going.done():
-            await _taken(send, {"type": BODY, "body": piece, "more_body": True})
-            piece = await self._export.read_next()
-        await self._opened.aclose()  # who has it whole may ask for the next
-        await _taken(send, {"type": BODY, "body": b"", "more_body": False})
-
-    async def _gone(self, receive: Receive) -> None:
-        """Returns when the client has disconnected."""
-        while (await receive())["type"] != "http.disconnect":
-            pass
-        self._export.kill()
-
-
-async def _taken(send: Send, message: Message) -> None:
-    """TimeoutError where no client takes it."""
-    async with asyncio.timeout(TAKEN_WITHIN_S):
-        await send(message)
+        return Exported(export, first, gzip, opened.pop_all(), "operator's log")
 
 
 def _shown(row: Row, language: str) -> Row:
@@ -265,13 +195,3 @@ def _shown(row: Row, language: str) -> Row:
         for name, cell in entry._asdict().items()
     )
     return replace(row, entry=Entry._make(cells))
-
-
-def _ms(name: str, text: str, fold: int = 0) -> int | None:
-    """`fold` is which of two times, where the clock shows a time twice: 1 for the later."""
-    if not text:
-        return None
-    try:
-        return int(datetime.fromisoformat(text).replace(fold=fold).timestamp() * 1000)
-    except (ValueError, OverflowError, OSError):
-        raise InputError(f'{name}: "{text}" is no time: it must be like 2026-11-21T10:00') from None

@@ -1,0 +1,61 @@
+"""The history of alarms as a page with a filter, and as CSV."""
+
+from contextlib import AsyncExitStack
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, Response
+
+from app.alarms.history import read_page
+from app.web.app_state import CurrentState
+from app.web.client_cookie import set_client_cookie
+from app.web.exported import Exported
+from app.web.language import language_of
+from app.web.openapi_parts import TEXT, errors
+from app.web.rendering.alarm_history_page import ROWS_ON_PAGE, HistoryQuery, history_context, now
+from app.web.rendering.alarms_page import word
+from app.web.rendering.log_words import word as log_word
+from app.web.routes.audit_log import page_frame
+
+router = APIRouter()
+
+
+@router.get(
+    "/alarms/history",
+    response_class=HTMLResponse,
+    summary="The history of alarms, the newest first",
+    responses=errors(403, 422, 429, 503),
+)
+async def page(
+    request: Request, state: CurrentState, wanted: Annotated[HistoryQuery, Query()]
+) -> Response:
+    read = partial(read_page, wanted=wanted.filter(now()), limit=ROWS_ON_PAGE + 1)
+    shown = await state.fleet.alarms.history.read(read)
+    context = history_context(state.fleet.panel, wanted, shown)
+    path = f"alarms/history?{wanted.address()}"
+    frame, token = page_frame(request, state, word("history_title"), alarms_page=path)
+    html = state.templates.render(
+        "alarm-history.html", language_of(request), **frame, **context, word=word, log_word=log_word
+    )
+    headers = {"cache-control": "no-store"}
+    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+
+
+@router.get(
+    "/alarms/history.csv",
+    response_class=Response,
+    summary="The history that the filter shows, as CSV",
+    responses=errors(403, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
+)
+async def as_csv(
+    request: Request, state: CurrentState, wanted: Annotated[HistoryQuery, Query()]
+) -> Response:
+    gzip = "gzip" in request.headers.get("accept-encoding", "")
+    exports = state.fleet.alarms.history
+    async with AsyncExitStack() as opened:
+        export = await opened.enter_async_context(
+            exports.export(wanted.filter(now()), gzip, language_of(request))
+        )
+        first = await export.start()
+        return Exported(export, first, gzip, opened.pop_all(), "alarms")

@@ -1,0 +1,117 @@
+"""The page of the history of alarms: found by text, time, priority and group, page by page, with and
+without scripts."""
+
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.alarms.disk import NAME
+from app.alarms.history import HistoryRow
+from app.alarms.store import AlarmStore
+from tests.browser.test_accessibility import violations
+from tests.browser.test_alarm_line import SIZES, started
+from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.pages import DRAWN
+from tests.support.parts import Server
+from tests.web.test_alarms import HEALTHY, server_with
+
+EVENTS = 120
+
+
+def written(folder: Path, now: float) -> None:
+    """A history in which each minute something happened, and the clock was set back once."""
+    store = AlarmStore(folder / NAME, days=1000, size_mb=64)
+    rows = []
+    for n in range(EVENTS):
+        at = now - 60.0 * (EVENTS - n) - (3600.0 if n == EVENTS - 1 else 0.0)
+        group, priority = ("Air", 2) if n % 2 else ("Belt", 3)
+        about = {"text": f"Pump {n}", "group": group, "unit": "bar"}
+        record = json.dumps({"about": about, "value": 4.5, "limit": 5.0})
+        row = HistoryRow(at, f"pump{n}", "active", 1, "", "", record, "raised", priority, "", group)
+        rows.append(row)
+    store.write(rows, {})
+    store.close()
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Server]:
+    data = tmp_path / "data"
+    data.mkdir()
+    written(data, time.time())
+    with server_with(tmp_path, HEALTHY, data=data) as server:
+        yield server
+
+
+@pytest.fixture
+def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page to which axe may be added."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    with mine.taken(request.node) as page:
+        yield page
+    mine.close()
+
+
+def shown(page: Page) -> list[str | None]:
+    return [row.get_attribute("data-alarm") for row in page.locator("tr[data-event]").all()]
+
+
+def test_the_history_is_reached_from_the_list_and_has_pages(
+    cell: Server, without_scripts: Page
+) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/alarms")
+    page.get_by_role("link", name="History").click()
+    assert shown(page)[:2] == ["pump119", "pump118"]
+    assert len(shown(page)) == 50
+    expect(page.locator(".pager")).to_contain_text("Events 1–50 of 120, newest first")
+    page.get_by_role("link", name="Older").click()
+    page.get_by_role("link", name="Older").click()
+    assert shown(page)[-1] == "pump0"
+    expect(page.locator(".pager")).to_contain_text("Events 101–120 of 120")
+    expect(page.get_by_role("link", name="Older")).to_have_count(0)
+    page.get_by_role("link", name="Newest").click()
+    assert shown(page)[0] == "pump119"
+
+
+def test_events_are_found_by_text_priority_group_and_time(cell: Server, without_scripts: Page) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/alarms/history")
+    page.get_by_label("Text").fill("Pump 11")
+    page.get_by_label("Group").select_option(label="Air")
+    page.get_by_label("Priority").select_option(label="Low")
+    page.get_by_role("button", name="Show").click()
+    expect(page.locator(".empty")).to_have_text("No event has this.")
+    page.get_by_label("Priority").select_option(label="all")
+    page.get_by_role("button", name="Show").click()
+    assert shown(page)[:2] == ["pump119", "pump117"]
+    page.goto(f"{cell.url}/alarms/history?text=Pump 11&priority=2")
+    assert shown(page) == ["pump119", "pump117", "pump115", "pump113", "pump111", "pump11"]
+    since = time.strftime("%Y-%m-%dT%H:%M", time.localtime(time.time() - 600))
+    page.get_by_label("Text").fill("")
+    page.get_by_label("From").fill(since)
+    page.get_by_role("button", name="Show").click()
+    assert all(int(str(name)[4:]) >= 109 for name in shown(page))
+    assert "pump119" not in shown(page)  # its clock was set back
+    expect(page.get_by_role("link", name="CSV")).to_have_attribute(
+        "href", re.compile("history.csv[?]since=.*priority=2")
+    )
+
+
+def test_a_row_says_that_the_clock_was_set_back(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms/history")
+    expect(page.locator("tr[data-event] .clock-back")).to_have_count(1)
+    expect(page.locator("tr[data-alarm=pump119]")).to_contain_text("Clock set back by 59 min 00 s")
+    expect(page.locator(".pager")).to_contain_text("The clock was set back")
+
+
+def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page: Page) -> None:
+    started(axe_page, f"{cell.url}/alarms/history")
+    for width, height in (*SIZES, (390, 844)):
+        sized(axe_page, width, height).evaluate(DRAWN)
+        assert axe_page.evaluate("document.documentElement.scrollWidth") == width
+        assert violations(axe_page) == [], width
