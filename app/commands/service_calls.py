@@ -20,7 +20,7 @@ from app.errors import DecodeError
 from app.i18n import PanelText, Text, TextLike, hint, joined, number, say
 from app.i18n.values import filled_in, together
 from app.interfaces import Fields, Interfaces, plain_text
-from app.panel.template import RESPONSE_PLACEHOLDER, response_paths
+from app.panel.response_text import ResponseField, is_number, pieces, response_paths
 from app.panel.widgets.service_action import Call
 from app.printable import printable, without_terminal_codes
 from app.robot.command_status import CommandStatus, Outcome
@@ -211,16 +211,17 @@ def with_fields(template: str | PanelText, fields: Fields, within: str = "") -> 
     """The template with each `{path}` (relative to `within`) replaced by the field's value, shortened
     if it is long, "—" if the message has no such element."""
 
-    def shown(path: str) -> TextLike:
-        value = fields.get(within + path)
+    def shown(field: ResponseField) -> TextLike:
+        value = fields.get(within + field.path)
         if value is None:
             return NO_VALUE
-        text = printable(plain_text(value, MAX_VALUE_CHARS, without_terminal_codes))
-        return number(text) if isinstance(value, float) else text
+        if is_number(value):
+            return number(field.text(value))
+        return printable(plain_text(value, MAX_VALUE_CHARS, without_terminal_codes))
 
     def filled(text: str) -> TextLike:
-        pieces = RESPONSE_PLACEHOLDER.split(text)  # text, path, text, …
-        return together(shown(piece) if n % 2 else piece for n, piece in enumerate(pieces))
+        parts = pieces(text)
+        return together(shown(part) if isinstance(part, ResponseField) else part for part in parts)
 
     if isinstance(template, str):
         return filled(template)

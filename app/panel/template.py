@@ -9,23 +9,12 @@ from string import Formatter
 from typing import Any, Final
 
 from app.errors import FieldError
-from app.i18n import TextLike
-from app.i18n.values import each_language
 from app.panel.values import negated
 from app.panel.widgets.families import Command
-
-# In texts about a response: a field's path. (In messages to send, a placeholder is an input's id.)
-RESPONSE_PLACEHOLDER: Final = re.compile(r"\{([^{}]*)\}")
 
 NOW: Final = "now"  # reserved: the time of sending, of the type TIME
 TIME: Final = "builtin_interfaces/msg/Time"
 NS_PER_S: Final = 10**9
-
-
-def response_paths(template: TextLike) -> list[str]:
-    """The fields of a response that a text about it names, in all its languages."""
-    texts = each_language(template).values()
-    return list(dict.fromkeys(path for text in texts for path in RESPONSE_PLACEHOLDER.findall(text)))
 
 
 def add_now(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from app.interfaces import Interfaces, Type
 from app.panel.base import TopicQos
 from app.panel.constants import parent_type, resolve_names
 from app.panel.machine_state import MachineState
-from app.panel.template import response_paths
+from app.panel.response_text import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout

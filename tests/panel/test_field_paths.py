@@ -14,7 +14,7 @@ from app.interfaces import field_name, load_interfaces, parent_path
 from app.interfaces.field_path import Key, path_steps
 from app.panel import load_panel
 from app.panel.checks.panel import find_faults
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.response_text import response_paths
 from app.permission.interlocks import interlock_verdict
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
@@ -138,7 +138,7 @@ def test_an_answer_says_an_element_by_its_key() -> None:
     status = diagnostics(("x", 0), ("the drive", 2))["status"]
     status[1]["message"] = "too hot"
     payload = INTERFACES.encode(name, {"id": "", "passed": 0, "status": status})
-    fields = INTERFACES.field_reader(name, RESPONSE_PLACEHOLDER.findall(answer)).read(payload)
+    fields = INTERFACES.field_reader(name, response_paths(answer)).read(payload)
     assert with_fields(answer, fields) == "too hot —"
 
 

@@ -16,7 +16,7 @@ from app.errors import DecodeError
 from app.i18n import Text, hint, joined, number, say
 from app.interfaces import Fields, Interfaces
 from app.interfaces.names import of_action
-from app.panel.template import response_paths
+from app.panel.response_text import response_paths
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState

@@ -19,7 +19,7 @@ from app.commands.transport import Transport
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
-from app.panel.template import response_paths
+from app.panel.response_text import response_paths
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, CommandStatus, Outcome
 from app.robot.sample_handlers import SampleHandler, SampleHandlers

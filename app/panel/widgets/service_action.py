@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 from pydantic import Field
 
 from app.dialect.endpoint import Role, ServerRole
-from app.errors import Fault, InterfaceError
+from app.errors import Fault, FieldError, InterfaceError
 from app.i18n import TextLike
 from app.interfaces import Interfaces
 from app.panel.base import ActionType, AnyText, FieldPath, Seconds, ServiceType, Span, TopicName
-from app.panel.template import response_paths
+from app.panel.response_text import response_fields
 from app.panel.widgets.families import CheckContext
 from app.panel.widgets.templated import TemplateCommand
 
@@ -125,8 +125,16 @@ class Action(ServerCommand):
 def _text_faults(
     place: str, type_name: str, template: TextLike, interfaces: Interfaces
 ) -> Iterator[Fault]:
-    for path in response_paths(template):
-        yield from _path_faults(place, type_name, path, ".*", interfaces)
+    try:
+        fields = response_fields(template)
+    except FieldError as error:
+        yield Fault(place, error.message)
+        return
+    for field in fields:
+        faults = list(_path_faults(place, type_name, field.path, ".*", interfaces))
+        if not faults and (fault := field.fault(interfaces.field_type(type_name, field.path))):
+            faults = [Fault(place, fault)]
+        yield from faults
 
 
 def _path_faults(
