@@ -178,6 +178,12 @@ class Alarm(Description):
         return tuple(condition for condition in (self.when, self.suppressed_while) if condition)
 
     @property
+    def has_action(self) -> bool:
+        """Whether it may say what the operator does: by itself, or by a fault catalogue."""
+        catalogue = self.listed.catalogue if self.listed else None
+        return self.action is not None or catalogue is not None
+
+    @property
     def evaluated_topics(self) -> tuple[str, ...]:
         """The topics after whose messages it is evaluated."""
         own = (self.topic,) if self.topic is not None else ()

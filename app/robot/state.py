@@ -22,6 +22,7 @@ from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of, po
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import GET
+from app.robot.alarm_action import AlarmAction
 from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatus
 from app.robot.definitions import Difference, difference
@@ -87,13 +88,8 @@ class RobotState:
         needed = list(required_endpoints(panel))
         # A node is there while its parameter services are.
         nodes = [f"{alarm.node}/{GET[0]}" for alarm in panel.alarms if alarm.node]
-        named = (
-            *nodes,
-            *panel.listened(),
-            *panel.publications(),
-            *(n for _, n in needed),
-            ROSOUT_TOPIC,
-        )
+        listed = (*panel.listened(), *panel.publications(), *(name for _, name in needed))
+        named = (*nodes, *listed, ROSOUT_TOPIC)
         self.required_keys = frozenset(key for name in named for key in self.possible_keys(name))
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
@@ -109,6 +105,7 @@ class RobotState:
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
         self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic
+        self.alarm_actions: tuple[AlarmAction, ...] = ()
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its peers do not respond

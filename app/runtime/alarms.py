@@ -256,7 +256,7 @@ class Alarms:
     def _notify(self) -> None:
         self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
         for robot in self._robots:
-            robot.shown.emit()
+            robot.show(self._shown.listed())
 
     # Restart, and a new file.
 

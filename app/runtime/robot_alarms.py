@@ -1,15 +1,17 @@
 """The alarms as a robot's session has them: what its turn tells them, and which controls they lock."""
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from app.alarms.engine import AlarmEngine
 from app.alarms.entries import AlarmEntry
 from app.alarms.instance import AlarmInstance
+from app.alarms.rows import AlarmRow
 from app.alarms.sources import link_state
 from app.i18n import say
 from app.permission.verdict import Verdict, locked
+from app.robot.alarm_action import AlarmAction
 from app.robot.state import RobotState
 from app.transport.robot_signals import Signal
 
@@ -47,6 +49,14 @@ class RobotAlarms:
         self._engine.entries_received(self._robot_id, alarm_id, entries, at, is_whole)
         self._evaluate()
 
+    def show(self, rows: Iterable[AlarmRow]) -> None:
+        """The rows of all robots' alarms have changed, the most urgent first."""
+        own = (row for row in rows if row["robot"] == self._robot_id and _stands(row))
+        self._robot.alarm_actions = tuple(
+            AlarmAction(panel_id(row["id"]), row["action"], row["picture"]) for row in own
+        )
+        self.shown.emit()
+
     def inhibited(self) -> Mapping[str, Verdict]:
         """The locks by alarms, by the widgets' ids."""
         if self._locks_version != self._engine.lock_changes:
@@ -54,6 +64,16 @@ class RobotAlarms:
             inhibited = self._engine.inhibited(self._robot_id)
             self._locks = {widget: _lock(alarm) for widget, alarm in inhibited.items()}
         return self._locks
+
+
+def panel_id(alarm_id: str) -> str:
+    """The id in the panel file of an alarm of a robot, or of one that the robot publishes."""
+    return alarm_id.partition(":")[0].partition("@")[0]
+
+
+def _stands(row: AlarmRow) -> bool:
+    """Whether something is to be done about an alarm now."""
+    return row["state"] in ("active", "latched")
 
 
 def _lock(alarm: AlarmInstance) -> Verdict:

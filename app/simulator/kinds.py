@@ -17,7 +17,7 @@ from app.panel.response_text import response_paths
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand
+from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand, TopicField
 from app.panel.widgets.figure import Figure, TargetField
 from app.panel.widgets.gauge import Gauge, SetpointField
 from app.panel.widgets.joints import Joints
@@ -26,6 +26,7 @@ from app.panel.widgets.log_view import LogView
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call, ServerCommand
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
@@ -123,6 +124,10 @@ def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Shown]:
     )
 
 
+def _of_field(source: TopicField) -> Shown:
+    return Shown(topic=source.topic, type=source.type, field=source.field, max_age_s=source.max_age_s)
+
+
 def _readout(readout: Readout, interfaces: Interfaces) -> Iterator[Shown]:
     if readout.constants is None:
         return _shown(readout)
@@ -138,9 +143,7 @@ def _indicator(indicator: Indicator, _: Interfaces) -> Iterator[Need]:
 def _machine_state(display: MachineState, _: Interfaces) -> Iterator[Need]:
     yield from _shown(display, tuple(state.value for state in display.states))
     for detail in display.details:
-        yield Shown(
-            topic=detail.topic, type=detail.type, field=detail.field, max_age_s=detail.max_age_s
-        )
+        yield _of_field(detail)
 
 
 def _figure(figure: Figure, _: Interfaces) -> Iterator[Need]:
@@ -150,22 +153,21 @@ def _figure(figure: Figure, _: Interfaces) -> Iterator[Need]:
     for shown in _shown(figure):
         yield shown if end is None else replace(shown, low=min(0.0, end), high=max(0.0, end))
     if isinstance(most, TargetField):
-        yield Shown(topic=most.topic, type=most.type, field=most.field, max_age_s=most.max_age_s)
+        yield _of_field(most)
     for line in figure.lines:
-        yield Shown(
-            topic=line.topic,
-            type=line.type,
-            field=line.field,
-            scale=line.scale,
-            offset=line.offset,
-            max_age_s=line.max_age_s,
-        )
+        yield replace(_of_field(line), scale=line.scale, offset=line.offset)
 
 
 def _pallet(pallet: Pallet, _: Interfaces) -> Iterator[Need]:
     """From an empty pallet to a full one."""
     for shown in _shown(pallet):
         yield replace(shown, low=0.0, high=float(pallet.in_layer * pallet.layers))
+
+
+def _sequence(sequence: Sequence, _: Interfaces) -> Iterator[Need]:
+    """From the first step to the last one."""
+    if (current := sequence.current) is not None:
+        yield replace(_of_field(current), values=sequence.values)
 
 
 def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
@@ -272,6 +274,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Figure: _figure,
     Pallet: _pallet,
     Conditions: None,
+    Sequence: _sequence,
     Gauge: _gauge,
     Joints: _joints,
     Table: None,

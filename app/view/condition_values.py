@@ -33,7 +33,9 @@ def condition_row(condition: NamedCondition, robot: RobotState, now: float) -> R
     met: Met = "met" if verdict.permitted else "unmet" if verdict.code in BY_VALUE else "unknown"
     is_plain = not condition.comparisons or met == "unknown" or state.value == ""
     value = say(f"condition_{met}") if is_plain else state.value
-    need = say("condition_needs", need=state.need) if condition.comparisons else ""
+    need: TextLike = say("condition_needs", need=state.need) if condition.comparisons else ""
+    if met == "unmet" and condition.action is not None:
+        need = condition.action  # what to do counts more than what is needed
     return Row(condition.name, met, value, need, min(verdict.until, link.until))
 
 

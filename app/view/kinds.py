@@ -22,6 +22,7 @@ from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
+from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
@@ -39,6 +40,7 @@ from app.view.log_values import log
 from app.view.machine_values import machine_state
 from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
+from app.view.sequence_values import sequence
 from app.view.step_values import step
 from app.view.table_values import table
 from app.view.trend_values import trend
@@ -163,6 +165,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Figure: lambda widget, robot, verdict, now: figure(widget, robot, now),
     Pallet: lambda widget, robot, verdict, now: pallet(widget, robot, now),
     Conditions: lambda widget, robot, verdict, now: conditions(widget, robot, now),
+    SequenceWidget: lambda widget, robot, verdict, now: sequence(widget, robot, now),
     Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
     Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
     Table: lambda widget, robot, verdict, now: table(widget, robot, now),

@@ -115,6 +115,7 @@ class ViewRefresher:
         self._shown_at = 0.0
         self._updated_keys: set[str] = set()  # of topics with a sample since the last frame
         self._whole = False  # whether the next frame builds the whole view
+        self._alarms_changed = False
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf  # monotonic seconds; not every event loop's timers know theirs
         self._failed = False
@@ -144,6 +145,7 @@ class ViewRefresher:
 
     def refresh_alarms(self) -> None:
         """Shows the alarms now: they do not wait for a frame."""
+        self._alarms_changed = True
         self._frame()
 
     @property
@@ -170,7 +172,7 @@ class ViewRefresher:
             locked = lock_all(self._panel, self._current, say("view_failed"))
             self.publisher.post(locked.view, locked.without_control)
         else:
-            self._failed = self._whole = False
+            self._failed = self._whole = self._alarms_changed = False
             self._updated_keys = set()
             self._schedule(self._current.until)
 
@@ -190,9 +192,15 @@ class ViewRefresher:
             self._current.view["alarms"] = self._sources.alarms()
 
     def _stale(self, now: float) -> list[DisplayWidget]:
-        """The displays that a sample or time has changed."""
-        untils, updated = self._current.displays, self._updated_keys
-        return [w for keys, w in self._displays if not keys.isdisjoint(updated) or untils[w.id] <= now]
+        """The displays that a sample, an alarm or time has changed."""
+        untils, updated, alarms = self._current.displays, self._updated_keys, self._alarms_changed
+        return [
+            widget
+            for keys, widget in self._displays
+            if not keys.isdisjoint(updated)
+            or untils[widget.id] <= now
+            or (alarms and widget.shows_alarms)
+        ]
 
     def _rebuild(self) -> None:
         """Builds the whole view; twice if the robot's lamp changed, since the view shows it."""

@@ -224,6 +224,7 @@ SHOWS_AT: Final[Mapping[str, str]] = {
     'title = "Robot cell 1"': "",
     'interfaces = ["msgs"]': 'type = "cell_msgs/msg/Jog"',
     'pictures = "msgs"': 'src = "plan.svg"',
+    'action = "Switch on the fan"': 'alarms = ["oven"]',
     'role = "reset"': 'colour = "blue"',
     'durability = "volatile"': 'qos = { durability = "volatile" }',
 }

@@ -80,6 +80,18 @@ def test_a_value_that_is_too_old_is_not_known() -> None:
     assert view["row_values"][1] == "not known"
 
 
+def test_a_condition_that_is_not_met_says_what_to_do() -> None:
+    panel = panel_of(LIST, condition=[AIR | {"action": "Open valve V1"}])
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/air", FLOAT)
+    says(robot, "/air", 4.5, FLOAT)
+    view = english(build_view(panel, robot, NOW).view["widgets"]["checks"])
+    assert view["row_needs"][1] == "Open valve V1"
+    says(robot, "/air", 5.5, FLOAT)
+    view = english(build_view(panel, robot, NOW).view["widgets"]["checks"])
+    assert view["row_needs"][1] == "needs 5 bar or more"
+
+
 def test_without_a_way_to_the_robot_nothing_is_known() -> None:
     view = checked(permitted=True, bar=5.5, link=False)
     assert (view["shape"], view["row_states"]) == ("unknown", ["unknown", "unknown"])

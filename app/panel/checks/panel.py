@@ -139,11 +139,12 @@ def _check_context(
         inputs={w.id: w for w in widgets if isinstance(w, Input)},
         all_inputs=[w.id for w in panel.widgets() if isinstance(w, Input)],
         interlocks=[interlock.id for interlock in panel.interlocks],
-        conditions=[condition.id for condition in panel.named_conditions],
+        conditions={c.id: c.action is not None for c in panel.named_conditions},
         types=panel.subscriptions(),
         faulty=faulty,
         pages=[page.id for page in panel.pages],
         pictures=panel.picture_files,
+        alarms={alarm.id: alarm.has_action for alarm in panel.alarms},
     )
 
 

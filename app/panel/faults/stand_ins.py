@@ -14,14 +14,14 @@ from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
 
-TABLES: Final = ("interlock", "condition", "page", "frame", "robot")
+TABLES: Final = ("interlock", "condition", "page", "frame", "robot", "alarm")
 
 
 @dataclass(frozen=True, slots=True)
 class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
-    are kinds of causes that can't be checked: the existing "interlock"s, "input"s or "control"s, or the
-    topics that the panel "listens" to."""
+    are kinds of causes that can't be checked: the existing "interlock"s, "input"s, "control"s or
+    "alarm"s, the topics that the panel "listens" to, or the "action"s of conditions and alarms."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -60,11 +60,11 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
             case ("interlock" | "condition" as name, int(i), *_):
                 stand_in = _stand_in(tables[name][i], f"{name}_{i}")
                 rest.tables[name][i] = stand_in | {"topic": f"/faulty_{name}_{i}"}
-                rest.undecidable.update(("listens", *_unnamed("interlock", tables[name][i])))
+                rest.undecidable.update(("listens", "action", *_unnamed("interlock", tables[name][i])))
             case ("alarm", int(i), *_):
                 stand_in = _stand_in(tables["alarm"][i], str(i))
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}
-                rest.undecidable.add("listens")
+                rest.undecidable.update(("listens", "action", *_unnamed("alarm", tables["alarm"][i])))
             case ("robot", int(r), *_):
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
                 rest.undecidable.update(_unnamed("robot", tables["robot"][r]))
@@ -78,7 +78,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 if closest_name(key, ("pictures",)):
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
-                    rest.undecidable.update(("interlock", "listens", "page", "robot"))
+                    rest.undecidable.update(("interlock", "listens", "page", "robot", "alarm"))
     return rest
 
 

@@ -45,7 +45,7 @@ class Readout(Display):
         yield from constant_faults(place, self, interfaces)
 
 
-def _check_state_value(value: Any) -> Any:
+def check_state_value(value: Any) -> Any:
     if not isinstance(value, bool | int | str):
         raise ValueError(f"must be a whole number, true or false, or text, not {format_value(value)}")
     return value
@@ -55,7 +55,7 @@ class LampState(Description):
     """How a lamp shows one value, which may be a constant's name. Normal states are grey, white or
     black; colours are for abnormal ones."""
 
-    value: Annotated[bool | int | str, BeforeValidator(_check_state_value)]
+    value: Annotated[bool | int | str, BeforeValidator(check_state_value)]
     text: Label
     shape: Literal["circle", "square", "triangle", "diamond", "cross", "bar", "play", "pause"]
     colour: Literal["grey", "white", "black", "blue", "yellow", "red"] = "grey"

@@ -6,7 +6,7 @@ send. Tables of other rooms say how a kind is shown, permitted and sent.
 
 from abc import abstractmethod
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field
@@ -38,20 +38,20 @@ from app.panel.widgets.sent_message import SentMessage
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What a widget's check needs: the inputs of its page by id, the ids of all inputs, of all
-    interlocks and of all conditions (interlocks too), topic → type of the subscriptions (`types`), the
-    ids of all `pages` and the names of all `pictures`. Faults of widgets in `faulty` are reported
-    already: checks of them are skipped."""
+    """What a widget's check needs: the `inputs` of its page by id, the ids of all others, topic → type
+    of the subscriptions (`types`), the names of all `pictures`. `conditions` (interlocks too) and
+    `alarms` say whether each has an action. Faults of widgets in `faulty` are reported already."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
     all_inputs: Collection[str]
     interlocks: Collection[str]
-    conditions: Collection[str]
+    conditions: Mapping[str, bool]
     types: Mapping[str, str]
     faulty: Collection[str] = ()
     pages: Collection[str] = ()
     pictures: Collection[str] = ()
+    alarms: Mapping[str, bool] = field(default_factory=dict)
 
 
 class TopicSource(NamedTuple):
@@ -157,7 +157,7 @@ class TopicWidget(BaseWidget):
 
 
 class TopicField(Description):
-    """A field of a topic of its own, which a widget reads beside or instead of its topic."""
+    """A field of a topic that a widget reads beside or instead of its topic."""
 
     topic: TopicName
     type: Type
@@ -171,7 +171,9 @@ class TopicField(Description):
 
 
 class DisplayWidget(BaseWidget):
-    """A widget that shows what topics say, of one robot."""
+    """A widget that shows what topics say, of one robot, or what to do about alarms."""
+
+    shows_alarms: ClassVar[bool] = False
 
     @abstractmethod
     def sources(self) -> Iterator[TopicSource]:

@@ -24,6 +24,7 @@ from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
+from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.static import PageLink, Picture, TextLabel
 from app.panel.widgets.step import Step
@@ -68,6 +69,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "figure": WidgetKind(Figure, tiles.FIGURE, styles=("facts",), script=False),
     "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("facts",), script=True),
     "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("facts",), script=True),
+    "sequence": WidgetKind(Sequence, tiles.SEQUENCE, styles=("facts",), script=True),
     "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),

@@ -11,6 +11,7 @@ from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
 
@@ -38,6 +39,10 @@ PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
 CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
 CONDITION, LOW_CONDITION = 42.0, 36.0
 CONDITIONS_WIDTH: Final = 200.0
+SEQUENCE_FRAME: Final = 33.0  # the line above the steps
+SEQUENCE_STEP, LOW_SEQUENCE_STEP = 46.0, 40.0
+SEQUENCE_PICTURE: Final = 80.0  # above the steps; on a narrow screen it is beside them
+SEQUENCE_WIDTH: Final = 240.0
 UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
 GAUGE_WIDTH: Final = 126.0
 JOINTS_FRAME: Final = 41.0  # name and note
@@ -157,6 +162,13 @@ def _conditions_height(widget: Conditions, screen: Screen) -> float:
     return CONDITIONS_FRAME + widget.rows_at_most * row
 
 
+def _sequence_height(widget: Sequence, screen: Screen) -> float:
+    row = LOW_SEQUENCE_STEP if screen.height <= LOW_SCREEN else SEQUENCE_STEP
+    has_picture = widget.has_picture and screen.width >= MIDDLE
+    picture = SEQUENCE_PICTURE if has_picture else 0.0
+    return SEQUENCE_FRAME + picture + widget.rows_at_most * row
+
+
 def _plan_height(_: BaseWidget, screen: Screen) -> float:
     return PLAN_HEIGHT if screen.height > NO_NAMES else LOW_PLAN_HEIGHT
 
@@ -201,6 +213,7 @@ CAMERA: Final = Tile(
 )
 PALLET: Final = Tile(_plan_height, lambda widget, screen: PLAN_WIDTH, grows=True)
 CONDITIONS: Final = Tile(_conditions_height, lambda widget, screen: CONDITIONS_WIDTH)
+SEQUENCE: Final = Tile(_sequence_height, lambda widget, screen: SEQUENCE_WIDTH, grows=True)
 FIGURE: Final = Tile(_figure_height, lambda widget, screen: FIGURE_WIDTH)
 GAUGE: Final = Tile(_gauge_height, lambda widget, screen: GAUGE_WIDTH)
 JOINTS: Final = Tile(_joints_height, lambda widget, screen: JOINTS_WIDTH, grows=True)

@@ -7,6 +7,7 @@ from app.web.gallery.displays import CAMERAS, LAMPS, LOGS, READOUTS
 from app.web.gallery.examples import Part
 from app.web.gallery.indicators import CHECKS, FIGURES, GAUGES, JOINT_ROWS, PALLETS, TABLES
 from app.web.gallery.inputs import INPUTS, PARAMETERS, STATIC
+from app.web.gallery.sequences import SEQUENCES
 from app.web.gallery.trends import TRENDS
 
 PARTS: Final = (
@@ -18,6 +19,7 @@ PARTS: Final = (
     Part("Figures", 3, FIGURES),
     Part("Pallets", 6, PALLETS),
     Part("Conditions", 3, CHECKS),
+    Part("Sequences", 3, SEQUENCES),
     Part("Gauges", 6, GAUGES),
     Part("Joints", 3, JOINT_ROWS),
     Part("Tables", 2, TABLES),

@@ -62,6 +62,19 @@ BOXES_COUNT: Final = Words("Boxes", "積付数", "Kartons")
 MINUTES_LEFT: Final = Words("{value} min left", "残り {value} 分", "noch {value} min")
 LAYER: Final = Words("layer {value} of 6", "{value} / 6 段", "Lage {value} von 6")
 CONDITIONS: Final = Words("Conditions", "条件", "Bedingungen")
+LOADING: Final = Words("Loading", "ワーク投入", "Einlegen")
+OPEN_CLAMP: Final = Words("Open the clamp", "クランプを開く", "Spanner öffnen")
+LAY_IN: Final = Words("Lay in the part", "ワークを入れる", "Teil einlegen")
+CLOSE_CLAMP: Final = Words("Close the clamp", "クランプを閉じる", "Spanner schließen")
+LOOK_IN: Final = Words(
+    "See that no one is in the cell",
+    "セル内に人がいないことを確認",
+    "Prüfen, dass niemand in der Zelle ist",
+)
+THROUGH_WINDOWS: Final = Words(
+    "look through both windows", "両方の窓から確認", "durch beide Fenster sehen"
+)
+TOUCH_RESET: Final = Words("Touch Reset", "「リセット」に触れる", "Rücksetzen berühren")
 BOXES: Final = Words("P12, boxes", "P12、ケース", "P12, Kartons")
 ORDER: Final = Words("Order", "製番", "Auftrag")
 WRAPPER: Final = Words("Wrapper", "包装機", "Wickler")
