@@ -206,7 +206,7 @@ async def _app_state(
             kinds,
             *own,
             panel.brand,
-            has_alarms=panel.has_alarms,
+            has_alarms=panel.may_raise,
         )
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:

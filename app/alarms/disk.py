@@ -56,6 +56,7 @@ class AlarmDisk:
         self._events = events
         self._loop = asyncio.get_running_loop()
         self._writer: DiskWriter[Change] = DiskWriter("alarms", self, most=MAX_WAITING, keep=True)
+        self._is_started = False
         # On the thread.
         self._store: AlarmStore | None = None
         self._files: Files | None = None
@@ -64,12 +65,20 @@ class AlarmDisk:
         self._tidy_at = 0.0
         self._untidied = 0  # transitions that were written since
 
+    @property
+    def exists(self) -> bool:
+        """Whether alarms were kept in the folder before."""
+        return (self._folder / NAME).exists()
+
     def start(self) -> None:
         """Starts the thread, which loads what stood."""
-        self._writer.start()
+        if not self._is_started:
+            self._is_started = True
+            self._writer.start()
 
     def put(self, change: Change) -> bool:
         """Queues a change; False if too many wait already."""
+        self.start()
         return self._writer.put(change)
 
     @property
@@ -79,7 +88,7 @@ class AlarmDisk:
 
     async def stop(self) -> None:
         """Writes what is queued; waits for `STOP_TIMEOUT_S` at most."""
-        if not await asyncio.to_thread(self._writer.close, STOP_TIMEOUT_S):
+        if self._is_started and not await asyncio.to_thread(self._writer.close, STOP_TIMEOUT_S):
             log.error("the disk is too slow: the last changes of alarms were not written")
 
     # On the thread: `DiskFile`.

@@ -79,7 +79,7 @@ class AlarmEngine:
 
     def _keep(self, definition: Definition) -> AlarmInstance:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
-        self._by_robot[definition.robot].append(definition.id)
+        self._by_robot.setdefault(definition.robot, []).append(definition.id)
         self._waiting[definition.id] = None
         self._inhibit(alarm)
         return alarm
@@ -116,6 +116,12 @@ class AlarmEngine:
     def robot_changed(self, robot: str) -> None:
         """The link to a robot, or its graph, has changed."""
         self._waiting.update(dict.fromkeys(self._by_robot[robot]))
+
+    def own_changed(self, definition: Definition, entry: AlarmEntry) -> None:
+        """What the server sees of an alarm of the panel itself, which is of no robot."""
+        alarm = self.alarms.get(definition.id) or self._keep(definition)
+        alarm.entry = entry
+        self._waiting[definition.id] = None
 
     def evaluate(self, most: int = MAX_EVALUATED) -> None:
         """Evaluates the alarms that wait, and those whose time has come: `most` of them."""
@@ -187,7 +193,7 @@ class AlarmEngine:
     def _evaluated(self, alarm: AlarmInstance, now: Moment) -> Iterator[Transition]:
         """Evaluates one alarm; returns its transitions."""
         definition, before = alarm.definition, alarm.status
-        lock, robot = alarm.lock, self._robots.get(definition.robot)
+        lock, robot = alarm.lock, self._robots[definition.robot] if definition.is_of_robot else None
         if robot is not None and not (robot.link_up and robot.graph.peers):
             alarm.heard_at = -math.inf  # what was published before a cut does not count after it
         reading = read_alarm(alarm, robot, now.monotonic, self._began_at)

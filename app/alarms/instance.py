@@ -26,6 +26,11 @@ class Definition:
     delays: Delays
     thresholds: tuple[Limit | None, ...]
 
+    @property
+    def is_of_robot(self) -> bool:
+        """Whether it is an alarm of a robot; else it is one of the panel itself."""
+        return self.alarm.source is not None
+
     def of_entry(self, entry: AlarmEntry) -> "Definition":
         """The definition of an alarm that the robot publishes itself."""
         rules = replace(self.rules, priorities=entry.priorities)

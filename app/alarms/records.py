@@ -6,7 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from app.alarms.entries import AlarmEntry
-from app.alarms.instance import AlarmInstance
+from app.alarms.event_names import event_of, lasted
+from app.alarms.history import HistoryRow
+from app.alarms.instance import AlarmInstance, Transition
+from app.alarms.rows import state_of
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, TakenOut
 from app.i18n import Text, TextLike, text_in
@@ -46,6 +49,25 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
             "action": _as_json(entry.action),
         }
     return json.dumps(record, ensure_ascii=False)
+
+
+def history_row(alarm: AlarmInstance, transition: Transition) -> HistoryRow:
+    """The row of a transition, with the record of the alarm after it."""
+    before, after, definition = transition.before, transition.after, alarm.definition
+    return HistoryRow(
+        transition.at.wall,
+        transition.id,
+        state_of(after),
+        after.occurrence,
+        transition.act,
+        transition.actor,
+        record_of(alarm, transition.at),
+        event_of(before, after, transition.act),
+        alarm.priority,
+        definition.robot,
+        str(definition.alarm.group or ""),
+        lasted(before, after, transition.at),
+    )
 
 
 def _as_json(text: TextLike) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, TypedDict
 
+from app.alarms.marks import AlarmMarks
 from app.alarms.rows import AlarmRow
 from app.i18n import TextLike
 
@@ -62,7 +63,8 @@ NO_ALARMS: Final = AlarmsView(
 class ShownAlarms:
     """The rows by their ids; a change costs no walk over all of them."""
 
-    def __init__(self) -> None:
+    def __init__(self, marks: AlarmMarks) -> None:
+        self.marks = marks
         self.rows: dict[str, AlarmRow] = {}
         self._order: list[tuple[tuple[float, ...], str]] = []
         self._counts: Counter[str] = Counter()
@@ -78,6 +80,7 @@ class ShownAlarms:
             self.rows[alarm_id] = row
             insort(self._order, _key(row))
             self._counts.update(_counted(row))
+        self.marks.update(before, row)
 
     def count_raise(self, now: float) -> None:
         """An alarm was raised at `now` (monotonic seconds)."""

@@ -54,7 +54,9 @@ def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> Source
     if not isinstance(value, int | float):
         return UNKNOWN
     stale_at = math.inf if alarm.max_age_s is None else reading.at + alarm.max_age_s
-    return SourceReading(value=value, until=stale_at) if now < stale_at else UNKNOWN
+    if now >= stale_at:
+        return UNKNOWN
+    return SourceReading(value=value if alarm.scale == 1.0 else value * alarm.scale, until=stale_at)
 
 
 def _read_node(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:

@@ -21,6 +21,7 @@ from app.panel.base import (
     panel_text,
 )
 from app.panel.condition import Condition
+from app.panel.widgets.displays import Factor, StateValue
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
 from app.panel.widgets.parameter import NodeName
@@ -116,7 +117,8 @@ class SuppressingCondition(Condition):
 
 class Alarm(Description):
     """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
-    publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR."""
+    publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
+    the value times `scale`. `state` is the machine's state while it is active."""
 
     id: Id
     robot: Id | None = None
@@ -131,6 +133,7 @@ class Alarm(Description):
     latched: bool = False
     ack: Literal["required", "none"] = "required"
     inhibits: Widgets = ()
+    state: StateValue | None = None
     on_delay_s: Delay = 0.0
     off_delay_s: Delay = 0.0
     on_unknown: Literal["keep", "raise"] = "keep"
@@ -139,6 +142,7 @@ class Alarm(Description):
     type: Type | None = None
     field: FieldPath = "data"
     unit: Unit = ""
+    scale: Factor = 1.0
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
     low_low: Limit | None = None
@@ -222,10 +226,12 @@ class Alarm(Description):
 
 
 class AlarmRules(Description):
-    """The table `[alarms]`. `panel`: the panel raises alarms of its own. The oldest entries of the
-    history are removed after `days`, or when the file is larger than `size_mb` megabytes."""
+    """The table `[alarms]`. `panel`: the panel raises alarms of its own. `low_screens`: what shows
+    alarms on pages of low screens. The oldest entries of the history are removed after `days`, or when
+    the file is larger than `size_mb` megabytes."""
 
     panel: bool = True
     disk_free_mb: Annotated[float, Field(ge=1, le=1_000_000, allow_inf_nan=False)] = 500.0
+    low_screens: Literal["line", "badge"] = "line"
     days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
     size_mb: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 64.0

@@ -14,6 +14,7 @@ from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_condition
 from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
+from app.panel.machine_state import StateRules
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
 
@@ -88,8 +89,8 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
     interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
     conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
-    alarms = tuple(_resolve_alarm(alarm, interfaces) for alarm in panel.alarms)
     state = panel.state and panel.state.with_constants(interfaces)
+    alarms = tuple(_resolve_alarm(alarm, panel.state, interfaces) for alarm in panel.alarms)
     resolved_parts = {
         "interlocks": interlocks,
         "own_conditions": conditions,
@@ -99,14 +100,16 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
     return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
 
 
-def _resolve_alarm(alarm: Alarm, interfaces: Interfaces) -> Alarm:
-    """The alarm with values in place of constants' names in its conditions."""
+def _resolve_alarm(alarm: Alarm, state: StateRules | None, interfaces: Interfaces) -> Alarm:
+    """The alarm with values in place of constants' names in its conditions and its state."""
     conditions = {"when": alarm.when, "suppressed_while": alarm.suppressed_while}
-    resolved = {
+    resolved: dict[str, Any] = {
         key: resolve_condition(condition, interfaces)
         for key, condition in conditions.items()
         if condition is not None
     }
+    if alarm.state is not None and state is not None:
+        resolved["state"] = state.value_of(alarm.state, interfaces)
     return alarm.model_copy(update=resolved) if resolved else alarm
 
 

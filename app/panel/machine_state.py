@@ -45,13 +45,16 @@ class StateRules(TopicField):
 
     def with_constants(self, interfaces: Interfaces) -> Self:
         """The same with values in place of constants' names."""
-        kind = interfaces.field_type(self.type, self.field)
-        constants = interfaces.constants(parent_type(self, interfaces))
         states = [
-            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
+            state.model_copy(update={"value": self.value_of(state.value, interfaces)})
             for state in self.states
         ]
         return self.model_copy(update={"states": tuple(states)})
+
+    def value_of(self, value: bool | int | str, interfaces: Interfaces) -> Any:
+        """The value of a state in the message: that of a constant by its name."""
+        kind = interfaces.field_type(self.type, self.field)
+        return resolve_state_value(value, kind, interfaces.constants(parent_type(self, interfaces)))
 
 
 class MachineState(Display):

@@ -165,8 +165,13 @@ class Panel(Description):
 
     @property
     def has_alarms(self) -> bool:
-        """Whether its pages have the line of alarms."""
+        """Whether its pages always have the line of alarms, and a tab for their list."""
         return bool(self.alarms)
+
+    @property
+    def may_raise(self) -> bool:
+        """Whether there may be alarms, if only those of the panel itself."""
+        return self.has_alarms or self.alarm_rules.panel
 
     @property
     def has_rail(self) -> bool:
@@ -249,19 +254,16 @@ class Panel(Description):
 
     def confirmations(self) -> Iterator[Confirm]:
         """The topics that confirm commands."""
-        for widget in self.widgets():
-            if isinstance(widget, PublishPress) and widget.confirm is not None:
-                yield widget.confirm
+        presses = (widget for widget in self.widgets() if isinstance(widget, PublishPress))
+        yield from (press.confirm for press in presses if press.confirm is not None)
 
     def monitored(self) -> Iterator[TopicSource]:
         """What conditions, alarms and displays listen to."""
         for condition in self.conditions:
-            field = (condition.field,)
-            yield TopicSource(condition.topic, condition.type, condition.qos, field)
-        listeners: tuple[Alarm | DisplayWidget | Command, ...]
-        listeners = (*self.alarms, *self.displays, *self.commands)
-        for listener in listeners:
-            yield from listener.sources()
+            yield TopicSource(condition.topic, condition.type, condition.qos, (condition.field,))
+        yield from (source for alarm in self.alarms for source in alarm.sources())
+        yield from (source for widget in self.displays for source in widget.sources())
+        yield from (source for command in self.commands for source in command.sources())
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""
@@ -292,7 +294,7 @@ class Panel(Description):
         return frozenset(source.topic for source in self.monitored()) - strict
 
     def qos(self, topic: str) -> TopicQos:
-        """A topic's QoS, which is the same in all places of the panel file."""
+        """A topic's QoS, the same in all places of the panel file."""
         named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}
         named |= {source.topic: source.qos for source in self.monitored()}
         return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())

@@ -10,19 +10,23 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from app.alarms.counts import AlarmCounts
 from app.alarms.disk import NAME, AlarmDisk, Change, DiskEvents
 from app.alarms.engine import AlarmEngine
-from app.alarms.event_names import event_of, lasted
 from app.alarms.history import HistoryRow
 from app.alarms.history_reader import HistoryReader
 from app.alarms.instance import Transition
-from app.alarms.records import record_of
-from app.alarms.rows import AlarmRow, row_of, state_of
+from app.alarms.marks import AlarmMarks
+from app.alarms.own import is_kept
+from app.alarms.records import history_row, record_of
+from app.alarms.rows import AlarmRow, row_of
 from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms
 from app.alarms.status import Moment
+from app.audit.press_record import Log
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.runtime.own_alarms import OwnAlarms
 from app.runtime.robot_alarms import RobotAlarms
 
 log = logging.getLogger("kiosk.alarms")
@@ -55,9 +59,7 @@ class Alarms:
         self._panel = panel
         self.engine = AlarmEngine(panel, now, self._receive)
         self.history = HistoryReader(None)
-        self.raised = 0  # since the start
-        self.acknowledged = 0  # since the start
-        self.acknowledge_s = 0.0  # from the raises to these acknowledgements together
+        self.counts = AlarmCounts()
         self._loop = asyncio.get_running_loop()
         self._disk: AlarmDisk | None = None
         self._loaded: asyncio.Future[None] = self._loop.create_future()
@@ -66,7 +68,7 @@ class Alarms:
         self._seq = 0
         self._overrun: dict[str, None] = {}  # ids of alarms of which a change found no room
         self._fault: TextLike = ""
-        self._shown = ShownAlarms()
+        self._shown = ShownAlarms(AlarmMarks(panel))
         self._view: AlarmsView | None = NO_ALARMS  # None: to be made
         self._robots: list[RobotAlarms] = []
         self._lock_changes = 0
@@ -77,6 +79,7 @@ class Alarms:
         self._due = math.inf
         self._waiters: list[tuple[int, asyncio.Future[None]]] = []
         self._stopped = False
+        self._own: OwnAlarms | None = None
 
     def add_robot(self, robot_id: str, robot: RobotState) -> RobotAlarms:
         """Adds a robot."""
@@ -85,14 +88,21 @@ class Alarms:
         self._robots.append(robot_alarms)
         return robot_alarms
 
-    async def start(self, folder: Path) -> None:
+    async def start(self, folder: Path, operators_log: Log) -> None:
         """Loads the alarms that stood when the server ended, from a folder. Does nothing for a panel
         without alarms."""
-        if not self._panel.alarms:
+        if not self._panel.may_raise:
             return
+        if self._panel.alarm_rules.panel:
+            rules = self._panel.alarm_rules
+            self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate)
+            self._own.start()
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)
         self._disk = AlarmDisk(folder, self._panel.alarm_rules, events)
         self.history = HistoryReader(folder / NAME)
+        if not self._panel.has_alarms and not self._disk.exists:
+            self._restore({})  # there is no file before the panel's own first alarm
+            return
         self._disk.start()
         try:
             async with asyncio.timeout(LOAD_TIMEOUT_S):
@@ -104,6 +114,8 @@ class Alarms:
     async def stop(self) -> None:
         """Evaluates no longer, and writes what is queued."""
         self._stopped = True
+        if self._own is not None:
+            self._own.stop()
         for timer in (self._show_timer, self._slow_timer, self._due_timer):
             if timer is not None:
                 timer.cancel()
@@ -169,31 +181,16 @@ class Alarms:
 
     def _receive(self, transitions: Sequence[Transition]) -> None:
         for transition in transitions:
-            before, after = transition.before, transition.after
-            if after.occurrence != before.occurrence:
-                self.raised += 1
+            after, alarm = transition.after, self.engine.alarms[transition.id]
+            if self.counts.count(transition):
                 self._shown.count_raise(transition.at.monotonic)
-            if before.raised_at and after.is_acknowledged and transition.act == "acknowledge":
-                self.acknowledged += 1
-                self.acknowledge_s += transition.at.monotonic - before.raised_at.monotonic
-            alarm = self.engine.alarms[transition.id]
-            record = record_of(alarm, transition.at)
-            row = HistoryRow(
-                transition.at.wall,
-                transition.id,
-                state_of(after),
-                after.occurrence,
-                transition.act,
-                transition.actor,
-                record,
-                event_of(before, after, transition.act),
-                alarm.priority,
-                alarm.definition.robot,
-                str(alarm.definition.alarm.group or ""),
-                lasted(before, after, transition.at),
-            )
+            row = history_row(alarm, transition)
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
-            self._put(transition.id, row, None if shown is None else record, shown)
+            if not is_kept(alarm.definition):
+                self._shown.update(transition.id, shown)
+                self._show()
+                continue
+            self._put(transition.id, row, None if shown is None else row.record, shown)
 
     def _put(
         self, alarm_id: str, row: HistoryRow | None, record: str | None, shown: AlarmRow | None
@@ -255,7 +252,10 @@ class Alarms:
 
     def _notify(self) -> None:
         self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
+        marked = self._shown.marks.take_changes()
         for robot in self._robots:
+            if topics := marked.get(robot.robot_id):
+                robot.show_marks(self._shown.marks.of_robot(robot.robot_id), topics)
             robot.show(self._shown.listed())
 
     # Restart, and a new file.

@@ -85,7 +85,7 @@ async def open_fleet(
                 recordings.start()
             if trends is not None:
                 await trends.start()
-            await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)))
+            await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)), oplog)
             await fleet.start()
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))

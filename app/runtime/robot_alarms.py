@@ -12,6 +12,7 @@ from app.alarms.sources import link_state
 from app.i18n import say
 from app.permission.verdict import Verdict, locked
 from app.robot.alarm_action import AlarmAction
+from app.robot.alarmed import AlarmedValues
 from app.robot.state import RobotState
 from app.transport.robot_signals import Signal
 
@@ -25,8 +26,9 @@ class RobotAlarms:
         """`evaluate` is called when alarms may be due."""
         self.shown = Signal[[]]()  # the alarms that pages show have changed
         self.locks_changed = Signal[[]]()  # alarms lock other controls than before
+        self.marks_changed = Signal[[Collection[str]]]()  # of values of topics with these keys
+        self.robot_id = robot_id
         self._engine = engine
-        self._robot_id = robot_id
         self._robot = robot
         self._evaluate = evaluate
         self._link: tuple[Any, ...] = ()
@@ -35,33 +37,38 @@ class RobotAlarms:
 
     def update(self, topics: Collection[str]) -> None:
         """Messages arrived on topics with these keys, or something else has changed."""
-        self._engine.topics_changed(self._robot_id, topics)
+        self._engine.topics_changed(self.robot_id, topics)
         link = link_state(self._robot, time.monotonic())
         if link != self._link:
             self._link = link
-            self._engine.robot_changed(self._robot_id)
+            self._engine.robot_changed(self.robot_id)
         self._evaluate()
 
     def entries_received(
         self, alarm_id: str, entries: Sequence[AlarmEntry], at: float, is_whole: bool
     ) -> None:
         """The robot published alarms itself."""
-        self._engine.entries_received(self._robot_id, alarm_id, entries, at, is_whole)
+        self._engine.entries_received(self.robot_id, alarm_id, entries, at, is_whole)
         self._evaluate()
 
     def show(self, rows: Iterable[AlarmRow]) -> None:
         """The rows of all robots' alarms have changed, the most urgent first."""
-        own = (row for row in rows if row["robot"] == self._robot_id and _stands(row))
+        own = (row for row in rows if row["robot"] == self.robot_id and _stands(row))
         self._robot.alarm_actions = tuple(
             AlarmAction(panel_id(row["id"]), row["action"], row["picture"]) for row in own
         )
         self.shown.emit()
 
+    def show_marks(self, marks: AlarmedValues, topics: Collection[str]) -> None:
+        """The values of topics have other marks than before."""
+        self._robot.alarmed = marks
+        self.marks_changed.emit({key for topic in topics for key in self._robot.possible_keys(topic)})
+
     def inhibited(self) -> Mapping[str, Verdict]:
         """The locks by alarms, by the widgets' ids."""
         if self._locks_version != self._engine.lock_changes:
             self._locks_version = self._engine.lock_changes
-            inhibited = self._engine.inhibited(self._robot_id)
+            inhibited = self._engine.inhibited(self.robot_id)
             self._locks = {widget: _lock(alarm) for widget, alarm in inhibited.items()}
         return self._locks
 

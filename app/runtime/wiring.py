@@ -175,6 +175,7 @@ def _connect(signals: RobotSignals, robot_alarms: RobotAlarms, session: RobotSes
     signals.changed.connect(turn.changed)
     robot_alarms.shown.connect(refresher.refresh_alarms)
     robot_alarms.locks_changed.connect(turn.changed)
+    robot_alarms.marks_changed.connect(refresher.refresh_values)
     signals.graph_read.connect(turn.on_graph_read)
     signals.late_reading.connect(turn.run_late_reading)
     signals.entries_decoded.connect(lambda key: refresher.refresh_values({key}))

@@ -9,11 +9,13 @@ from app.errors import Fault
 from app.scaffold.draft_parts import Draft
 from app.scaffold.toml_text import toml_text, written
 
-Part = tuple[str, str]  # (kind, name) of a widget; ("interlock", topic) of a candidate
+# (kind, name) of a widget; ("interlock", topic) of a candidate, ("alarm", topic) of alarms
+Part = tuple[str, str]
 LeftOut = Mapping[Part, str]  # with the reason of each
 Check = Callable[[str], Sequence[Fault]]  # the faults of a panel file's text
 
 _WIDGET: Final = re.compile(r"page\[(\d+)\]\.widget\[(\d+)\]\.?(?P<key>.*)")
+_ALARM: Final = re.compile(r"alarm\[(\d+)\]\.?(?P<key>.*)")
 _INTERLOCK: Final = re.compile(r"interlock\[(\d+)\]\.?(?P<key>.*)")
 
 
@@ -40,6 +42,8 @@ def _blamed(draft: Draft, faults: Sequence[Fault]) -> Iterator[tuple[Part, str]]
         elif (place := _INTERLOCK.fullmatch(fault.place)) is not None:
             topic = draft.interlocks[int(place[1])].topic
             yield ("interlock", topic), _reason(place["key"], fault)
+        elif (place := _ALARM.fullmatch(fault.place)) is not None:
+            yield ("alarm", draft.alarms[int(place[1])].topic), _reason(place["key"], fault)
 
 
 def _reason(key: str, fault: Fault) -> str:

@@ -1,12 +1,12 @@
 """The widgets that show a topic."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from math import ceil, degrees, pi
 from typing import Any, Final
 
 from app.interfaces import Interfaces
-from app.scaffold.draft_parts import DraftWidget, Omission
+from app.scaffold.draft_parts import DiagnosticAlarms, DraftWidget, Omission
 from app.scaffold.fields import NUMBERS, Shown, range_for, shown_fields
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import NEGATIVE, label_of, place_of
@@ -15,6 +15,8 @@ from app.survey.model import SurveyedTopic
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
+DIAGNOSTICS_TOPIC: Final = "/diagnostics"
+AGGREGATED: Final = "_agg"  # ends the topic of an aggregator, which repeats the statuses of others
 LOG: Final = "rcl_interfaces/msg/Log"
 PICTURES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 MAX_JOINTS: Final = 24
@@ -52,6 +54,16 @@ def displays(
             if not fields:
                 why = why_no_display(topic.type, interfaces)
                 yield Omission(f"{topic.name} ({topic.type})", why)
+
+
+def diagnostic_alarms(topics: Iterable[SurveyedTopic]) -> Iterator[DiagnosticAlarms]:
+    """The alarms of the topics with diagnostics, without those that repeat others."""
+    for topic in topics:
+        aggregated = topic.name.endswith(AGGREGATED)
+        if topic.type != DIAGNOSTICS or not topic.publishers or aggregated:
+            continue
+        named = {} if topic.name == DIAGNOSTICS_TOPIC else {"topic": topic.name}
+        yield DiagnosticAlarms(topic=topic.name, keys={"diagnostics": "*", **named, **_qos(topic)})
 
 
 def _qos(topic: SurveyedTopic) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from app.errors import InterfaceError
 from app.interfaces import Interfaces
 from app.interfaces.names import GLOBAL
 from app.scaffold import controls
-from app.scaffold.displays import displays
+from app.scaffold.displays import diagnostic_alarms, displays
 from app.scaffold.draft_parts import Draft, DraftWidget, Omission
 from app.scaffold.interlocks import interlock_candidates, interlock_for
 from app.scaffold.labels import with_own_labels
@@ -86,6 +86,9 @@ def make_draft(
     interlocks = [
         candidate for candidate in candidates if ("interlock", candidate.topic) not in left_out
     ]
+    alarms = [
+        row for row in diagnostic_alarms(shown(known.topics)) if ("alarm", row.topic) not in left_out
+    ]
     entries: list[DraftWidget] = []
     remarks: list[str] = []
     for topic in (topic for topic in known.topics if topic.announced):
@@ -109,7 +112,7 @@ def make_draft(
     ]
     pages, rest = make_pages([*(entry for entry in entries if not entry.control), *acting], live)
     remarks += [f"{name}: {NO_ROOM}" for name in dict.fromkeys(entry.name for entry in rest)]
-    return replace(base, interlocks=interlocks, pages=pages, remarks=remarks)
+    return replace(base, interlocks=interlocks, alarms=alarms, pages=pages, remarks=remarks)
 
 
 NO_ROOM: Final = f"the panel has {MOST_PAGES} pages; --namespace makes one of a part of the robot"

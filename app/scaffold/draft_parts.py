@@ -48,6 +48,15 @@ class InterlockCandidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnosticAlarms:
+    """The alarms of a topic with diagnostics, one for each status. `keys` are those of its table, but
+    for its id."""
+
+    topic: str
+    keys: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
     """A panel file that is not written yet. `remarks` are lines about what has no widget."""
 
@@ -57,5 +66,6 @@ class Draft:
     distro: str = "jazzy"
     interfaces: Sequence[str] = ()
     interlocks: Sequence[InterlockCandidate] = ()
+    alarms: Sequence[DiagnosticAlarms] = ()
     pages: Mapping[str, Sequence[DraftWidget]] = field(default_factory=dict)
     remarks: Sequence[str] = ()

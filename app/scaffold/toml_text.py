@@ -16,7 +16,7 @@ CHECK: Final = "operator-panel check"
 def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
     """The file. `controls`: keys that act on the robot are live, each behind its interlock.
     `trial`: all of them, to be checked."""
-    lines = [*_head(draft), *_interlocks(draft)]
+    lines = [*_head(draft), *_interlocks(draft), *_alarms(draft)]
     taken: set[str] = set()
     pages: set[str] = set()
     for page, entries in zip(draft.pages, written(draft, controls, trial), strict=True):
@@ -92,6 +92,24 @@ def _interlocks(draft: Draft) -> Iterator[str]:
             yield "require_publisher = true  # locks when its publisher is gone"
         else:
             yield "max_age_s = 2.0  # locks when no message arrives for so long"
+        yield ""
+
+
+def _alarms(draft: Draft) -> Iterator[str]:
+    if not draft.alarms:
+        return
+    yield ""
+    yield from _comment(
+        "The robot's diagnostics: each status that is WARN, ERROR or STALE is an alarm with the robot's"
+        ' own message. Give the names of those that an operator has to act on, such as ["motor *"].'
+    )
+    taken: set[str] = set()
+    for row in draft.alarms:
+        own_id = id_of(row.topic, taken)
+        taken.add(own_id)
+        yield "[[alarm]]"
+        yield f"id = {_value(own_id)}"
+        yield from (f"{key} = {_value(value)}" for key, value in row.keys.items())
         yield ""
 
 

@@ -16,15 +16,21 @@ def machine_state(display: MachineState, robot: RobotState, now: float) -> tuple
     """Attributes of the machine's state: those of a lamp, `since` (how long it has been so, "" where
     that was not heard) and `detail0`, `detail1`; and when time alone changes them.
 
-    A state that is not known now has a shape and a word of its own, and never a colour.
+    A state that is not known now has a shape and a word of its own, and never a colour. An active alarm
+    with a `state` replaces what the robot says.
     """
+    details, changes = _details(display, robot, now)
+    if (alarmed := robot.alarmed.state) is not None:
+        text, shape, colour = lamp_of(display.states, alarmed.value)
+        since, until = _for_s(now - alarmed.since, now)
+        shown = {"state": "live", "text": text, "shape": shape, "colour": colour, "note": ""}
+        return {**shown, "since": since, **details}, min(until, changes)
     field = field_state(display, robot, now)
     text, shape, colour = lamp_of(display.states, field.value)
     since, until = _since(display, robot, now)
     if field.state != "live":
         text, shape, colour = say(f"lamp_{field.state}"), SHAPES[field.state], "none"
         since, until = "", math.inf
-    details, changes = _details(display, robot, now)
     shown = {"state": field.state, "text": text, "shape": shape, "colour": colour, "note": field.note}
     return {**shown, "since": since, **details}, min(field.until, until, changes)
 
@@ -34,7 +40,11 @@ def _since(display: MachineState, robot: RobotState, now: float) -> tuple[TextLi
     changed = reading.since.get(display.field)
     if changed is None:
         return "", math.inf
-    age = max(0.0, reading.wall - changed) + max(0.0, now - reading.at)
+    return _for_s(max(0.0, reading.wall - changed) + max(0.0, now - reading.at), now)
+
+
+def _for_s(age: float, now: float) -> tuple[TextLike, float]:
+    """For how long the state has been so, and when that text changes."""
     step = 1.0 if age < MINUTE_S else MINUTE_S
     return say("machine_state_for", duration=span_text(age)), now + step - age % step
 

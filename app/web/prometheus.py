@@ -53,13 +53,13 @@ def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
         listed.add_metric([priority, state], count)
     yield listed
     yield CounterMetricFamily(
-        "kiosk_alarms_raised", "How often alarms were raised", value=alarms.raised
+        "kiosk_alarms_raised", "How often alarms were raised", value=alarms.counts.raised
     )
     yield SummaryMetricFamily(
         "kiosk_alarm_acknowledge_seconds",
         "From the raise of an alarm to its acknowledgement",
-        count_value=alarms.acknowledged,
-        sum_value=alarms.acknowledge_s,
+        count_value=alarms.counts.acknowledged,
+        sum_value=alarms.counts.acknowledge_s,
     )
 
 

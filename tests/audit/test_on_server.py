@@ -67,6 +67,12 @@ def small_disk(tmp_path: Path, tables: str = "") -> Server:
     return Server(ROOT, before=[*SMALL_DISK, MOUNT, "sh"], KIOSK_PANEL=panel)
 
 
+def own_alarms(server: Server) -> dict[str, str]:
+    """The states of the panel's own alarms."""
+    rows = server.http.get("/alarms").json()["alarms"]
+    return {row["id"]: row["state"] for row in rows if row["source"] == "panel"}
+
+
 def press_until_full(server: Server) -> None:
     filler = fill(inside(server))
     assert filler.exists()
@@ -93,10 +99,13 @@ def test_a_full_disk_locks_and_opens_again_by_itself(
     assert FULL in page_text(kiosk, "/")
     assert kiosk.http.get("/readyz").json()["code"] == "log"
     assert FULL in page_text(kiosk, "/log")
+    until(lambda: own_alarms(kiosk).get("panel_log") == "active", "the alarm is raised")
     (inside(kiosk) / "filler").unlink()
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled(timeout=20_000)
     expect(page.locator("#fault")).to_be_hidden()
     until(lambda: sends(kiosk, "sent again"), "a press is sent")
+    until(lambda: own_alarms(kiosk)["panel_log"] == "returned", "the alarm returns")
+    assert own_alarms(kiosk)["panel_disk"] == "active"  # the whole disk is smaller than the limit
     assert kiosk.http.get("/log.csv?text=never+sent").text.count("\n") == 1
     assert "could not be written from" in page_text(kiosk, "/log?outcome=resumed")
     until(lambda: "sent again" in kiosk.widget("last_heard")["text"], "the robot has it")

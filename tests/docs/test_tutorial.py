@@ -93,6 +93,8 @@ def test_the_demo_robot_hears_the_buttons(panel: Path, servers: Callable[[Server
     until(lambda: mine.widget("heard")["text"] == "start (/operation)", "the readout shows it")
     until(lambda: mine.widget("air")["state"] == "live", "the gauge has the air pressure")
     until(lambda: mine.widget("air_history")["state"] == "live", "the trend has it, too")
+    until(lambda: mine.snapshot()["alarms"]["line"], "the alarm is raised", within_s=60, every_s=0.5)
+    assert mine.snapshot()["alarms"]["line"]["text"] == "Air pressure too high"
     assert mine.widget("permitted")["text"] in {"Permitted", "Not permitted"}
     until(lambda: loads(mine), "the robot permits", within_s=40, every_s=0.2)
     until(lambda: mine.widget("heard")["text"] == "A-17 (/operation1)", "the readout shows it")

@@ -23,6 +23,12 @@ type = "std_msgs/msg/Empty"
 message = {}
 """
 AIR = 'topic = "/air"\ntype = "std_msgs/msg/Float64"\ntext = "Air"\n'
+STATE = """
+[state]
+topic = "/state"
+type = "std_msgs/msg/String"
+states = [{ value = "ON", text = "On", shape = "play" }]
+"""
 FAULTS = 'topic = "/faults"\ntype = "diagnostic_msgs/msg/DiagnosticArray"\n'
 LIST = '[alarm.list]\nfield = "status"\ncode = "hardware_id"\n'
 CATALOGUE = (
@@ -72,6 +78,9 @@ def test_diagnostics_have_their_topic_and_type(tmp_path: Path) -> None:
         (AIR + "low = 5.0\nhigh = 6.0\ndeadband = 1.0\n", "alarm[0].deadband", "between low and high"),
         (AIR.replace("Float64", "String") + "low = 5.0\n", "alarm[0].field", "is string"),
         (AIR + 'field = "value"\nlow = 5.0\n', "alarm[0].field", "value"),
+        (AIR + "low = 5.0\nscale = 0.0\n", "alarm[0].scale", "is 0"),
+        (AIR + 'low = 5.0\nstate = "FAULT"\n', "alarm[0].state", "the panel has no [state]"),
+        (AIR + 'low = 5.0\nstate = "OFF"\n' + STATE, "alarm[0].state", 'no state "OFF"; there is ON'),
         ('text = "Air"\nlow = 5.0\ntype = "std_msgs/msg/Float64"\n', "alarm[0].topic", "is missing"),
         ('node = "/driver"\n', "alarm[0].text", "is missing"),
         ('text = "Driver"\nnode = "/driver"\ndeadband = 1.0\n', "alarm[0].deadband", "no meaning"),

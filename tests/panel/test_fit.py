@@ -65,3 +65,15 @@ def test_widgets_are_placed_as_a_grid_places_them() -> None:
         ("k1", 0, 1),
         ("k2", 1, 1),
     ]
+
+
+@pytest.mark.parametrize(("low_screens", "fits"), [("badge", True), ("line", False)])
+def test_the_line_of_alarms_takes_its_height_unless_low_screens_have_a_badge(
+    low_screens: str, fits: bool
+) -> None:
+    alarm = {"id": "apart", "text": "No connection", "lost": "robot"}
+    rules = {"alarms": {"low_screens": low_screens}, "alarm": [alarm]}
+    rows = {"title": "T", "columns": 1, "widget": keys(3)}
+    page = {"id": "p", "title": "P", "fit": True, "group": [rows]}
+    checked = Panel.model_validate({"title": "T", "screens": ["800x480"], "page": [page], **rules})
+    assert said(checked).startswith("fits" if fits else "does not fit")

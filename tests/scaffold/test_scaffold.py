@@ -429,3 +429,22 @@ def test_times_and_durations_are_shown_as_such(tmp_path: Path) -> None:
         ("began", "builtin_interfaces/msg/Time"),
         ("took", "builtin_interfaces/msg/Duration"),
     ]
+
+
+def test_diagnostics_are_proposed_as_alarms() -> None:
+    diagnostics = "diagnostic_msgs/msg/DiagnosticArray"
+    topics = [
+        published("/diagnostics", diagnostics),
+        published("/diagnostics_agg", diagnostics),
+        published("/arm/health", diagnostics, reliable=False),
+    ]
+    assert tomllib.loads(text_of(topics=topics))["alarm"] == [
+        {"id": "diagnostics", "diagnostics": "*"},
+        {
+            "id": "arm_health",
+            "diagnostics": "*",
+            "topic": "/arm/health",
+            "qos": {"reliability": "best_effort"},
+        },
+    ]
+    assert "alarm" not in tomllib.loads(text_of(topics=[ENABLED]))

@@ -368,3 +368,15 @@ def test_a_published_permission_is_the_answer_to_the_command(topic: str) -> None
         permitted = ROWS[topic].value(cell)
         verdicts.add((permitted, COMMANDS[topic](cell) == ""))
     assert verdicts == {(True, True), (False, False)}
+
+
+def test_the_gripper_warns_while_air_is_low(cell: PalletizingCell) -> None:
+    def level() -> int:
+        statuses = ROWS["/diagnostics"].value(cell)
+        return next(int(status["level"]) for status in statuses if status["name"] == "Gripper")
+
+    assert level() == 0
+    run_until(cell, lambda: not cell.air.is_enough)
+    assert level() == 1
+    run_until(cell, lambda: cell.air.is_enough)
+    assert level() == 0

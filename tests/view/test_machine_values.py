@@ -7,6 +7,7 @@ import pytest
 
 from app.panel.machine_state import STATE_ID
 from app.panel.model import Panel
+from app.robot.alarmed import AlarmedState, AlarmedValues
 from app.robot.state import RobotState
 from app.view.view import build_view
 from tests.support.builders import FREE, NOW, panel_of, robot_there, says
@@ -100,3 +101,20 @@ def test_long_state_is_shown_in_hours_and_minutes(panel: Panel, robot: RobotStat
     reports(robot, "RUNNING", seq=2)
     reports(robot, "RUNNING", at=NOW + 8060, seq=3)
     assert shown(panel, robot, NOW + 8060)["since"] == "for 2 h 14 min"
+
+
+def test_an_active_alarm_with_a_state_is_shown_in_place_of_the_robots(
+    panel: Panel, robot: RobotState
+) -> None:
+    reports(robot, "RUNNING")
+    robot.alarmed = AlarmedValues(AlarmedState("FAULT", NOW))
+    attributes = shown(panel, robot, NOW + 5)
+    assert (attributes["text"], attributes["colour"], attributes["since"]) == (
+        "FAULT",
+        "red",
+        "for 5 s",
+    )
+    assert attributes["detail0"] == "Order —"
+    assert until(panel, robot, NOW + 5) == pytest.approx(NOW + 6)
+    robot.alarmed = AlarmedValues()
+    assert shown(panel, robot, NOW + 6)["text"] == "RUNNING"

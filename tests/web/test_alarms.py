@@ -293,3 +293,27 @@ def test_the_history_is_exported_as_the_page_shows_it(cell: Server) -> None:
     rows = list(csv.DictReader(io.StringIO(answer.text.removeprefix("\ufeff"))))
     assert [row["event"] for row in rows] == ["acknowledged", "raised"]
     assert (rows[0]["text"], rows[0]["unit"], rows[0]["limit"]) == ("空気圧低下", "bar", "5.0")
+
+
+def test_the_header_has_the_state_of_an_active_alarm(tmp_path: Path) -> None:
+    state = """
+[state]
+topic = "/state"
+type = "std_msgs/msg/String"
+states = [
+  { value = "RUNNING", text = "Running", shape = "play" },
+  { value = "FAULT", text = { en = "Fault", ja = "異常" }, shape = "cross", colour = "red" },
+]
+[demo."/state"]
+values = ["RUNNING"]
+"""
+    panel = PANEL.replace("latched = true", 'latched = true\nstate = "FAULT"') + state
+    with demo_server(tmp_path, panel % "values = [4.5, 6.0], period_s = 6.0") as server:
+
+        def says(text: str) -> bool:
+            return bool(server.snapshot()["widgets"]["machine_state"]["text"] == text)
+
+        until(lambda: says("Fault"), "the alarm is active")
+        assert server.snapshot()["widgets"]["machine_state"]["colour"] == "red"
+        until(lambda: says("Running"), "the alarm is latched, and no longer active")
+        assert listed(server)["air_latched"]["state"] == "latched"

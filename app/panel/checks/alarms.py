@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces, has_key
+from app.interfaces.validation import format_value
 from app.panel.alarm import DIAGNOSTIC_ARRAY, LIMIT_KEYS, Alarm, AlarmList, SourceKind
 from app.panel.checks.conditions import condition_faults
 from app.panel.checks.types import field_faults, type_fault
@@ -13,7 +14,7 @@ from app.panel.constants import NUMBERS
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
 from app.panel.faults.wording import list_names
 from app.panel.model import Panel
-from app.panel.values import number_text
+from app.panel.values import number_text, same_value
 
 RESERVED: Final = "panel_"  # begins the ids of the panel's own alarms
 NO_SOURCE: Final = (
@@ -23,7 +24,10 @@ NO_SOURCE: Final = (
 TOPIC: Final = ("topic", "type", "qos")
 # The keys that only some sources read.
 OWN_KEYS: Final[Mapping[SourceKind, tuple[str, ...]]] = {
-    "limits": (*TOPIC, "field", "unit", "max_age_s", "deadband", "critical_priority", *LIMIT_KEYS),
+    "limits": (
+        *(*TOPIC, "field", "unit", "scale", "max_age_s", "deadband", "critical_priority"),
+        *LIMIT_KEYS,
+    ),
     "condition": ("when",),
     "stale": (*TOPIC, "stale_s"),
     "node": ("node",),
@@ -45,6 +49,7 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
             yield Fault(f"{place}.id", f"{message}: choose another id")
         yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
         yield from _stop_faults(place, alarm, panel)
+        yield from _state_faults(place, alarm, panel)
         for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
             if condition is not None:
                 yield from condition_faults(f"{place}.{key}", condition, interfaces)
@@ -61,6 +66,19 @@ def _stop_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
             yield Fault(
                 f"{place}.inhibits[{i}]", f'"{widget}" stops the machine: an alarm may not lock it'
             )
+
+
+def _state_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
+    """The state that it shows is one of `[state]`."""
+    if alarm.state is None:
+        return
+    place, cause = f"{place}.state", f"state {alarm.state}"
+    known = [state.value for state in panel.state.states] if panel.state else []
+    if not known:
+        yield Fault(place, "is a state of the header: the panel has no [state]", cause=cause)
+    elif not any(same_value(value, alarm.state) for value in known):
+        message = f"no state {format_value(alarm.state)}; there is {list_names(map(str, known))}"
+        yield Fault(place, message, cause=cause)
 
 
 def _reference_faults(
@@ -117,6 +135,8 @@ def _limit_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> I
     kind = None if faults else interfaces.field_type(alarm.type, alarm.field)
     if kind is not None and kind not in NUMBERS:
         yield Fault(f"{place}.field", f'"{alarm.field}" is {kind}: limits are for one number')
+    if alarm.scale == 0:
+        yield Fault(f"{place}.scale", "is 0: every value would be the same")
     for (below, low), (above, high) in itertools.pairwise(alarm.limits.items()):
         if low >= high:
             message = f"{number_text(high)} is not above {below} ({number_text(low)})"

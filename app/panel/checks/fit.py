@@ -64,7 +64,8 @@ def page_height(panel: Panel, page: Page, screen: Screen) -> float:
 
 def frame_top(panel: Panel, screen: Screen) -> float:
     """The height of the header, the line of alarms and the robots' tabs."""
-    alarms = screen.header if panel.has_alarms else 0.0
+    is_badge = screen.height <= LOW_SCREEN and panel.alarm_rules.low_screens == "badge"
+    alarms = screen.header if panel.has_alarms and not is_badge else 0.0
     robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
     return screen.header + alarms + robots
 

@@ -74,7 +74,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
             case (str(key), *_):
                 rest.tables.pop(key, None)
                 rest.tables.setdefault("title", "?")
-                rest.undecidable.add("control")
+                rest.undecidable.update(("control", "state"))
                 if closest_name(key, ("pictures",)):
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):

@@ -51,11 +51,14 @@ def check_state_value(value: Any) -> Any:
     return value
 
 
+StateValue = Annotated[bool | int | str, BeforeValidator(check_state_value)]
+
+
 class LampState(Description):
     """How a lamp shows one value, which may be a constant's name. Normal states are grey, white or
     black; colours are for abnormal ones."""
 
-    value: Annotated[bool | int | str, BeforeValidator(check_state_value)]
+    value: StateValue
     text: Label
     shape: Literal["circle", "square", "triangle", "diamond", "cross", "bar", "play", "pause"]
     colour: Literal["grey", "white", "black", "blue", "yellow", "red"] = "grey"

@@ -57,9 +57,10 @@ def _statuses(cell: PalletizingCell) -> Iterator[Status]:
     opened, fault = cell.door.is_open, cell.state is State.FAULT
     said = "open" if opened else "closed, needs a reset" if fault else "locked"
     yield ERROR if opened else WARN if fault else OK, "Guard door 1", said, {}
-    holds = f"holds box {cell.boxes + 1}" if cell.holds_box else "open"
-    yield OK, "Gripper", holds, {"vacuum": f"{vacuum_kpa(cell):.0f} kPa"}
     enough = cell.air.is_enough
+    holds = f"holds box {cell.boxes + 1}" if cell.holds_box else "open"
+    vacuum = {"vacuum": f"{vacuum_kpa(cell):.0f} kPa"}
+    yield OK if enough else WARN, "Gripper", holds if enough else "vacuum is weak", vacuum
     pressure = {"pressure": f"{cell.air.bar:.1f} bar", "low": f"{LOW_BAR:.1f} bar"}
     yield OK if enough else WARN, "Air supply", "enough" if enough else "low", pressure
     full = cell.reason is Reason.PALLET_FULL

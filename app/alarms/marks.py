@@ -1,0 +1,74 @@
+"""Which values of the robots have an active alarm, from the rows that pages show."""
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from typing import Final
+
+from app.alarms.rows import AlarmRow
+from app.panel.alarm import Alarm
+from app.panel.model import Panel
+from app.robot.alarmed import AlarmedState, AlarmedValues
+
+Value = tuple[str, str]  # topic and field
+BEHIND_ID: Final = re.compile("[@:]")  # the robot, or the name of what it published
+
+
+def marked_values(alarm: Alarm) -> Iterator[Value]:
+    """The values that an alarm is about: that of its limits, or of its condition."""
+    if alarm.source == "limits" and alarm.topic is not None:
+        yield alarm.topic, alarm.field
+    if alarm.when is not None:
+        yield alarm.when.topic, alarm.when.field
+
+
+class AlarmMarks:
+    """The marks of all robots. Alarms that are about no value cost nothing."""
+
+    def __init__(self, panel: Panel) -> None:
+        self._alarms = {
+            alarm.id: alarm
+            for alarm in panel.alarms
+            if alarm.state is not None or any(marked_values(alarm))
+        }
+        self._state_topic = panel.state.topic if panel.state else None
+        self._active: dict[str, dict[str, AlarmRow]] = {}  # robot → id → row
+        self._changed: dict[str, set[str]] = {}  # robot → topics
+
+    def update(self, before: AlarmRow | None, after: AlarmRow | None) -> None:
+        """A row is shown in place of another; None for an alarm that is not listed."""
+        row = after or before
+        alarm = row and self._alarms.get(_alarm_id(row))
+        if row is None or alarm is None:
+            return
+        active = self._active.setdefault(row["robot"], {})
+        was_active = active.pop(row["id"], None) is not None
+        if after is not None and after["state"] == "active":
+            active[row["id"]] = after
+        elif not was_active:
+            return
+        changed = self._changed.setdefault(row["robot"], set())
+        changed.update(topic for topic, _ in marked_values(alarm))
+        if alarm.state is not None and self._state_topic is not None:
+            changed.add(self._state_topic)
+
+    def take_changes(self) -> Mapping[str, Collection[str]]:
+        """The topics of which the marks have changed since the last call, by robot."""
+        changed, self._changed = self._changed, {}
+        return changed
+
+    def of_robot(self, robot: str) -> AlarmedValues:
+        """The marks of a robot as they are now."""
+        priorities: dict[Value, int] = {}
+        state: AlarmedState | None = None
+        for row in sorted(self._active.get(robot, {}).values(), key=lambda row: row["order"]):
+            alarm = self._alarms[_alarm_id(row)]
+            for value in marked_values(alarm):
+                priorities[value] = min(row["priority"], priorities.get(value, row["priority"]))
+            if state is None and alarm.state is not None:
+                state = AlarmedState(alarm.state, -row["order"][-1])
+        return AlarmedValues(state, priorities)
+
+
+def _alarm_id(row: AlarmRow) -> str:
+    """The id of the alarm in the panel file."""
+    return BEHIND_ID.split(row["id"], 1)[0]

@@ -1,0 +1,23 @@
+"""What active alarms say about the values of a robot, as displays show it."""
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+
+class AlarmedState(NamedTuple):
+    """The machine's state while an alarm is active: its `value` in `[state]`, and since when (monotonic
+    seconds)."""
+
+    value: bool | int | str
+    since: float
+
+
+class AlarmedValues(NamedTuple):
+    """`state` is that of the most urgent alarm that has one. `priorities` has the highest priority of
+    the active alarms of a value, by its topic and field."""
+
+    state: AlarmedState | None = None
+    priorities: Mapping[tuple[str, str], int] = {}
+
+
+NO_ALARMED: Final = AlarmedValues()

@@ -1,0 +1,119 @@
+"""What the server sees of itself, for the panel's own alarms: its log, its disk and its clock."""
+
+import asyncio
+import logging
+import shutil
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final, Protocol
+
+from app.alarms.engine import AlarmEngine
+from app.alarms.entries import AlarmEntry
+from app.alarms.own import OwnAlarm, clock_entry, disk_entry, log_entry, own_definitions
+from app.audit.press_record import Log
+from app.panel.alarm import AlarmRules
+
+log = logging.getLogger("kiosk.alarms")
+
+CHECK_S: Final = 1.0
+DISK_EVERY: Final = 10  # checks
+CLOCKS_APART_S: Final = 0.05  # two clocks that are read further apart say nothing
+MEGABYTE: Final = 1e6
+
+
+class Usage(Protocol):
+    """The free bytes of a disk."""
+
+    @property
+    def free(self) -> int: ...
+
+
+class OwnAlarms:
+    """The panel's own alarms, from `start` to `stop`. Used on the event loop only."""
+
+    def __init__(
+        self,
+        rules: AlarmRules,
+        folder: Path,
+        operators_log: Log,
+        engine: AlarmEngine,
+        evaluate: Callable[[], None],
+    ) -> None:
+        self._rules = rules
+        self._folder = folder
+        self._log = operators_log
+        self._engine = engine
+        self._evaluate = evaluate
+        self._definitions = dict(own_definitions())
+        self._entries: dict[OwnAlarm, AlarmEntry] = {}
+        self._listening = ExitStack()
+        self._ahead_s = time.time() - time.monotonic()  # of the wall clock
+        self._disk_is_low = False
+        self._checks = 0
+        self._timer: asyncio.TimerHandle | None = None
+        self._measuring: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Adds the alarms, and looks at what they are about from now on."""
+        self._set("panel_disk", disk_entry(self._rules.disk_free_mb, self._rules.disk_free_mb, False))
+        self._set("panel_clock", clock_entry(0.0, 0.0))
+        self._check_log()
+        self._listening.enter_context(self._log.notifying(self._log_changed))
+        self._check()
+
+    def stop(self) -> None:
+        self._listening.close()
+        for work in (self._timer, self._measuring):
+            if work is not None:
+                work.cancel()
+
+    def _set(self, name: OwnAlarm, entry: AlarmEntry) -> None:
+        """One that returns still says what its cause was."""
+        known = self._entries.get(name)
+        self._entries[name] = entry if entry.level or known is None else known._replace(level=0)
+        self._engine.own_changed(self._definitions[name], self._entries[name])
+
+    def _log_changed(self) -> None:
+        self._check_log()
+        self._evaluate()
+
+    def _check_log(self) -> None:
+        self._set("panel_log", log_entry(self._log.fault, bool(self._log.lock)))
+
+    def _check(self) -> None:
+        self._timer = asyncio.get_running_loop().call_later(CHECK_S, self._check)
+        self._check_clock()
+        if self._checks % DISK_EVERY == 0 and self._measuring is None:
+            self._measuring = asyncio.create_task(self._check_disk())
+        self._checks += 1
+        self._evaluate()
+
+    def _check_clock(self) -> None:
+        before, wall, after = time.monotonic(), time.time(), time.monotonic()
+        if after - before > CLOCKS_APART_S:
+            return
+        ahead_s = wall - before
+        by_s, shown = ahead_s - self._ahead_s, before + self._ahead_s
+        self._ahead_s = ahead_s
+        self._set("panel_clock", clock_entry(by_s, shown))
+
+    async def _check_disk(self) -> None:
+        """Measures on a thread: a disk may not answer."""
+        try:
+            usage = await asyncio.to_thread(_usage, self._folder)
+        except OSError as error:
+            log.warning("the free space of %s is not known: %s", self._folder, error)
+        else:
+            entry = disk_entry(usage.free / MEGABYTE, self._rules.disk_free_mb, self._disk_is_low)
+            self._disk_is_low = entry.level > 0
+            self._set("panel_disk", entry)
+            self._evaluate()
+        finally:
+            self._measuring = None
+
+
+def _usage(folder: Path) -> Usage:
+    """Of the disk of a folder, which may not be there yet."""
+    return shutil.disk_usage(next(path for path in (folder, *folder.parents) if path.exists()))

@@ -1,0 +1,44 @@
+"""The panel's own alarms, from what the server sees of its log, its disk and its clock."""
+
+import pytest
+
+from app.alarms.own import clock_entry, disk_entry, log_entry, own_definitions
+from app.i18n import render, say
+
+
+def test_the_disk_is_low_below_the_limit_until_there_is_a_tenth_more() -> None:
+    assert disk_entry(499.0, 500.0, was_low=False).level == 1
+    assert disk_entry(501.0, 500.0, was_low=False).level == 0
+    assert disk_entry(501.0, 500.0, was_low=True).level == 1
+    assert disk_entry(551.0, 500.0, was_low=True).level == 0
+    assert (
+        render(disk_entry(99.4, 500.0, was_low=False).cause) == "99 MB are free. The limit is 500 MB."
+    )
+
+
+@pytest.mark.parametrize(("by_s", "level"), [(0.0, 0), (4.9, 0), (-4.9, 0), (5.1, 1), (-3600.0, 1)])
+def test_a_step_of_the_clock_is_raised_and_drift_is_not(by_s: float, level: int) -> None:
+    assert clock_entry(by_s, 1_700_000_000.0).level == level
+
+
+def test_a_step_of_the_clock_says_by_how_much_and_in_which_direction() -> None:
+    back = render(clock_entry(-3600.0, 1_700_000_000.0).cause)
+    ahead = render(clock_entry(90.0, 1_700_000_000.0).cause)
+    assert back.startswith("It was set back by 1 h, from ")
+    assert ahead.startswith("It was set ahead by 1 min, from ")
+
+
+def test_a_log_that_locks_says_so() -> None:
+    why = say("log_unwritable", why="disk full")
+    assert log_entry("", is_required=False).level == 0
+    required, free = log_entry(why, is_required=True), log_entry(why, is_required=False)
+    assert (required.level, free.level) == (1, 1)
+    assert required.consequence != free.consequence
+    assert "disk full" in render(required.cause)
+
+
+def test_the_panels_own_alarms_are_of_no_robot_and_never_of_high_priority() -> None:
+    definitions = dict(own_definitions())
+    assert set(definitions) == {"panel_log", "panel_disk", "panel_clock"}
+    assert not any(definition.is_of_robot for definition in definitions.values())
+    assert all(definition.rules.priority(1) > 1 for definition in definitions.values())
