@@ -181,7 +181,7 @@ class Alarms:
 
     def _receive(self, transitions: Sequence[Transition]) -> None:
         for transition in transitions:
-            after, alarm = transition.after, self.engine.alarms[transition.id]
+            alarm = self.engine.alarms[transition.id]
             if self.counts.count(transition):
                 self._shown.count_raise(transition.at.monotonic)
             row = history_row(alarm, transition)
