@@ -5,6 +5,7 @@ import ast
 import graphlib
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -70,19 +71,25 @@ SPEAK_ZENOH = {
     "app.transport.token_query",
     "app.transport.zenoh_answers",
     "app.transport.zenoh_config",
+    "app.transport.zenoh_opening",
     "app.transport.zenoh_publishers",
     "app.transport.zenoh_session",
     "app.simulator.zenoh_action",
     "app.simulator.zenoh_peer",
-    "app.simulator.zenoh_robot",
+    "app.simulator.zenoh_wire",
 }
-# The bridge's dialect and peer, and who else may know them.
-OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
-WIRE_THE_BRIDGE = {
-    "app.cli.bridge_config",
-    "app.runtime.robot_access",
-    "app.simulator.zenoh_peer",
-    "app.simulator.zenoh_robot",
+# The dialect and the peer of each kind of robot, and who else may know them.
+OF_A_KIND: dict[tuple[str, ...], set[str]] = {
+    ("app.dialect.bridge_", "app.transport.bridge_"): {
+        "app.cli.bridge_config",
+        "app.runtime.robot_access",
+        "app.simulator.zenoh_peer",
+        "app.simulator.zenoh_wire",
+    },
+    ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
+        "app.runtime.robot_access",
+        "app.simulator.zenoh_wire",
+    },
 }
 KNOWN_TO_THE_SIMULATOR = (
     "app.simulator",
@@ -173,11 +180,20 @@ def test_only_the_link_and_the_simulator_speak_zenoh() -> None:
     assert {module for module in MODULES if of_zenoh(module)} == SPEAK_ZENOH
 
 
-def test_only_the_wiring_and_the_simulator_know_that_there_is_a_bridge() -> None:
-    """A robot without one is reached by another dialect and another peer."""
-    others = {module for module in MODULES if not module.startswith(OF_THE_BRIDGE)}
-    know = {m for m in others if any(name.startswith(OF_THE_BRIDGE) for name in of_project(m))}
-    assert know == WIRE_THE_BRIDGE
+@pytest.mark.parametrize("modules", OF_A_KIND)
+def test_only_the_wiring_and_the_simulator_know_that_there_is_a_kind(modules: tuple[str, ...]) -> None:
+    """A robot of another kind is reached by another dialect and another peer."""
+    others = {module for module in MODULES if not module.startswith(modules)}
+    know = {m for m in others if any(name.startswith(modules) for name in of_project(m))}
+    assert know == OF_A_KIND[modules]
+
+
+def test_nothing_asks_which_dialect_it_is() -> None:
+    """Beside the tables, only a dialect, a transport and the simulator know what depends on it."""
+    asks = re.compile(r"dialect\s*(==|!=|in|is)\s*[\"'(]")
+    rooms = ("dialect", "transport", "simulator")
+    asking = {m for m, path in MODULES.items() if asks.search(path.read_text())}
+    assert {module for module in asking if room_of(module) not in rooms} == set()
 
 
 def test_the_simulator_knows_nothing_of_the_server() -> None:

@@ -7,6 +7,7 @@ from math import inf
 from typing import Any, Final
 
 from app.cli.parser import Parser
+from app.dialect.dialect import DOMAIN_MOST
 
 HIGHEST_PORT: Final = 65_535
 PANEL_HELP: Final = "the panel file; without one that of KIOSK_PANEL, else the shipped one"
@@ -40,6 +41,13 @@ def environment(options: Any) -> dict[str, str]:
         if value is not None:
             variables[variable] = ",".join(value) if isinstance(value, list) else str(value)
     return variables
+
+
+def ros_domain(text: str) -> int:
+    """A ROS_DOMAIN_ID: 0 to 232."""
+    if not 0 <= (number := _digits(text)) <= DOMAIN_MOST:
+        raise ArgumentTypeError(f'"{text}" is not a ROS domain: 0 to {DOMAIN_MOST}')
+    return number
 
 
 def port(text: str) -> int:

@@ -9,13 +9,15 @@ import signal
 import sys
 import threading
 from argparse import ArgumentTypeError
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
+from app.cli.arguments import ros_domain
 from app.cli.parser import Parser
+from app.dialect.dialect import DialectName
 from app.errors import KioskError, LinkError
 from app.interfaces import load_interfaces
 from app.interfaces.names import NAMESPACE
@@ -24,6 +26,7 @@ from app.panel.model import Panel
 from app.settings import Settings
 from app.simulator.in_process import robots_of
 from app.simulator.zenoh_peer import ENDPOINT, serve
+from app.simulator.zenoh_wire import Way, way_of
 
 if TYPE_CHECKING:
     from app.simulator.simulated import SimulatedRobot
@@ -52,11 +55,22 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
             robots = _simulated(panel, namespace)
             if options.bag is not None:
                 robots = {namespace: _replayed(options, panel, ends, stack)}
-            serve(options.endpoint, robots, interfaces, ends, listening)
+            ways = _ways(options, panel, robots)
+            serve(options.endpoint, robots, interfaces, ends, listening, ways)
     except KioskError as error:
         report(f"demo robot: {error}")
         return 1 if isinstance(error, LinkError) else 2
     return 0
+
+
+def _ways(options: Any, panel: Panel, namespaces: Iterable[str]) -> dict[str, Way]:
+    """How each robot is reached: by the command line, else as the panel file says."""
+    entries = {robot.namespace: robot for robot in panel.robots}
+    first = next(iter(panel.robots), panel)
+    return {
+        name: way_of(panel, entries.get(name, first), options.dialect, options.domain)
+        for name in namespaces
+    }
 
 
 def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
@@ -108,7 +122,8 @@ def _rate(text: str) -> float:
 def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
-        usage=f"{prog} [-h] [--bag FILE [--loop] [--rate RATE]] [PANEL] [ENDPOINT [NAMESPACE]]",
+        usage=f"{prog} [-h] [--dialect NAME] [--domain N] [--bag FILE [--loop] [--rate RATE]]"
+        " [PANEL] [ENDPOINT [NAMESPACE]]",
         description="The demo robot as a Zenoh peer of its own, for panels to connect to: it has what a"
         " panel shows, publishes, calls and sets, or publishes what was recorded.",
     )
@@ -135,6 +150,15 @@ def make_parser(prog: str) -> Parser:
         type=Path,
         metavar="FILE",
         help="replay this recording: an .mcap or .db3 file, or a folder of rosbag2",
+    )
+    parser.add_argument(
+        "--dialect",
+        choices=get_args(DialectName),
+        help="bridge: behind a bridge of its own; rmw_zenoh: as nodes on rmw_zenoh; default: as the"
+        " panel file says",
+    )
+    parser.add_argument(
+        "--domain", type=ros_domain, metavar="N", help="the nodes' ROS_DOMAIN_ID on rmw_zenoh"
     )
     parser.add_argument("--loop", action="store_true", help="replay it again and again")
     parser.add_argument(

@@ -16,7 +16,7 @@ FRAMES: Final[Mapping[str, str]] = {
     "log_not_on_disk": "said",
 }
 # They follow a reason and are none themselves.
-ADVICE: Final = frozenset(sentences.timeout_hint for sentences in EVERY_SENTENCES)
+ADVICE: Final = frozenset(s.timeout_hint for s in EVERY_SENTENCES if s.timeout_hint)
 
 
 def reason_code(reason: TextLike) -> str | None:

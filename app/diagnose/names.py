@@ -43,6 +43,10 @@ class PanelRobot:
         return (self.entry or self.panel).dialect
 
     @property
+    def domain(self) -> int:
+        return (self.entry or self.panel).domain
+
+    @property
     def namespace(self) -> str:
         return self.entry.namespace if self.entry else self.panel.namespace
 

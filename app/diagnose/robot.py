@@ -14,7 +14,7 @@ from app.diagnose.names import PanelNames, PanelRobot
 from app.diagnose.permissions import check_permissions
 from app.diagnose.received import ReceivedSamples, copies, receive
 from app.diagnose.topics import TopicChecks
-from app.dialect.dialect import DEFAULT_DIALECT, Dialect
+from app.dialect.dialect import DEFAULT_DIALECT, Dialect, any_hash
 from app.errors import LinkError
 from app.interfaces import load_interfaces
 from app.runtime.robot_access import ROBOT_ACCESS
@@ -29,10 +29,11 @@ CONNECTED_WITHIN_S: Final = 4.0
 
 @dataclass(frozen=True, slots=True)
 class RobotLink:
-    """A session with a robot, and how robots of its kind are reached."""
+    """A session with a robot, how robots of its kind are reached, and the names that it has."""
 
     session: ZenohSession
     access: RobotAccess
+    dialect: Dialect
 
     async def graph(self, earlier: GraphSnapshot | None = None) -> GraphSnapshot:
         """The graph now, see `Observe`. LinkError without a link."""
@@ -44,10 +45,11 @@ async def check_connection(
     robot_id: str,
     zenoh: Path,
     connect: tuple[str, ...],
-    dialect: Dialect = ROBOT_ACCESS[DEFAULT_DIALECT].dialect,
+    dialect: Dialect | None = None,
 ) -> list[str]:
     """Checks the Zenoh configuration and the link; returns the endpoints at which Zenoh answers."""
     endpoints = configured(report, zenoh, connect, robot_id)
+    dialect = dialect or ROBOT_ACCESS[DEFAULT_DIALECT].dialect(0, any_hash)
     return await check_link(report, zenoh, endpoints, robot_id, dialect)
 
 
@@ -57,15 +59,16 @@ async def check_robot(
     """Adds all findings of a robot to the report. Returns its graph, None without a link."""
     connect = robot.entry.connect if robot.entry else ()
     access = ROBOT_ACCESS[robot.dialect]
-    endpoints = await check_connection(report, robot.id, zenoh, connect, access.dialect)
+    dialect = access.dialect(robot.domain, any_hash)
+    endpoints = await check_connection(report, robot.id, zenoh, connect, dialect)
     if not endpoints:
         return None
     session = await asyncio.to_thread(
-        ZenohSession, config_from(zenoh, endpoints), lambda _: None, access.dialect
+        ZenohSession, config_from(zenoh, endpoints), lambda _: None, dialect
     )
     try:
         await session.connected(CONNECTED_WITHIN_S)
-        return await _inspect(report, robot, RobotLink(session, access), endpoints, listen_s)
+        return await _inspect(report, robot, RobotLink(session, access, dialect), endpoints, listen_s)
     except LinkError as error:
         report.find("zenoh_config", str(zenoh), robot=robot.id, detail=str(error))
         return None
@@ -122,7 +125,7 @@ async def _receive(
 ) -> ReceivedSamples:
     """Listens to the panel's topics until interlocks that are not latched, or have a max_age_s, have
     been received often enough."""
-    panel, behind, dialect = robot.panel, PanelNames.for_robot(robot, graph), link.access.dialect
+    panel, behind, dialect = robot.panel, PanelNames.for_robot(robot, graph), link.dialect
     topics = panel.subscriptions()
     expressions = {
         key: dialect.topic(key, type_name)

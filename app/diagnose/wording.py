@@ -87,6 +87,15 @@ ERRORS: Final[Rows] = {
         "The bridge {about} is known, but does not respond.",
         "Restart the bridge. If it happens again, look at its log.",
     ),
+    "link_no_ros_node": (
+        "Zenoh answers at {about}, but no ROS 2 node on rmw_zenoh is there.",
+        "Start the robot's nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp at this router, and set "
+        "`domain` in the panel file to their ROS_DOMAIN_ID.",
+    ),
+    "link_router_silent": (
+        "The nodes of the Zenoh session {about} are known, but do not respond.",
+        "Restart the node. If it happens again, look at its log.",
+    ),
     "bridge_namespace": (
         'The bridge has the namespace "{theirs}", the panel "{ours}".',
         'Set namespace = "{theirs}" in the panel file, or correct `namespace` in the bridge\'s file.',

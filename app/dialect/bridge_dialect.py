@@ -109,6 +109,7 @@ class BridgeDialect:
     """The `Dialect` of a robot behind zenoh-bridge-ros2dds."""
 
     tokens: Final = TOKENS
+    as_client: Final = False
 
     def topic(self, key: str, type_name: str) -> str:
         """The key: the bridge publishes a topic on its name."""
@@ -121,8 +122,16 @@ class BridgeDialect:
         """The bridge needs none."""
         return None
 
+    def is_whole(self, payload: bytes) -> bool:
+        """The bridge reads every payload as one."""
+        return True
+
+    def key_hash(self, type_name: str) -> str:
+        return ""
+
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
-        return [_own_token(zid, endpoint) for endpoint in endpoints]
+        """A bridge makes the clients of services by itself."""
+        return [token for own in endpoints if (token := _own_token(zid, own))]
 
     def endpoint(self, token: str) -> Endpoint | None:
         return parsed(token)
@@ -138,6 +147,10 @@ class BridgeDialect:
 def _own_token(zid: str, endpoint: OwnEndpoint) -> str:
     if endpoint.role == "AC":
         return action_client_token(zid, endpoint.key, endpoint.type)
+    if endpoint.role == "SC":
+        return ""
+    if endpoint.role == "SS" or endpoint.role == "AS":
+        return server_token(zid, endpoint.role, endpoint.key, endpoint.type)
     return token(zid, endpoint.role, endpoint.key, endpoint.type, endpoint.qos, endpoint.type_hash)
 
 

@@ -1,12 +1,22 @@
 """The protocol of a dialect: how the names of a robot's ROS graph are written in Zenoh."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final, Literal, Protocol
 
 from app.dialect.endpoint import Endpoint, OwnEndpoint
 
-DialectName = Literal["bridge"]
+DialectName = Literal["bridge", "rmw_zenoh"]
 DEFAULT_DIALECT: Final[DialectName] = "bridge"  # where the panel file does not say
+# Those whose peers join a ROS domain by their own configuration.
+WITH_OWN_DOMAIN: Final[frozenset[DialectName]] = frozenset({"bridge"})
+DOMAIN_MOST: Final = 232  # the last ROS_DOMAIN_ID
+ANY_HASH: Final = "*"
+TypeHash = Callable[[str], str]  # the name of a type → its hash in key expressions
+
+
+def any_hash(type_name: str) -> str:
+    """For those who only read: whatever definition a topic has."""
+    return ANY_HASH
 
 
 class Dialect(Protocol):
@@ -21,6 +31,10 @@ class Dialect(Protocol):
     def tokens(self) -> str:
         """The key expression of every liveliness token that shows the ROS graph."""
 
+    @property
+    def as_client(self) -> bool:
+        """Whether a session has to be a client of a router: routers pass on nothing between peers."""
+
     def topic(self, key: str, type_name: str) -> str:
         """The key expression on which a topic is published and subscribed to."""
 
@@ -31,6 +45,13 @@ class Dialect(Protocol):
         """The attachment of a message or a query; None for none. `zid` is the sending session's,
         `number` counts what this session sends on `expression`, from 1, and `at_ns` is the time in
         nanoseconds since the epoch."""
+
+    def is_whole(self, payload: bytes) -> bool:
+        """Whether a payload may be sent: one that is cut off could end a node of the robot."""
+
+    def key_hash(self, type_name: str) -> str:
+        """The type hash in the key expressions of a type; "" where they have none. The robot's must
+        equal it, or nothing arrives."""
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
         """The tokens by which a session has these endpoints in the ROS graph."""

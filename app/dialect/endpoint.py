@@ -8,16 +8,19 @@ from app.interfaces.names import Qos
 TopicRole = Literal["MP", "MS"]  # a publisher, a subscriber
 ServerRole = Literal["SS", "AS"]  # a service's server, an action's
 Role = TopicRole | ServerRole
-OwnRole = TopicRole | Literal["AC"]  # of the panel: an action's client, too
+# Of the panel and of the simulated robot: clients of services and actions, and servers, too.
+OwnRole = TopicRole | ServerRole | Literal["SC", "AC"]
 Direction = Literal["pub", "sub"]  # of a bridge's route: from ROS to Zenoh, from Zenoh to ROS
 
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
+DEMO_NODE: Final = "/operator_panel_demo_robot"  # a node of the demo robot without a bridge
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
     """A publisher, subscriber or server, of a token or of a node. The role None means the peer that the
-    robot is reached by. `reliable` is None if it is not known, `node` and `dds` are "".
+    robot is reached by: a bridge, or a Zenoh session of nodes. `reliable` is None if it is not known,
+    `node` and `dds` are "".
 
     `hashes` are (message type, type hash) of the messages that it exchanges, as far as they are known:
     one of a topic, those of its requests and responses of a server.
@@ -36,7 +39,7 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class OwnEndpoint:
-    """A publisher, subscriber or action client of the panel in the ROS graph. An action client has
+    """A publisher, a subscriber, a client or a server in the ROS graph. Clients and servers have
     neither QoS nor hash."""
 
     role: OwnRole

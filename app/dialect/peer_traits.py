@@ -55,6 +55,9 @@ class PeerTraits:
     token_delay_s: float
     token_delay_single_s: float  # where no other publisher can have sent the message
     token_delay_latched_s: float  # of a TRANSIENT_LOCAL publisher
+    # Whether the stamp of each message names the peer that it came by. Else a router may have stamped
+    # it: then it may be of any of them.
+    stamped_by_peer: bool
     # For commands on a terminal, in English.
     title: str
     start_hint: str  # what to do if there is none
@@ -73,6 +76,7 @@ BRIDGE_TRAITS: Final = PeerTraits(
     token_delay_s=0.5,
     token_delay_single_s=4.0,
     token_delay_latched_s=5.0,
+    stamped_by_peer=True,
     title="bridge to ROS 2",
     start_hint="start zenoh-bridge-ros2dds on the robot, or name its place with --connect"
     " tcp/HOST:7447",
@@ -97,5 +101,41 @@ BRIDGE_TRAITS: Final = PeerTraits(
         renewal="hold_by_reconnect",
     ),
 )
-PEER_TRAITS: Final[Mapping[DialectName, PeerTraits]] = {"bridge": BRIDGE_TRAITS}
+# A node declares its publisher's token before it can publish, and Zenoh keeps the order of a session.
+RMW_ZENOH_TRAITS: Final = PeerTraits(
+    server_settle_s=0.1,
+    loss_delay_s=0.3,
+    events_settle_s=0.5,
+    max_unanswered=8,
+    token_delay_s=0.1,
+    token_delay_single_s=0.1,
+    token_delay_latched_s=0.5,
+    stamped_by_peer=False,
+    title="ROS 2 node on rmw_zenoh",
+    start_hint="start the Zenoh router and the robot's nodes (RMW_IMPLEMENTATION=rmw_zenoh_cpp), or"
+    " name their place with --connect tcp/HOST:7447; the panel's `domain` must be their ROS_DOMAIN_ID",
+    elsewhere_hint="",
+    sentences=PeerSentences(
+        lamp="router",
+        unreachable="link_router_unreachable",
+        unreachable_at="link_router_unreachable_at",
+        absent="link_no_ros_node",
+        absent_named="link_no_ros_node_named",
+        silent="link_router_silent",
+        unrouted="topic_not_forwarded",
+        uncallable="service_wrong_rmw",
+        nodes_unknown="link_node_unknown_router",
+        nodes_absent="link_node_absent_domain",
+        node_lost="link_node_endpoint_gone",
+        no_reply="call_no_reply_from_node",
+        timeout_hint="",
+        press_unconfirmed="press_router_no_response",
+        stop_unconfirmed="hold_stop_unconfirmed_router",
+        renewal="hold_by_reconnect",
+    ),
+)
+PEER_TRAITS: Final[Mapping[DialectName, PeerTraits]] = {
+    "bridge": BRIDGE_TRAITS,
+    "rmw_zenoh": RMW_ZENOH_TRAITS,
+}
 EVERY_SENTENCES: Final = tuple(traits.sentences for traits in PEER_TRAITS.values())

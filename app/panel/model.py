@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field
 
-from app.dialect.dialect import DEFAULT_DIALECT, DialectName
+from app.dialect.dialect import DEFAULT_DIALECT, DOMAIN_MOST, DialectName
 from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
@@ -49,6 +49,8 @@ from app.panel.widgets.service_action import Action
 from app.panel.widgets.templated import is_stop
 from app.pictures import picture_files
 
+Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST)]
+
 
 class RobotEntry(Description):
     """One of several robots of a panel; `connect` are its Zenoh endpoints, by default those of the
@@ -58,11 +60,8 @@ class RobotEntry(Description):
     name: Label
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
-
-    @property
-    def dialect(self) -> DialectName:
-        """By which dialect the robot is reached."""
-        return DEFAULT_DIALECT
+    dialect: DialectName = DEFAULT_DIALECT
+    domain: Domain = 0
 
 
 Kind = TypeVar("Kind", bound=BaseWidget)
@@ -79,6 +78,8 @@ class Panel(Description):
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
+    dialect: DialectName = DEFAULT_DIALECT
+    domain: Domain = 0
     stop_hint: SaidLabel = catalogue_default("stop_hint")
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
@@ -109,11 +110,6 @@ class Panel(Description):
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
-
-    @property
-    def dialect(self) -> DialectName:
-        """By which dialect the robot is reached if it is the only one."""
-        return DEFAULT_DIALECT
 
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:

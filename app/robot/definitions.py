@@ -32,15 +32,16 @@ def difference(graph: LiveGraph, role: Role, key: str, interfaces: Interfaces) -
     """The first difference of an endpoint of the robot; None if none is known. `role` is the
     robot's."""
     differences = (
-        _difference(endpoint, interfaces) for endpoint in graph.described_endpoints(role, key)
+        _difference(graph, endpoint, interfaces) for endpoint in graph.described_endpoints(role, key)
     )
     return next((difference for difference in differences if difference is not None), None)
 
 
-def _difference(endpoint: Endpoint, interfaces: Interfaces) -> Difference | None:
+def _difference(graph: LiveGraph, endpoint: Endpoint, interfaces: Interfaces) -> Difference | None:
     for name, theirs in endpoint.hashes:
-        ours = own_hash(name, interfaces)
-        if ours and differs(theirs, ours):
+        in_key = graph.dialect.key_hash(name)
+        ours = in_key or own_hash(name, interfaces)
+        if theirs != ours if in_key else ours and differs(theirs, ours):
             return Difference(name, theirs, ours, endpoint.node)
     return None
 

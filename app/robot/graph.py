@@ -6,13 +6,14 @@ Endpoints are indexed by key, so that a query costs the same for any size of gra
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, TypeVar, TypeVarTuple
+from typing import Any
 
 from app.dialect.dialect import Dialect
 from app.dialect.endpoint import (
+    DEMO_NODE,
     DEMO_VERSION,
     Direction,
     Endpoint,
@@ -22,6 +23,7 @@ from app.dialect.endpoint import (
     within,
 )
 from app.interfaces.names import Qos
+from app.robot.graph_cache import cached_until_change as cached_until_change
 from app.robot.qos_mismatch import reader_mismatch, writer_mismatch
 
 # The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of a bridge
@@ -46,28 +48,6 @@ class Route:
     has_reader: bool = True
 
 
-Arguments = TypeVarTuple("Arguments")
-Result = TypeVar("Result")
-
-
-def cached_until_change(
-    query: Callable[["LiveGraph", *Arguments], Result],
-) -> Callable[["LiveGraph", *Arguments], Result]:
-    """Caches the results of a query until the graph changes: queries are far more frequent."""
-
-    def cached(graph: "LiveGraph", *arguments: *Arguments) -> Result:
-        key = (query, arguments)
-        result: Result
-        try:
-            result = graph.cache[key]
-        except KeyError:
-            result = graph.cache[key] = query(graph, *arguments)
-        return result
-
-    cached.__doc__ = query.__doc__
-    return cached
-
-
 class LiveGraph:
     """The current ROS graph behind all peers. Changed on the event loop only, by `apply_token` and
     the `update_…` methods."""
@@ -81,7 +61,7 @@ class LiveGraph:
     ) -> None:
         """`namespace` distinguishes this robot's peers from others; None: all peers belong to it.
         Only tokens for `keys` are kept; None: all."""
-        self._dialect = dialect
+        self.dialect = dialect
         self.own_zid = own_zid  # of the panel's session: its tokens are ignored
         self._relevant_names = None if keys is None else frozenset(map(dialect.in_token, keys))
         self.cache: dict[Any, Any] = {}  # see `cached_until_change`
@@ -99,18 +79,18 @@ class LiveGraph:
         """Whether a token is a peer's own, or for one of the keys that are kept."""
         if self._relevant_names is None:
             return True
-        name = self._dialect.name_in(token_key)
+        name = self.dialect.name_in(token_key)
         return not name or name in self._relevant_names
 
     def has_token(self, token_key: str) -> bool:
         """Whether a token has been applied and has not ended."""
-        endpoint = self._dialect.endpoint(token_key)
+        endpoint = self.dialect.endpoint(token_key)
         return endpoint is not None and token_key in self._tokens.get(endpoint.key, {})
 
     def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
         """Applies a token's appearance (`now`, monotonic seconds) or end; returns the zid of a peer
         that appeared or was lost."""
-        endpoint = self._dialect.endpoint(token_key) if self.is_relevant(token_key) else None
+        endpoint = self.dialect.endpoint(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
         self.cache.clear()
@@ -205,12 +185,23 @@ class LiveGraph:
     def is_simulated(self) -> bool:
         """Whether a peer is that of the simulated robot."""
         versions = self._versions or {}
-        return any(versions.get(zid) == DEMO_VERSION for zid in self.peers)
+        return DEMO_NODE in self.nodes or any(versions.get(zid) == DEMO_VERSION for zid in self.peers)
+
+    @property
+    @cached_until_change
+    def nodes(self) -> frozenset[str]:
+        """The names of the nodes that have tokens of their own, such as "/arm/driver"."""
+        every = (map(self.dialect.endpoint, tokens) for tokens in self._peers.values())
+        return frozenset(e.node for e in chain.from_iterable(every) if e is not None and e.node)
 
     @cached_until_change
-    def _endpoints(self, role: Role, key: str) -> list[Endpoint]:
-        tokens = self._tokens.get(key, {}).values()
-        return [e for e in tokens if e.role == role and e.zid in self._peers]
+    def tokens_of(self, role: Role, key: str) -> Mapping[str, Endpoint]:
+        """Token → endpoint of each one that is there now."""
+        tokens = self._tokens.get(key, {}).items()
+        return {token: e for token, e in tokens if e.role == role and e.zid in self._peers}
+
+    def _endpoints(self, role: Role, key: str) -> Collection[Endpoint]:
+        return self.tokens_of(role, key).values()
 
     def peers_with(self, role: Role, key: str) -> frozenset[str]:
         """The zids of the peers behind which a node publishes, subscribes or serves."""

@@ -22,19 +22,23 @@ def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
 
 
 class EndpointPresence:
-    """The peers behind which each required endpoint was last seen."""
+    """The peers behind which each required endpoint was last seen, and the nodes where tokens name
+    them."""
 
     def __init__(self, needed: Iterable[RequiredEndpoint], key: Callable[[str], str]) -> None:
         """`key` returns the present key of a ROS name."""
         self.required = tuple(dict.fromkeys(needed))
         self._key = key
         self.last_peers: dict[RequiredEndpoint, frozenset[str]] = {}
+        self.last_nodes: dict[RequiredEndpoint, frozenset[str]] = {}
 
     def update(self, graph: LiveGraph) -> None:
         """Updates the presence; call it after every change of the graph."""
         for end in self.required:
             if peers := graph.peers_with(*self.keyed(end)):
                 self.last_peers[end] = peers
+            if nodes := {e.node for e in graph.tokens_of(*self.keyed(end)).values()} - {""}:
+                self.last_nodes[end] = frozenset(nodes)
         graph.cache.clear()  # results depend on `last_peers` too
 
     def keyed(self, end: RequiredEndpoint) -> RequiredEndpoint:
@@ -44,6 +48,7 @@ class EndpointPresence:
     def clear(self) -> None:
         """Forgets all endpoints; call it when the link is lost."""
         self.last_peers.clear()
+        self.last_nodes.clear()
 
     def any_present(self, graph: LiveGraph) -> bool:
         """Whether any required endpoint exists."""
@@ -52,6 +57,11 @@ class EndpointPresence:
     def missing(self, graph: LiveGraph) -> list[str]:
         """The ROS names of endpoints that have disappeared while their peer is connected."""
         return _missing(graph, self)
+
+    def ended_nodes(self, graph: LiveGraph) -> list[str]:
+        """The names of nodes that had a required endpoint, which nothing else has now, and that are
+        not there any more."""
+        return _ended_nodes(graph, self)
 
 
 @cached_until_change
@@ -66,3 +76,13 @@ def _missing(graph: LiveGraph, presence: EndpointPresence) -> list[str]:
         for end, peers in presence.last_peers.items()
         if peers & graph.peers and not graph.has_endpoint(*presence.keyed(end))
     ]
+
+
+@cached_until_change
+def _ended_nodes(graph: LiveGraph, presence: EndpointPresence) -> list[str]:
+    absent = (
+        nodes
+        for end, nodes in presence.last_nodes.items()
+        if not graph.has_endpoint(*presence.keyed(end))
+    )
+    return sorted(frozenset().union(*absent) - graph.nodes)

@@ -106,6 +106,7 @@ class Ingest:
             changes.samples.items(), key=lambda arrived: arrived[0] not in self._interlocks
         )
         for key, sample in ordered:
+            sample = self._with_peer(sample)
             updates.topics.add(key)
             if sample.overrun and key in self._interlocks:
                 self._robot.invalidate(key)
@@ -132,6 +133,13 @@ class Ingest:
         return Updates(
             urgent=key in self._interlocks, values={key}, topics={key}, readings=[(key, reading)]
         )
+
+    def _with_peer(self, sample: Sample) -> Sample:
+        """A sample whose source is a peer, or not known: a router may have stamped it."""
+        robot = self._robot
+        if robot.traits.stamped_by_peer or sample.source in robot.graph.every_peer:
+            return sample
+        return sample._replace(source=None)
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Ingests a sample; returns whether it changed a permission."""

@@ -5,5 +5,6 @@ from typing import Final
 from app.dialect.dialect import DialectName
 from app.transport.bridge_peer import BRIDGE
 from app.transport.peer import RobotAccess
+from app.transport.rmw_zenoh_peer import RMW_ZENOH
 
-ROBOT_ACCESS: Final[dict[DialectName, RobotAccess]] = {"bridge": BRIDGE}
+ROBOT_ACCESS: Final[dict[DialectName, RobotAccess]] = {"bridge": BRIDGE, "rmw_zenoh": RMW_ZENOH}

@@ -88,6 +88,9 @@ class Turn:
             self._log.warning("Zenoh link lost")
             self._link_lost.emit()
             return
+        if changes.reopen:  # what it waited for is there
+            self._link_lost.emit()
+            return
         if came_up:
             self._robot.link_up = True
             self._again = True  # the first step shows it

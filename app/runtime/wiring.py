@@ -13,6 +13,7 @@ from app.commands.acts import ActContext, ActRunner
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.press_guard import PressGuard
+from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
@@ -152,11 +153,13 @@ def _context(
     """The state of the robot and the link to it."""
     panel, signals = server.panel, RobotSignals()
     interfaces = load_interfaces(panel.distro, panel.interfaces)
-    link = ZenohSession(config, signals.arrived.emit, access.dialect)
+    hashes = distribution_hashes(panel.distro, interfaces)
+    dialect = access.dialect((entry or panel).domain, hashes)
+    link = ZenohSession(config, signals.arrived.emit, dialect)
     robot = RobotState(
         panel,
         interfaces,
-        access.dialect,
+        dialect,
         access.traits,
         link.zid,
         entry,

@@ -62,6 +62,7 @@ class Draft:
 
     title: str
     namespace: str = ""
+    reached: Mapping[str, Any] = field(default_factory=dict)  # `dialect` and `domain`, if not the usual
     robots: Sequence[Mapping[str, Any]] = ()
     distro: str = "jazzy"
     interfaces: Sequence[str] = ()

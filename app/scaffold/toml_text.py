@@ -52,6 +52,8 @@ def _head(draft: Draft) -> Iterator[str]:
     yield f"distro = {_value(draft.distro)}  # of the robot's ROS 2"
     if draft.interfaces:
         yield f"interfaces = {_value(list(draft.interfaces))}  # packages with the robot's own types"
+    for key, value in draft.reached.items() if not draft.robots else ():
+        yield f"{key} = {_value(value)}"
     if draft.namespace and not draft.robots:
         yield f"namespace = {_value(draft.namespace)}  # it stands before each name below"
     for robot in draft.robots:

@@ -20,11 +20,14 @@ def in_process(panel: Panel, entry: RobotEntry | None = None) -> Iterator[str]:
     from app.interfaces import load_interfaces
     from app.simulator.panel_robot import PanelRobot
     from app.simulator.zenoh_peer import ANY_PORT, Simulator
+    from app.simulator.zenoh_wire import way_of
 
     number = panel.robots.index(entry) if entry else 0
     namespace = entry.namespace if entry else panel.namespace
     interfaces = load_interfaces(panel.distro, panel.interfaces)
-    with Simulator(ANY_PORT, {namespace: PanelRobot(panel, number)}, interfaces) as robot:
+    reached = entry or panel
+    ways = {namespace: way_of(panel, reached)}
+    with Simulator(ANY_PORT, {namespace: PanelRobot(panel, number)}, interfaces, ways=ways) as robot:
         yield robot.endpoint
 
 

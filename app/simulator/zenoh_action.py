@@ -1,18 +1,13 @@
-"""A simulated action on Zenoh, and how services and latched topics are behind a bridge."""
+"""A simulated action on Zenoh."""
 
 import threading
-from collections.abc import Callable
-from typing import Any
 
 import zenoh
-from zenoh.ext import CacheConfig, declare_advanced_publisher
-from zenoh.handlers import Callback
 
 from app.errors import DecodeError
 from app.interfaces import Interfaces, names
 from app.simulator.goals import ActionServer
-
-Answer = Callable[[bytes], bytes | None]
+from app.simulator.zenoh_wire import Wire, payload_of
 
 
 class PlayedAction:
@@ -20,29 +15,28 @@ class PlayedAction:
 
     def __init__(
         self,
-        session: zenoh.Session,
+        wire: Wire,
         key: str,
         server: ActionServer,
         interfaces: Interfaces,
         lock: threading.Lock,
     ) -> None:
-        self._session = session
+        self._wire = wire
         self._key = key
         self._server = server
         self._interfaces = interfaces
         self._lock = lock
         self._types = interfaces.action_types(server.type)
-        self._status = latched(session, names.status(key))
+        types = self._types
+        self._publish_status = wire.publisher(names.status(key), types.status, latched=True)
+        self._publish_feedback = wire.publisher(names.feedback(key), types.feedback_message)
         self._states: list[tuple[bytes, int]] = []
         self._results: list[tuple[bytes, zenoh.Query]] = []
+        self._result_key = names.of_action(key, "get_result")
         self._declared = [
-            served(session, names.of_action(key, "send_goal"), self._begin),
-            served(session, names.of_action(key, "cancel_goal"), self._cancel),
-            session.declare_queryable(
-                names.of_action(key, "get_result"),
-                Callback(self._on_result, indirect=False),
-                complete=True,
-            ),
+            wire.served(names.of_action(key, "send_goal"), types.send_goal, self._begin),
+            wire.served(names.of_action(key, "cancel_goal"), types.cancel_goal, self._cancel),
+            wire.server(self._result_key, types.get_result, self._on_result),
         ]
 
     def step(self) -> None:
@@ -54,18 +48,16 @@ class PlayedAction:
             self._results = [result for result in self._results if id(result[1]) not in answered]
         for goal_id, fields in news:
             message = {"goal_id": {"uuid": goal_id}, "feedback": fields}
-            payload = self._interfaces.encode(self._types.feedback_message, message)
-            self._session.put(names.feedback(self._key), payload)
+            self._publish_feedback(self._interfaces.encode(self._types.feedback_message, message))
         if states != self._states:
             self._states = states
             self._publish_states()
         for query, (status, result) in ended:
-            response = {"status": status, "result": result}
+            response = self._interfaces.encode(
+                self._types.get_result_response, {"status": status, "result": result}
+            )
             with query:
-                query.reply(
-                    names.of_action(self._key, "get_result"),
-                    self._interfaces.encode(self._types.get_result_response, response),
-                )
+                self._wire.reply(query, self._result_key, self._types.get_result, response)
 
     def _begin(self, payload: bytes) -> bytes | None:
         try:
@@ -103,26 +95,4 @@ class PlayedAction:
             {"goal_info": {"goal_id": {"uuid": goal_id}}, "status": status}
             for goal_id, status in self._states
         ]
-        self._status.put(self._interfaces.encode(self._types.status, {"status_list": known}))
-
-
-def latched(session: zenoh.Session, key: str) -> Any:
-    """A publisher that keeps its last message for subscribers that come late."""
-    cache = CacheConfig(max_samples=1)
-    return declare_advanced_publisher(session, key, cache=cache, publisher_detection=True)
-
-
-def served(session: zenoh.Session, key: str, answer: Answer) -> Any:
-    """A queryable that answers as a service server behind a bridge does."""
-
-    def on_query(query: zenoh.Query) -> None:
-        with query:
-            response = answer(payload_of(query))
-            if response is not None:
-                query.reply(key, response)
-
-    return session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
-
-
-def payload_of(query: zenoh.Query) -> bytes:
-    return b"" if query.payload is None else query.payload.to_bytes()
+        self._publish_status(self._interfaces.encode(self._types.status, {"status_list": known}))

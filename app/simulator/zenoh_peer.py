@@ -1,17 +1,18 @@
-"""Simulated robots behind a bridge of their own, as a separate Zenoh peer.
+"""Simulated robots as a separate Zenoh peer: behind a bridge of their own, or nodes on rmw_zenoh.
 
-It has the keys, CDR bytes, liveliness tokens and admin space that a real robot has behind
-zenoh-bridge-ros2dds, so that the panel needs nothing special for it. It knows nothing of the server.
+It has the keys, CDR bytes, liveliness tokens and admin space that a real robot has, so that the panel
+needs nothing special for it. It knows nothing of the server.
 """
 
 import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import zenoh
+from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import DEMO_VERSION
@@ -19,8 +20,8 @@ from app.errors import KioskError, LinkError
 from app.interfaces import Interfaces
 from app.simulator.simulated import SimulatedRobot
 from app.simulator.values.known_types import Moment
-from app.simulator.zenoh_action import served
 from app.simulator.zenoh_robot import SimulatedZenohRobot
+from app.simulator.zenoh_wire import Way, Wire
 
 log = logging.getLogger("kiosk.simulator")
 
@@ -28,6 +29,8 @@ ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
 # A signal that comes to a thread of Zenoh's wakes no wait of the main thread, where it is handled.
 LOOK_S: Final = 0.2
+BEHIND_A_BRIDGE: Final = Way()
+NO_WAYS: Final[Mapping[str, Way]] = {}
 
 
 class Simulator:
@@ -39,19 +42,28 @@ class Simulator:
         robots: Mapping[str, SimulatedRobot],
         interfaces: Interfaces,
         failed: Callable[[KioskError], None] = lambda error: log.error("%s", error),
+        ways: Mapping[str, Way] = NO_WAYS,
     ) -> None:
-        """`failed` is called when a robot ends with an error: then all of them stop."""
+        """`failed` is called when a robot ends with an error: then all of them stop. `ways` say by
+        namespace how the robots are reached; those that it lacks are behind one bridge."""
         self._step_s = min(robot.step_s for robot in robots.values())
         self._failed = failed
         self._lock = threading.Lock()
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
+        way_of = {namespace: ways.get(namespace, BEHIND_A_BRIDGE) for namespace in robots}
+        self._wires = {
+            way: Wire(self._session, way, interfaces) for way in dict.fromkeys(way_of.values())
+        }
         keys: set[str] = set()
         self.robots = [
-            SimulatedZenohRobot(self._session, namespace, robot, interfaces, self._lock, keys)
+            SimulatedZenohRobot(
+                self._wires[way_of[namespace]], namespace, robot, interfaces, self._lock, keys
+            )
             for namespace, robot in robots.items()
         ]
-        self._declared = list(self._graph(robots))
+        bridged = [namespace for namespace, way in way_of.items() if way == BEHIND_A_BRIDGE]
+        self._declared = list(self._graph(bridged))
         self._thread = threading.Thread(target=self._run, name="demo-robot", daemon=True)
 
     def __enter__(self) -> "Simulator":
@@ -71,17 +83,24 @@ class Simulator:
                 return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
         raise zenoh.ZError("the session has no locator")
 
-    def _graph(self, robots: Mapping[str, SimulatedRobot]) -> Iterator[Any]:
-        """The admin space and the tokens of a bridge. With one robot it has its namespace."""
+    def _graph(self, bridged: Sequence[str]) -> Iterator[Any]:
+        """The tokens of the robots, and the admin space of a bridge for the namespaces behind one."""
+        if bridged:
+            yield from self._bridge(bridged)
+        for played in self.robots:
+            for token in played.tokens():
+                yield self._session.liveliness().declare_token(token)
+        for wire in self._wires.values():
+            for token in wire.peer_tokens():
+                yield self._session.liveliness().declare_token(token)
+
+    def _bridge(self, namespaces: Sequence[str]) -> Iterator[Any]:
+        """The admin space of a bridge. With one robot it has its namespace."""
         zid = str(self._session.zid())
-        namespace = next(iter(robots)) if len(robots) == 1 else ""
+        namespace = namespaces[0] if len(namespaces) == 1 else ""
         config = json.dumps({"namespace": namespace or "/"})
         yield _admin_value(self._session, bridge_dialect.version(zid), DEMO_VERSION)
         yield _admin_value(self._session, bridge_dialect.config(zid), config)
-        for played in self.robots:
-            for token in played.tokens(zid):
-                yield self._session.liveliness().declare_token(token)
-        yield self._session.liveliness().declare_token(bridge_dialect.bridge_token(zid))
 
     def _run(self) -> None:
         while not self._ends.wait(self._step_s):
@@ -96,7 +115,12 @@ class Simulator:
 
 def _admin_value(session: zenoh.Session, key: str, text: str) -> Any:
     """A constant value in the admin space."""
-    return served(session, key, lambda _: text.encode())
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, text)
+
+    return session.declare_queryable(key, Callback(answer, indirect=False), complete=True)
 
 
 def _listening(endpoint: str) -> zenoh.Config:
@@ -121,6 +145,7 @@ def serve(
     interfaces: Interfaces,
     ends: threading.Event,
     listening: Callable[[], None],
+    ways: Mapping[str, Way] = NO_WAYS,
 ) -> None:
     """Robots at this endpoint until `ends` is set; calls `listening` when they are there.
 
@@ -133,7 +158,7 @@ def serve(
         ends.set()
 
     try:
-        with Simulator(endpoint, robots, interfaces, failed):
+        with Simulator(endpoint, robots, interfaces, failed, ways):
             listening()
             while not ends.wait(LOOK_S):
                 pass

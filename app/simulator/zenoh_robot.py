@@ -4,14 +4,12 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-import zenoh
-from zenoh.handlers import Callback
-
-from app.dialect import bridge_dialect
+from app.dialect.endpoint import OwnEndpoint
 from app.interfaces import Interfaces, names
-from app.simulator.simulated import SimulatedRobot, SimulatedTopic
+from app.simulator.simulated import SimulatedRobot
 from app.simulator.values.known_types import Moment
-from app.simulator.zenoh_action import Answer, PlayedAction, latched, served
+from app.simulator.zenoh_action import PlayedAction
+from app.simulator.zenoh_wire import Answer, Wire
 
 
 class SimulatedZenohRobot:
@@ -19,7 +17,7 @@ class SimulatedZenohRobot:
 
     def __init__(
         self,
-        session: zenoh.Session,
+        wire: Wire,
         namespace: str,
         robot: SimulatedRobot,
         interfaces: Interfaces,
@@ -28,7 +26,7 @@ class SimulatedZenohRobot:
     ) -> None:
         """`played` are the keys of what other robots publish and serve: names that are not below a
         namespace. It gets those of this one."""
-        self._session = session
+        self._wire = wire
         self._namespace = namespace
         self._robot = robot
         self._lock = lock
@@ -41,61 +39,56 @@ class SimulatedZenohRobot:
         self._services = {name: type_name for name, type_name in robot.services.items() if name in own}
         self._servers = {name: action for name, action in robot.actions.items() if name in own}
         self._publishers = {
-            topic: self._publisher(topic, simulated) for topic, simulated in self._publishes.items()
+            topic: wire.publisher(
+                self._key(topic), simulated.type, latched=simulated.qos.transient_local
+            )
+            for topic, simulated in self._publishes.items()
         }
         self._actions = [
-            PlayedAction(session, self._key(name), action, interfaces, lock)
+            PlayedAction(wire, self._key(name), action, interfaces, lock)
             for name, action in self._servers.items()
         ]
         self._declared = [
             *(self._subscriber(topic) for topic in robot.subscribes),
-            *(served(session, self._key(service), self._server(service)) for service in self._services),
+            *(
+                wire.served(self._key(service), name, self._server(service))
+                for service, name in self._services.items()
+            ),
         ]
 
-    def tokens(self, zid: str) -> Iterator[str]:
+    def tokens(self) -> Iterator[str]:
         """The liveliness tokens of its endpoints."""
+        return self._wire.tokens(self._namespace, self._endpoints())
+
+    def _endpoints(self) -> Iterator[OwnEndpoint]:
         robot, key = self._robot, self._key
         for topic, simulated in robot.subscribes.items():
-            yield bridge_dialect.token(
-                zid, "MS", key(topic), simulated.type, simulated.qos, simulated.type_hash
-            )
+            yield OwnEndpoint("MS", key(topic), simulated.type, simulated.qos, simulated.type_hash)
         for topic, simulated in self._publishes.items():
-            yield bridge_dialect.token(
-                zid, "MP", key(topic), simulated.type, simulated.qos, simulated.type_hash
-            )
+            yield OwnEndpoint("MP", key(topic), simulated.type, simulated.qos, simulated.type_hash)
         for service, name in self._services.items():
-            yield bridge_dialect.server_token(zid, "SS", key(service), name)
+            yield OwnEndpoint("SS", key(service), name)
         for action, server in self._servers.items():
-            yield bridge_dialect.server_token(zid, "AS", key(action), server.type)
+            yield OwnEndpoint("AS", key(action), server.type)
 
     def step(self, moment: Moment) -> None:
         with self._lock:
             messages = list(self._robot.step(moment))
         for topic, payload in messages:
             if topic in self._publishers:
-                self._publishers[topic].put(payload)
+                self._publishers[topic](payload)
         for action in self._actions:
             action.step()
 
     def _key(self, topic: str) -> str:
         return names.key_of(topic, self._namespace)
 
-    def _publisher(self, topic: str, about: SimulatedTopic) -> Any:
-        """A publisher; a TRANSIENT_LOCAL one keeps its last message for late subscribers."""
-        if about.qos.transient_local:
-            return latched(self._session, self._key(topic))
-        return self._session.declare_publisher(self._key(topic))
-
     def _subscriber(self, topic: str) -> Any:
-        """A subscriber that ignores what the robot itself publishes."""
-
-        def on_sample(sample: zenoh.Sample) -> None:
+        def take(payload: bytes) -> None:
             with self._lock:
-                self._robot.receive(topic, sample.payload.to_bytes())
+                self._robot.receive(topic, payload)
 
-        return self._session.declare_subscriber(
-            self._key(topic), Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
-        )
+        return self._wire.subscriber(self._key(topic), self._robot.subscribes[topic].type, take)
 
     def _server(self, service: str) -> Answer:
         def answer(payload: bytes) -> bytes | None:

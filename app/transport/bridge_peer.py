@@ -55,4 +55,7 @@ class BridgePeer:
         return await self._readiness.answers()
 
 
-BRIDGE: Final = RobotAccess(BridgeDialect(), BRIDGE_TRAITS, BridgePeer, observe_bridges)
+# A bridge has the domain and the hashes in its own configuration and messages.
+BRIDGE: Final = RobotAccess(
+    lambda _domain, _hash: BridgeDialect(), BRIDGE_TRAITS, BridgePeer, observe_bridges
+)

@@ -48,13 +48,14 @@ class Token:
 class Changes:
     """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
     `kept` has every sample of the recorded topics. `caches` are (key, token) of the publishers that
-    keep their last message for late subscribers."""
+    keep their last message for late subscribers. `reopen`: the session has to be opened again."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
     link_up: bool
     kept: Collection[tuple[str, Sample]] = ()
     caches: Collection[tuple[str, str]] = ()
+    reopen: bool = False
 
 
 class Superseded:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.dialect.dialect import Dialect
+from app.dialect.dialect import Dialect, TypeHash
 from app.dialect.peer_traits import PeerTraits
 from app.interfaces import Interfaces
 from app.panel.model import Panel
@@ -73,9 +73,10 @@ class RobotContext:
 
 @dataclass(frozen=True, slots=True)
 class RobotAccess:
-    """How a kind of robot is reached: `peer` makes the peer of one robot of a panel."""
+    """How a kind of robot is reached: `dialect` makes the dialect for a ROS domain and the type hashes
+    of a panel or of a command, `peer` the peer of one robot of a panel."""
 
-    dialect: Dialect
+    dialect: Callable[[int, TypeHash], Dialect]
     traits: PeerTraits
     peer: Callable[[RobotContext], Peer]
     observe: Observe

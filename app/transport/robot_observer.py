@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from typing import Final
 
+from app.dialect.dialect import any_hash
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.robot.sample import Sample
@@ -24,11 +25,11 @@ CALL_S: Final = 2.0
 class RobotObserver:
     """A session with robots of one kind. Used on the event loop that it was opened on."""
 
-    def __init__(self, config: Config, access: RobotAccess) -> None:
+    def __init__(self, config: Config, access: RobotAccess, domain: int = 0) -> None:
         self._loop = asyncio.get_running_loop()
         self._woken = asyncio.Event()
         self._access = access
-        self._dialect = access.dialect
+        self._dialect = access.dialect(domain, any_hash)
         self._session = ZenohSession(config, self._wake, self._dialect)
 
     @property

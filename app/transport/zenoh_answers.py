@@ -1,4 +1,4 @@
-"""Receives the answers to a Zenoh query on the event loop."""
+"""Receives the answers to a Zenoh query on the event loop, and payloads that are kept."""
 
 import asyncio
 import time
@@ -8,6 +8,7 @@ from contextlib import suppress
 import zenoh
 from zenoh.handlers import Callback
 
+COPIED_MOST = 16_384  # bytes of a sample
 Ask = Callable[["Callback[zenoh.Reply]"], None]  # queries with this handler of its replies
 
 
@@ -57,3 +58,9 @@ def first_answer(ask: Ask) -> "asyncio.Future[bytes | None]":
 
     ask(Callback(on_reply, lambda: hand_over(None), indirect=False))
     return answered
+
+
+def own_payload(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
+    """A payload that may be kept for long. A small one is copied: it is a part of the buffer that the
+    network was read into, and would keep all of it, so that the next message needs another."""
+    return payload if len(payload) > COPIED_MOST else payload.to_bytes()

@@ -1,5 +1,5 @@
-"""Owns the Zenoh session. Zenoh's callbacks run on its own threads and put what they receive into the
-inbox. Errors of Zenoh are raised as LinkError."""
+"""Owns the Zenoh session. Zenoh's threads put what they receive into the inbox. Errors of Zenoh are
+raised as LinkError."""
 
 import asyncio
 import atexit
@@ -19,21 +19,15 @@ from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
 from app.transport.token_query import TokenQuery
-from app.transport.zenoh_answers import collected, first_answer
+from app.transport.zenoh_answers import collected, first_answer, own_payload
 from app.transport.zenoh_config import endpoints_of, translated
+from app.transport.zenoh_opening import open_session
 from app.transport.zenoh_publishers import declare_publisher
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
 POLL_S = 0.02
-COPIED_MOST = 16_384  # bytes of a sample
 OnPayload = Callable[[Any], None]
-
-
-def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
-    """A payload that may be kept for long. A small one is copied: it is a part of the buffer that the
-    network was read into, and would keep all of it, so that the next message needs another."""
-    return payload if len(payload) > COPIED_MOST else payload.to_bytes()
 
 
 class ZenohSession:
@@ -57,8 +51,7 @@ class ZenohSession:
         return endpoints_of(self._config)
 
     def _open(self) -> None:
-        with translated("the Zenoh session can't be opened"):
-            self._session = zenoh.open(self._config)
+        self._session, self._is_final = open_session(self._config, self._dialect.as_client)
         self.zid = str(self._session.zid())
         self._tokens = TokenQuery(self._session, self._dialect.tokens)
         atexit.register(self._leave)
@@ -118,7 +111,8 @@ class ZenohSession:
         of a clock that is ahead it would drop all."""
         put = self._inbox.put
         yield self._session.declare_subscriber(
-            expression, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
+            expression,
+            self._direct(lambda sample: put(key, own_payload(sample.payload), sample.timestamp)),
         )
         yield self._session.liveliness().declare_subscriber(
             caches(expression), self._direct(lambda sample: self._on_cache(key, sample)), history=True
@@ -142,7 +136,7 @@ class ZenohSession:
 
     def _subscriber(self, expression: str, on_payload: OnPayload) -> "zenoh.Subscriber[None]":
         return self._session.declare_subscriber(
-            expression, self._direct(lambda sample: on_payload(_own(sample.payload)))
+            expression, self._direct(lambda sample: on_payload(own_payload(sample.payload)))
         )
 
     def _ask_cache(self, key: str, token: str) -> None:
@@ -151,7 +145,7 @@ class ZenohSession:
 
         def take(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                put(key, _own(reply.ok.payload), reply.ok.timestamp)
+                put(key, own_payload(reply.ok.payload), reply.ok.timestamp)
 
         with suppress(zenoh.ZError):  # the session is closed: the next one finds the cache again
             self._session.get(
@@ -186,11 +180,15 @@ class ZenohSession:
 
     def put(self, key: str, payload: bytes) -> None:
         """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""
+        attachment = self._attachment(self._declared.publish[key], payload)
         with translated(f"can't send on {key}"):
-            self._publishers[key].put(payload, attachment=self._attachment(self._declared.publish[key]))
+            self._publishers[key].put(payload, attachment=attachment)
 
-    def _attachment(self, expression: str) -> bytes | None:
-        """The attachment of the next message or query on a key expression."""
+    def _attachment(self, expression: str, payload: bytes) -> bytes | None:
+        """The attachment of the next message or query on a key expression: all that leaves comes by
+        here. LinkError for a payload that is not whole: a node of the robot could end by it."""
+        if not self._dialect.is_whole(payload):
+            raise LinkError(f"can't send on {expression}: {len(payload)} bytes are no message")
         self._sent[expression] += 1
         return self._dialect.attachment(self.zid, expression, self._sent[expression], time.time_ns())
 
@@ -207,13 +205,14 @@ class ZenohSession:
         self, expression: str, payload: bytes, timeout_s: float
     ) -> "asyncio.Future[bytes | None]":
         """The same, for any service by its key expression."""
+        attachment = self._attachment(expression, payload)
         with translated(f"can't ask {expression}"):
             return first_answer(
                 lambda callback: self._session.get(
                     expression,
                     callback,
                     payload=payload,
-                    attachment=self._attachment(expression),
+                    attachment=attachment,
                     timeout=timeout_s,
                     consolidation=zenoh.ConsolidationMode.NONE,
                 )
@@ -245,21 +244,25 @@ class ZenohSession:
     @property
     def is_connected(self) -> bool:
         """Whether it has a connection to any other peer or router."""
+        return any(self.neighbours())
+
+    def neighbours(self) -> tuple[frozenset[str], frozenset[str]]:
+        """The zids of the routers and of the peers that it has a connection to."""
         with translated("the Zenoh session can't be used"):
             info = self._session.info
-            return bool(info.routers_zid() or info.peers_zid())
+            return frozenset(map(str, info.routers_zid())), frozenset(map(str, info.peers_zid()))
 
     def probe(self) -> None:
         """Returns when both the inbox and the session respond; blocks until then."""
         self._inbox.probe()
-        with suppress(zenoh.ZError):  # a session that is being renewed has responded too
-            info = self._session.info
-            info.peers_zid()
-            info.routers_zid()
+        with suppress(LinkError):  # a session that is being renewed has responded too
+            self.neighbours()
 
     def drain(self) -> Changes:
         """Returns and removes everything received since the last call."""
         changes = self._inbox.drain()
+        if not self._is_final:  # a peer that waited for something to be a client of
+            changes.link_up, changes.reopen = False, changes.link_up
         for key, token in changes.caches:  # not in the callback, which must not query
             self._ask_cache(key, token)
         return changes

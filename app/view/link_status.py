@@ -124,6 +124,8 @@ def _node(
 ) -> tuple[State, str, TextLike]:
     """State, text and reason of the link from the peer to the robot's nodes."""
     sentences = robot.traits.sentences
+    if ended := robot.presence.ended_nodes(robot.graph):
+        return "bad", "link_node_ended", _named("link_node_named_ended", ended)
     if _peer_lamps(sentences)[passable.code][0] == "bad":
         return "bad", "lost", say(sentences.nodes_unknown)
     if silence:
@@ -200,9 +202,13 @@ def _all(verdict: Verdict) -> tuple[Verdict, ...]:
 
 
 def _gone(sentences: PeerSentences, names: Sequence[str]) -> Text:
+    return _named(sentences.node_lost, names)
+
+
+def _named(code: str, names: Sequence[str]) -> Text:
     more = len(names) - 1
     name = say("and_count", name=names[0], number=more) if more else names[0]
-    return say(sentences.node_lost, name=name)
+    return say(code, name=name)
 
 
 BROWSERS_OWN = "server"  # each browser measures for itself how long it has been connected

@@ -64,6 +64,7 @@ class TinyDialect:
     them, but shorter."""
 
     tokens = "tiny/*/**"
+    as_client = False
 
     def topic(self, key: str, type_name: str) -> str:
         return f"7/{key}/{type_name.replace('/', '::')}/*"
@@ -73,6 +74,12 @@ class TinyDialect:
 
     def attachment(self, zid: str, expression: str, number: int, at_ns: int) -> bytes | None:
         return b"%d of %s" % (number, zid.encode())
+
+    def is_whole(self, payload: bytes) -> bool:
+        return bool(payload)
+
+    def key_hash(self, type_name: str) -> str:
+        return ""
 
     def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
         topics = (self.token(zid, endpoint.role, endpoint.key, endpoint.type) for endpoint in endpoints)
@@ -161,7 +168,7 @@ def tiny_graph(tokens: Sequence[str], zid: str) -> GraphSnapshot:
     return GraphSnapshot(robots=(robot,) if nodes else ())
 
 
-TINY = RobotAccess(TinyDialect(), TINY_TRAITS, TinyPeer, observe_tiny)
+TINY = RobotAccess(lambda _domain, _hash: TinyDialect(), TINY_TRAITS, TinyPeer, observe_tiny)
 
 
 class TinyRobot:

@@ -25,7 +25,7 @@ from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_session import RobotSession
 from app.runtime.wiring import ServerParts, wire_session
 from app.simulator.in_process import in_process
-from app.transport import bridge_liveness
+from app.transport import liveness
 from app.transport.bridge_peer import BRIDGE as BRIDGES
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_config import config_to
@@ -298,7 +298,7 @@ def test_replacing_the_session_ends_holds_first(
     for module in (controller, lease):  # a busy machine misses heartbeats
         monkeypatch.setattr(module, "LEASE_S", ENOUGH_S)
     for limit in ("STALLED_S", "SILENT_S"):  # and its loop stands still
-        monkeypatch.setattr(bridge_liveness, limit, ENOUGH_S)
+        monkeypatch.setattr(liveness, limit, ENOUGH_S)
 
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")

@@ -87,6 +87,7 @@ def test_an_example_is_alive(path: Path, servers: Servers) -> None:
     until(lambda: states() <= {"live", "waiting"}, "nothing is unknown")
 
 
+# The first robot is behind a bridge, the second on rmw_zenoh.
 @pytest.mark.parametrize("number", [0, 1])
 def test_everything_is_alive_and_works(everything: Path, servers: Servers, number: int) -> None:
     panel = load_panel(everything)
@@ -112,11 +113,13 @@ def test_the_robots_of_a_panel_differ(everything: Path, servers: Servers) -> Non
     assert level != other
 
 
-def test_a_goal_of_any_action_is_canceled(everything: Path, servers: Servers) -> None:
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_goal_of_any_action_is_canceled(everything: Path, servers: Servers, number: int) -> None:
     text = everything.read_text()
     everything.write_text(text.replace("duration_s = 5.0", "duration_s = 600.0"))
-    robot = servers(demo_of(everything, PATIENT)).robot("r1")
-    is_alive(load_panel(everything), robot)
+    panel = load_panel(everything)
+    robot = servers(demo_of(everything, PATIENT)).robot(panel.robots[number].id)
+    is_alive(panel, robot)
     assert pressed(robot, "home", count=5)["outcome"] == "accepted"
     until(lambda: robot.widget("home")["stoppable"], "it can be canceled")
     assert takes_control(robot)

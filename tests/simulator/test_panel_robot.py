@@ -311,7 +311,7 @@ type = "std_srvs/srv/Trigger"
 
 def test_shared_topics_of_several_robots_are_simulated_once(loaded: Loaded) -> None:
     with Simulator(ANY_PORT, robots_of(loaded(SHARED)), INTERFACES) as played:
-        tokens = [token for robot in played.robots for token in robot.tokens("z")]
+        tokens = [token for robot in played.robots for token in robot.tokens()]
     names = [token.split("/")[4] for token in tokens if "/MP/" in token or "/SS/" in token]
     assert [names.count(name) for name in ("a§speed", "b§speed", "cell§door", "cell§open")] == [1] * 4
 

@@ -11,13 +11,13 @@ from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.permission.interlocks import link_verdict
 from app.robot.state import RobotState
-from app.transport import bridge_liveness
-from app.transport.bridge_liveness import (
+from app.transport import liveness
+from app.transport.bridge_liveness import BridgeLiveness
+from app.transport.liveness import (
     DELAYS_KEPT,
     EVERY_S,
     GOOD,
     LONGEST_S,
-    BridgeLiveness,
     LivenessDetector,
 )
 from tests.support.builders import (
@@ -94,7 +94,7 @@ def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
     end = network(silence, 0.7, end, DELAYS_KEPT + 10)
     assert not silence.silent
     network(silence, LAN_S, end, DELAYS_KEPT)
-    assert silence.limit < bridge_liveness.SILENT_S + 0.01
+    assert silence.limit < liveness.SILENT_S + 0.01
 
 
 def test_a_loop_that_stood_still_is_no_slow_network() -> None:
@@ -103,7 +103,7 @@ def test_a_loop_that_stood_still_is_no_slow_network() -> None:
     silence.on_query(end)
     silence.on_reply(end, end + 2.0)  # no one judged in the meantime
     assert not silence.silent
-    assert silence.limit < bridge_liveness.SILENT_S + 0.01
+    assert silence.limit < liveness.SILENT_S + 0.01
 
 
 class Line(FakeTransport):
@@ -147,9 +147,9 @@ def run(
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bridge_liveness, "EVERY_S", 0.02)
-    monkeypatch.setattr(bridge_liveness, "SILENT_S", 0.1)
-    monkeypatch.setattr(bridge_liveness, "STALLED_S", 60.0)
+    monkeypatch.setattr(liveness, "EVERY_S", 0.02)
+    monkeypatch.setattr(liveness, "SILENT_S", 0.1)
+    monkeypatch.setattr(liveness, "STALLED_S", 60.0)
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -248,9 +248,9 @@ def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
         line.frozen = BRIDGE
         await until(lambda: changes == [False])
         robot.graph.apply_token(bridge_dialect.bridge_token("b2"), False)
-        await asyncio.sleep(5 * bridge_liveness.EVERY_S)
+        await asyncio.sleep(5 * liveness.EVERY_S)
         robot.graph.apply_token(bridge_dialect.bridge_token("b3"), True)
-        await asyncio.sleep(5 * bridge_liveness.EVERY_S)
+        await asyncio.sleep(5 * liveness.EVERY_S)
         assert changes == [False]
         line.frozen = ""
         await until(lambda: changes == [False, True])
@@ -260,7 +260,7 @@ def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
 
 def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was asked before it is answered before what waited; so is what was asked at its end."""
-    monkeypatch.setattr(bridge_liveness, "STALLED_S", 0.1)
+    monkeypatch.setattr(liveness, "STALLED_S", 0.1)
     clock = 0.0
 
     async def benched() -> None:

@@ -11,9 +11,9 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
-from app.cli.arguments import seconds
+from app.cli.arguments import ros_domain, seconds
 from app.diagnose.findings import Finding, few
 from app.dialect.dialect import DEFAULT_DIALECT, DialectName
 from app.dialect.endpoint import within
@@ -34,8 +34,8 @@ DEFAULT_DISTRO: Final = "jazzy"
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """Where to look, by the command line: `namespace` is "" for all robots. `dialect` is that of all of
-    them. `robots` are the namespaces
-    of the panel's robots, and `bridges` how many bridges they have at least; 0: one an endpoint."""
+    them, `domain` their ROS domain. `robots` are the namespaces of the panel's robots, and `bridges`
+    how many bridges they have at least; 0: one an endpoint."""
 
     zenoh: Path
     connect: tuple[str, ...] = ()
@@ -46,6 +46,15 @@ class Place:
     interfaces: tuple[Path, ...] = ()
     within_s: float = CONNECT_S
     dialect: DialectName = DEFAULT_DIALECT
+    domain: int = 0
+
+    @property
+    def reached(self) -> dict[str, Any]:
+        """The keys of a panel file that say how such a robot is reached, where that is not usual."""
+        reached: dict[str, Any] = {}
+        if self.dialect != DEFAULT_DIALECT:
+            reached["dialect"] = self.dialect
+        return reached | ({"domain": self.domain} if self.domain else {})
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -78,6 +87,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="packages with definitions of types, such as a workspace's install/; may be given several"
         " times",
     )
+    add(
+        "--dialect",
+        choices=get_args(DialectName),
+        help="bridge: the robot is behind zenoh-bridge-ros2dds; rmw_zenoh: its nodes run on rmw_zenoh."
+        f" Default: the panel file's, else {DEFAULT_DIALECT}",
+    )
+    add(
+        "--domain",
+        type=ros_domain,
+        metavar="N",
+        help="the nodes' ROS_DOMAIN_ID on rmw_zenoh; default: 0",
+    )
     add("--distro", choices=DISTROS, help=f"of ROS 2; default: {DEFAULT_DISTRO}")
     add(
         "--wait",
@@ -101,11 +122,12 @@ def place_of(options: Any) -> Place:
     connect, named = tuple(options.connect or ()), options.namespace
     distro, folders = options.distro, tuple(options.interfaces or ())
     namespaces: tuple[str, ...] = ()
-    bridges, dialect = 0, DEFAULT_DIALECT
+    bridges, dialect, ros_domain = 0, DEFAULT_DIALECT, 0
     if options.panel is not None:
         panel = load_panel(options.panel)
         robots = panel.robots
         dialect = robots[0].dialect if robots else panel.dialect
+        ros_domain = robots[0].domain if robots else panel.domain
         if not connect:
             connect = tuple(dict.fromkeys(e for robot in robots for e in robot.connect))
             bridges = len({robot.connect for robot in robots if robot.connect})
@@ -122,7 +144,8 @@ def place_of(options: Any) -> Place:
         distro=distro or DEFAULT_DISTRO,
         interfaces=tuple(folders),
         within_s=options.wait,
-        dialect=dialect,
+        dialect=options.dialect or dialect,
+        domain=ros_domain if options.domain is None else options.domain,
     )
 
 
@@ -135,7 +158,10 @@ def _is_elsewhere(endpoint: str) -> bool:
 async def opened(place: Place) -> AsyncIterator[tuple[RobotObserver, GraphSnapshot]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
     access = ROBOT_ACCESS[place.dialect]
-    observer, traits = RobotObserver(config_from(place.zenoh, place.connect), access), access.traits
+    observer, traits = (
+        RobotObserver(config_from(place.zenoh, place.connect), access, place.domain),
+        access.traits,
+    )
     try:
         try:
             await observer.connect(place.within_s)

@@ -108,11 +108,13 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
     for name, own_id, label in zip(names, ids, labels, strict=True):
         entry: dict[str, Any] = {"id": own_id, "name": label}
         entry |= {"namespace": name} if name else {}
+        entry |= place.reached
         robots.append(entry | ({"connect": list(place.connect)} if place.connect else {}))
     folder = _folder(target)
     return Draft(
         title=label_of(namespace or "Robot"),
         namespace=namespace,
+        reached=place.reached,
         robots=robots if len(names) > 1 or place.connect else (),
         distro=place.distro,
         interfaces=[os.path.relpath(interface, folder) for interface in place.interfaces],

@@ -2,10 +2,8 @@
 across widgets."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from itertools import islice
 
 from app.errors import Fault, InterfaceError
-from app.i18n.values import alike
 from app.interfaces import Interfaces
 from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
@@ -13,13 +11,14 @@ from app.panel.checks.languages import language_faults
 from app.panel.checks.look import brand_faults, grow_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
+from app.panel.checks.robots import duplicate_ids, robot_faults
 from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.condition import Condition
 from app.panel.faults.wording import list_names
 from app.panel.machine_state import STATE_ID
-from app.panel.model import Panel, RobotEntry
+from app.panel.model import Panel
 from app.panel.template import NOW
 from app.panel.widgets.families import (
     BaseWidget,
@@ -44,10 +43,10 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     skipped.
     """
     yield from _required_type_faults(panel, interfaces)
-    yield from _robot_faults(panel)
+    yield from robot_faults(panel)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
-    yield from _duplicate_ids("page", [page.id for page in panel.pages])
+    yield from duplicate_ids("page", [page.id for page in panel.pages])
     ids, inputs = list(_id_faults(panel)), list(_input_faults(panel, interfaces))
     yield from (*ids, *inputs)
     reported = [fault.place for fault in (*ids, *inputs)]
@@ -80,9 +79,9 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
 
 def _id_faults(panel: Panel) -> Iterator[Fault]:
     """Faults of ids. Their items may be missing elsewhere under the correct id."""
-    yield from _duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
+    yield from duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
     yield from condition_id_faults(panel)
-    yield from _duplicate_ids("alarm", [alarm.id for alarm in panel.alarms])
+    yield from duplicate_ids("alarm", [alarm.id for alarm in panel.alarms])
     yield from _duplicate_widget_ids(panel)
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:
@@ -205,34 +204,6 @@ def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
         from app.panel.checks.demo import demo_faults
 
         yield from demo_faults(panel, interfaces)
-
-
-def _robot_faults(panel: Panel) -> Iterator[Fault]:
-    """Faults of robots: each needs its own id, name, and namespace or endpoints."""
-    yield from _duplicate_ids("robot", [robot.id for robot in panel.robots])
-    if panel.robots and panel.namespace:
-        yield Fault("namespace", "is of the one robot: with [[robot]] each has its own")
-    for r, robot in enumerate(panel.robots):
-        yield from islice(_duplicate_robot_faults(f"robot[{r}]", robot, panel.robots[:r]), 1)
-
-
-def _duplicate_robot_faults(
-    place: str, robot: RobotEntry, others: Sequence[RobotEntry]
-) -> Iterator[Fault]:
-    """Faults of a robot with the name or the address of another one. An equal id is reported
-    elsewhere."""
-    for a, above in enumerate(others if robot.id not in [other.id for other in others] else ()):
-        if alike(robot.name, above.name):
-            yield Fault(f"{place}.name", f'"{robot.name}" is already the name of robot[{a}]')
-        if (robot.namespace, robot.connect) == (above.namespace, above.connect):
-            same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"
-            yield Fault(f"{place}.namespace", same)
-
-
-def _duplicate_ids(table: str, ids: list[str]) -> Iterator[Fault]:
-    for i, name in enumerate(ids):
-        if name in ids[:i]:
-            yield Fault(f"{table}[{i}].id", f'"{name}" is already the id of {table}[{ids.index(name)}]')
 
 
 def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:

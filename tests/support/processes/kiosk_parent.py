@@ -83,9 +83,9 @@ def prepare(templates: str) -> None:
 def bear_standstills() -> None:
     """Tolerates stalls: beside other tests a server or a bridge may stall for a second, which locks
     nothing here and refuses no press. A test of stalls starts its server with `EXACT_LIVENESS=1`."""
-    from app.transport import bridge_liveness, bridge_peer, readiness
+    from app.transport import bridge_peer, liveness, readiness
 
-    vars(bridge_liveness).update(STALLED_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
+    vars(liveness).update(STALLED_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
     vars(bridge_peer)["WITHIN_S"] = 10.0
     vars(readiness)["LIMIT_S"] = 15.0
 

@@ -1,0 +1,53 @@
+"""A robot on rmw_zenoh for the tests: its router and its nodes, each a process, with the same commands
+as the bridge and the rclpy nodes of `tests/support/parts.py`."""
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from tests.support.parts import ORDERS, ROOT, Bridge, Process, until
+from tests.support.processes.commanded import Commanded
+
+
+class Router(Bridge):
+    """A Zenoh router in place of the bridge."""
+
+    def __init__(self, domain: int = 0) -> None:
+        super().__init__(domain)
+
+    def start(self) -> None:
+        module = "tests.support.processes.rmw_router"
+        self._process = Process([sys.executable, "-m", module, self.endpoint], {}, cwd=str(ROOT))
+        process = self._process
+        until(lambda: "running" in process.text or not process.running, "the router runs")
+        assert process.running, process.text
+
+
+class RmwNode(Commanded):
+    """A node on rmw_zenoh; see `tests/support/processes/rmw_node.py` for its commands."""
+
+    def __init__(self, router: Bridge, name: str = "system_controller") -> None:
+        module = "tests.support.processes.rmw_node"
+        super().__init__(
+            [sys.executable, "-m", module, name, router.endpoint, str(router.domain)], {}, cwd=ROOT
+        )
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        def do(*arguments: Any, **named: Any) -> Any:
+            return self(name, **dict(zip(ORDERS.get(name, ()), arguments, strict=False)), **named)
+
+        return do
+
+    def heard_data(self, topic: str) -> list[Any]:
+        """The `data` field of all messages that a subscription received."""
+        return [message["data"] for message in self.heard(topic)]
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        self.end()
+
+    def end(self) -> None:
+        if self._process.poll() is None:
+            assert self.broken() == [], "what the panel sent would have ended the node"
+        super().end()
