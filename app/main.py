@@ -53,6 +53,7 @@ from app.web.routes import (
     frames,
     health,
     hold_socket,
+    lock_help,
     log_lines,
     pages,
     parameters,
@@ -80,6 +81,7 @@ ROBOT_ROUTES: Final = (
     parameters,
     frames,
     log_lines,
+    lock_help,
     trends,
 )
 READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown

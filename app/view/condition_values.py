@@ -34,16 +34,21 @@ def condition_row(condition: NamedCondition, robot: RobotState, now: float) -> R
     is_plain = not condition.comparisons or met == "unknown" or state.value == ""
     value = say(f"condition_{met}") if is_plain else state.value
     need: TextLike = say("condition_needs", need=state.need) if condition.comparisons else ""
-    if met == "unmet" and condition.action is not None:
-        need = condition.action  # what to do counts more than what is needed
     return Row(condition.name, met, value, need, min(verdict.until, link.until))
+
+
+def _advising_row(condition: NamedCondition, robot: RobotState, now: float) -> Row:
+    """The same where what to do counts more than what is needed."""
+    row = condition_row(condition, robot, now)
+    is_advised = row.met == "unmet" and condition.action is not None
+    return row._replace(need=condition.action or "") if is_advised else row
 
 
 def conditions(widget: Conditions, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a check list, and when they change: `shape` is "met", "unmet" or "unknown", `text`
     the line above; `row_labels`, `row_states`, `row_values` and `row_needs` have an element for each
     condition, and `order` the places of all, those that are not met first."""
-    rows = [condition_row(robot.conditions[name], robot, now) for name in widget.conditions]
+    rows = [_advising_row(robot.conditions[name], robot, now) for name in widget.conditions]
     states = [row.met for row in rows]
     number = sum(state != "met" for state in states)
     summary = say("conditions_unmet", number=number, total=len(rows))

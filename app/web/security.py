@@ -21,7 +21,7 @@ from app.web.page_guard import PAGE_GUARD_HASH
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
-GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines))/?")
+GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines|lock))/?")
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})

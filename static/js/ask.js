@@ -1,14 +1,12 @@
 // The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press. The
 // frame around the page stays live behind it: a stop button is never covered, and never waits for an answer.
+import { coverPage, placeBeside, uncoverPage } from "./beside.js";
 import { entries, isCheckbox } from "./entries.js";
 import { entryText } from "./number-inputs.js";
 import { TAP_AGAIN_MS } from "./press.js";
 import { closest, find, setText } from "./show.js";
 
 const NOT_NOW_MS = 15_000; // without an answer the question goes
-const GAP_PX = 12;
-
-let closing = 0;
 
 /** @param {HTMLElement} root @param {(event: Event) => void} onYes */
 export function confirm(root, onYes) {
@@ -46,39 +44,13 @@ export function confirm(root, onYes) {
     clearTimeout(notNow);
     root.toggleAttribute("data-asked", false);
     if (dialog.contains(document.activeElement)) find(root, "button").focus();
-    // The second tap of an answer is no press of the button below.
-    closing = setTimeout(() => delete document.body.dataset.asks, TAP_AGAIN_MS);
+    uncoverPage();
   });
-  clearTimeout(closing);
-  document.body.dataset.asks = "";
+  coverPage();
   root.toggleAttribute("data-asked", true);
   dialog.showPopover();
   placeBeside(dialog, root.getBoundingClientRect());
   find(dialog, ".no").focus();
-}
-
-// Above the button, else below or beside it, within the page.
-/** @param {HTMLElement} sheet @param {DOMRect} button */
-function placeBeside(sheet, button) {
-  const page = find(document, "main").getBoundingClientRect();
-  const { width, height } = sheet.getBoundingClientRect();
-  /** @param {number} start @param {number} least @param {number} most */
-  const within = (start, least, most) => Math.max(least, Math.min(start, most));
-  const isInFrame = button.right <= page.left || button.left >= page.right;
-  let left = within((button.left + button.right - width) / 2, page.left + GAP_PX, page.right - GAP_PX - width);
-  let top = button.top - GAP_PX - height;
-  if (isInFrame || top < page.top) {
-    const isRight = page.right - button.right >= width + 2 * GAP_PX;
-    const isBelow = !isInFrame && page.bottom - button.bottom >= height + 2 * GAP_PX;
-    if (isBelow) top = button.bottom + GAP_PX;
-    else {
-      left = isRight ? Math.max(button.right, page.left) + GAP_PX : button.left - GAP_PX - width;
-      left = within(left, page.left + GAP_PX, page.right - GAP_PX - width);
-      const middle = (button.top + button.bottom - height) / 2;
-      top = within(middle, page.top + GAP_PX, page.bottom - GAP_PX - height);
-    }
-  }
-  Object.assign(sheet.style, { left: `${left}px`, top: `${top}px` });
 }
 
 // The value as the page shows it.

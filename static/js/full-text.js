@@ -1,16 +1,29 @@
-// The full text of a key in a popover: its face shows two lines. A touch on a locked key opens it, or one on the "…"
-// that the face has where text is cut, which a keyboard reaches too. An open popover follows its key. A touch on the
-// bar of control shows its text in full.
+// The full text of a key in a sheet beside it: its face shows what there is room for. A touch on a locked key opens it
+// with why it is locked and what to do, and so does the "…" of the key, which a keyboard reaches. An open sheet follows
+// its key. A touch on the bar of control shows its text in full.
+import { placeBeside, uncoverPage } from "./beside.js";
+import { lockHelp } from "./lock-help.js";
 import { closest, copyOf, find, setText } from "./show.js";
 
 const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
-const popover = find(document, "#whole");
+const FIRST_MS = 200; // so long the sheet waits for the server before it opens with the text that the page has
+const AGAIN_MS = 1000; // between two looks at the server while it is open
+const SOON_MS = 100; // after a change of the lock
+const sheet = find(document, "#whole");
+const part = find(sheet, ".lock"); // from the server
 /** @type {HTMLElement | null} */
-let shown = null; // the key whose text the popover shows
+let shown = null; // the key, or another element, whose text the sheet shows
+let timer = 0;
+let looks = 0; // at the server: only the answer to the last one counts
+
+/** @param {HTMLElement} key */
+const isLocked = (key) => key.dataset.enabled === "false" || key.querySelector("button")?.disabled === true;
+
+const isOpen = () => sheet.matches(":popover-open");
 
 /** @param {HTMLElement} key */
 function visibleTexts(key) {
-  const locked = key.querySelector("button")?.disabled;
+  const locked = isLocked(key);
   const reasons = key.querySelector(".reasons")?.textContent;
   const shown = [...key.querySelectorAll(TEXTS)].filter((text) => {
     if (text.matches(".why")) return locked && !reasons;
@@ -19,17 +32,79 @@ function visibleTexts(key) {
   return shown.map((text) => text.textContent.trim()).filter(Boolean);
 }
 
-function fillPopover() {
-  const texts = shown ? visibleTexts(shown) : [];
-  if (texts.length) setText(find(popover, "p"), texts.join("\n"));
+// What the page itself knows. Whether there is anything.
+/** @param {HTMLElement} key */
+function showTexts(key) {
+  const texts = visibleTexts(key);
+  if (texts.length) show(find(key, ".name, h3").textContent, texts, null);
   return texts.length > 0;
 }
 
-/** @param {HTMLElement} key */
-function showFullText(key) {
+/** @param {string | undefined} title @param {string[]} texts @param {HTMLElement | null} help */
+function show(title, texts, help) {
+  setText(find(sheet, "h2"), title);
+  setText(find(sheet, "p"), texts.join("\n"));
+  find(sheet, "p").hidden = help !== null;
+  if (!help) part.replaceChildren();
+  else if (!part.firstElementChild?.isEqualNode(help)) part.replaceChildren(help);
+  place();
+}
+
+function place() {
+  if (shown && isOpen()) placeBeside(sheet, find(shown, "button, p").getBoundingClientRect());
+}
+
+/** @param {HTMLElement} key @param {boolean} byKeyboard */
+async function open(key, byKeyboard) {
+  if (key === shown && isOpen()) return;
+  release();
   shown = key;
-  setText(find(popover, "h2"), find(key, ".name").textContent);
-  if (fillPopover()) popover.showPopover();
+  if (isLocked(key)) {
+    key.toggleAttribute("data-asked", true);
+    await Promise.race([refresh(key), new Promise((resolve) => setTimeout(resolve, FIRST_MS))]);
+    if (key !== shown || isOpen()) return;
+  }
+  if (!part.firstElementChild && !showTexts(key)) return release();
+  sheet.showPopover();
+  place();
+  if (byKeyboard) find(sheet, "button").focus();
+}
+
+// As the server has it now, again and again while the sheet is open.
+/** @param {HTMLElement} key */
+async function refresh(key) {
+  clearTimeout(timer);
+  const look = ++looks;
+  const help = await lockHelp(closest(key, "[data-widget]")?.dataset.widget);
+  if (look !== looks || key !== shown || !isLocked(key)) return;
+  if (help) show(help.dataset.title, [], help);
+  else showTexts(key);
+  timer = setTimeout(() => refresh(key), AGAIN_MS);
+}
+
+function release() {
+  clearTimeout(timer);
+  shown?.toggleAttribute("data-asked", false);
+  shown = null;
+  part.replaceChildren();
+}
+
+// What it covers is not pressed by a tap that was meant for it.
+function close() {
+  uncoverPage();
+  if (isOpen()) sheet.hidePopover();
+}
+
+// The lock of the key, or its text, is another.
+/** @param {HTMLElement} key */
+function follow(key) {
+  if (key !== shown) return;
+  if (key.matches("[data-asked]")) {
+    clearTimeout(timer);
+    if (isLocked(key)) timer = setTimeout(() => refresh(key), SOON_MS);
+    else if (isOpen()) close();
+    else release();
+  } else if (isOpen() && !showTexts(key)) sheet.hidePopover();
 }
 
 /** @param {HTMLElement} text */
@@ -37,11 +112,15 @@ function isCut(text) {
   return text.scrollHeight > text.clientHeight + 1;
 }
 
+// A locked key has it always: the button itself has no focus.
 /** @param {HTMLElement} key @param {boolean} cut */
-function showCut(key, cut) {
-  const isComplete = !cut && !key.querySelector('[data-text="more"]')?.textContent;
-  find(key, ".more").toggleAttribute("hidden", isComplete);
-  if (key === shown && popover.matches(":popover-open") && !fillPopover()) popover.hidePopover();
+function showMore(key, cut) {
+  const more = find(key, ".more");
+  const isComplete = !cut && !isLocked(key) && !key.querySelector('[data-text="more"]')?.textContent;
+  more.toggleAttribute("hidden", isComplete && document.activeElement !== more);
+  const focused = document.activeElement;
+  if (isLocked(key) && focused?.matches("button:disabled") && key.contains(focused)) more.focus();
+  follow(key);
 }
 
 /** @type {Set<HTMLElement>} */
@@ -57,31 +136,40 @@ function mark(key) {
 function markAll() {
   const keys = [...changed].map((key) => ({ key, cut: [...key.querySelectorAll(".face > p")].some(isCut) }));
   changed.clear();
-  for (const { key, cut } of keys) showCut(key, cut);
+  for (const { key, cut } of keys) showMore(key, cut);
 }
 
+// A key, or a step, whose two keys have one text between them.
 /** @param {HTMLElement} key */
 function equip(key) {
-  const face = find(key, ".face");
-  const button = find(key, "button");
-  face.append(copyOf(find(document, "template#more")));
+  const face = find(key, ".face, .reported");
+  const more = copyOf(find(document, "template#more"));
+  more.setAttribute("aria-describedby", find(key, "button").getAttribute("aria-describedby") ?? "");
+  more.addEventListener("blur", () => mark(key));
+  face.append(more);
   const observer = new MutationObserver(() => mark(key));
-  observer.observe(face, { childList: true, characterData: true, subtree: true });
-  observer.observe(button, { attributeFilter: ["disabled"] });
+  const texts = { childList: true, characterData: true, subtree: true };
+  for (const text of face.querySelectorAll(TEXTS)) observer.observe(text, texts);
+  for (const button of key.querySelectorAll("button")) observer.observe(button, { attributeFilter: ["disabled"] });
   new ResizeObserver(() => mark(key)).observe(key);
-  key.addEventListener("click", ({ target }) => {
-    const locked = button.disabled && !closest(target, "button");
-    if (locked || closest(target, ".more")) showFullText(key);
+  key.addEventListener("click", (event) => {
+    if (closest(event.target, ".more") || (isLocked(key) && !closest(event.target, "button")))
+      open(key, event.detail === 0);
   });
 }
 
-for (const key of document.querySelectorAll(".key")) equip(key);
+for (const key of document.querySelectorAll('.key, [data-kind="step"]')) equip(key);
+
+sheet.addEventListener("beforetoggle", ({ newState }) => newState === "closed" && release());
+find(sheet, ".close").addEventListener("click", close);
+addEventListener("resize", place);
 
 const control = document.querySelector("#control");
 control?.querySelector("div")?.addEventListener("click", () => {
-  shown = null;
-  setText(find(popover, "h2"), control.getAttribute("aria-label") ?? "");
+  release();
+  shown = control;
   const texts = [...control.querySelectorAll("p")].map((text) => text.textContent).filter(Boolean);
-  setText(find(popover, "p"), texts.join("\n"));
-  popover.showPopover();
+  show(control.getAttribute("aria-label") ?? "", texts, null);
+  sheet.showPopover();
+  place();
 });

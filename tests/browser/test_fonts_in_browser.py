@@ -55,7 +55,7 @@ def test_control_bar_fits_and_does_not_shift_on_a_control_request(opens: Opens) 
             assert page.evaluate(SCROLLED) <= [width, height]
             assert bar(page).evaluate("e => e.scrollWidth <= e.clientWidth")
             bar(page).click()
-            whole = page.locator("#whole p")
+            whole = page.locator("#whole > p")
             expect(whole).to_have_text(bar(page).text_content() or "")
             assert whole.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
             page.keyboard.press("Escape")

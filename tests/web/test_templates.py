@@ -26,7 +26,12 @@ def test_all_that_a_page_is_made_of_is_compiled_at_the_start() -> None:
     environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
     asyncio.run(compiled(environment))
     assert environment.cache is not None
-    names = ["screen.html", "_failed.html", *(f"widgets/{kind}.html" for kind in KINDS)]
+    names = [
+        "screen.html",
+        "_failed.html",
+        "lock_help.html",
+        *(f"widgets/{kind}.html" for kind in KINDS),
+    ]
     names += [section.template for section in SECTIONS if section.template]
     expected = {inner for name in names for inner in needed(environment, name)}
     assert {key[1] for key in environment.cache} == expected

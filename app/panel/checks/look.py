@@ -1,18 +1,33 @@
-"""Checks of how a panel looks: its brand, and what grows on a page."""
+"""Checks of how a panel looks: its brand, pictures of help, and what grows on a page."""
 
 from collections.abc import Iterator
 
 from app.errors import Fault
+from app.i18n.values import each_language
 from app.panel.faults.wording import list_names
 from app.panel.model import Panel
 
 
 def brand_faults(panel: Panel) -> Iterator[Fault]:
     """A logo that is not there."""
-    if panel.brand and panel.brand.logo and panel.brand.logo not in panel.picture_files:
+    if panel.brand and panel.brand.logo:
+        yield from _picture_faults("brand.logo", panel.brand.logo, panel)
+
+
+def help_faults(panel: Panel) -> Iterator[Fault]:
+    """Pictures of what to do about an interlock that are not there."""
+    for i, interlock in enumerate(panel.interlocks):
+        place = f"interlock[{i}].help"
+        if interlock.help.picture is not None:
+            for name in dict.fromkeys(each_language(interlock.help.picture).values()):
+                yield from _picture_faults(f"{place}.picture", name, panel)
+
+
+def _picture_faults(place: str, name: str, panel: Panel) -> Iterator[Fault]:
+    if name not in panel.picture_files:
         names = list_names(panel.picture_files) if panel.picture_files else "none"
-        message = f'no picture "{panel.brand.logo}" in the folder `pictures`; there is {names}'
-        yield Fault("brand.logo", message, cause=f"picture {panel.brand.logo}")
+        message = f'no picture "{name}" in the folder `pictures`; there is {names}'
+        yield Fault(place, message, cause=f"picture {name}")
 
 
 def grow_faults(panel: Panel) -> Iterator[Fault]:

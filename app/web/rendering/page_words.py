@@ -17,6 +17,7 @@ from app.web.rendering.log_lines import LEVEL_WORDS, newest_lines
 WORDS: Final = (
     "menu",
     "whole",
+    "close",
     "phone",
     "cancel",
     "robots",
