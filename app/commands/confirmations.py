@@ -15,7 +15,8 @@ from app.clock import format_time
 from app.commands.press import PressHandle
 from app.i18n import TextLike, joined, number, say
 from app.panel.values import same_value
-from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.families import PressCommand
+from app.panel.widgets.publish import Confirm
 from app.robot.command_status import CommandStatus, Outcome
 from app.robot.sample_handlers import SampleHandlers
 from app.robot.state import Reading, RobotState
@@ -32,7 +33,7 @@ class Unconfirmed:
     """A command that was sent at `since` (monotonic seconds) and has the effect that the field of
     `confirm` is `expected`. `sentence` is the sentence about the sending."""
 
-    widget: PublishPress
+    widget: PressCommand
     confirm: Confirm
     expected: Any
     since: float
@@ -50,7 +51,7 @@ class _Waiting:
     late: bool = False
 
     @property
-    def widget(self) -> PublishPress:
+    def widget(self) -> PressCommand:
         return self.command.widget
 
     @property
@@ -105,6 +106,16 @@ class Confirmations:
         missed = say("confirmation_missing", topic=confirm.topic, seconds=limit)
         return Outcome("unknown", joined([waiting.command.sentence, missed]))
 
+    def confirmed_since(self, confirm: Confirm, expected: Any, since: float) -> Outcome | None:
+        """The outcome if the field has the expected value since `since` (monotonic seconds)."""
+        reading = self._robot.reading(confirm.topic).of_field(confirm.field, math.inf)
+        is_known = reading.status == "message" and reading.at >= since
+        if not is_known or not equal(reading.value(confirm.field), expected):
+            return None
+        return Outcome(
+            "confirmed", say("confirmed", topic=confirm.topic, time=format_time(reading.wall))
+        )
+
     def is_awaited(self, key: str) -> bool:
         """Whether the next message of this topic may confirm a command."""
         return any(not waiting.confirmed.done() for waiting in self._waiting.get(key, ()))
@@ -145,7 +156,7 @@ class Confirmations:
         if self._latest.get(waiting.widget.id) == waiting.handle.press_id:
             self._show(waiting.widget, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    def _show(self, widget: PublishPress, progress: CommandStatus) -> None:
+    def _show(self, widget: PressCommand, progress: CommandStatus) -> None:
         self._robot.command_status[widget.id] = progress
         self._changed()
 

@@ -21,9 +21,10 @@ from app.panel.template import add_now, fill, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.publish import Confirm, Publish, PublishPress
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
 from app.permission.interlocks import reported_value
 from app.robot.command_status import FinalCheck, Outcome
 from app.robot.state import RobotState
@@ -94,6 +95,7 @@ class Dispatcher:
         self.dispatches: Mapping[type[Any], Dispatch] = {
             PublishPress: Dispatch(self._publish, self._check_message),
             Call: Dispatch(self._call, self._check_call),
+            Switch: Dispatch(self._switch, self._check_switch),
             Action: Dispatch(self._start, lambda widget, _: self.actions.full(widget.action)),
             Parameter: Dispatch(
                 self._set, lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}")
@@ -103,6 +105,7 @@ class Dispatcher:
             Input: lambda widget, value: widget.sent_value(widget.check_value(value)),
             Parameter: self._parameters.check_value,
             Step: self._check_step,
+            Switch: lambda widget, value: widget.check_value(value),
         }
         require_rows("dispatch", self.dispatches, PressCommand)
         require_rows("check of its entries", self.checks, EntryWidget)
@@ -192,6 +195,29 @@ class Dispatcher:
         self._interfaces.encode(self._interfaces.service_types(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
+    async def _switch(self, widget: Switch, prepared: PreparedPress) -> Outcome:
+        """Sends the command for the new position, and waits for the robot to report it."""
+        on, since = prepared.fields["value"], self._monotonic()
+        self._robot.switched_to[widget.id] = on
+        command = widget.command(on=on)
+        sent = prepared._replace(fields=_sent_by(prepared.fields))
+        if isinstance(command, Publish):
+            return await self._publish(command, sent)
+        answer = await self._call(command, sent)
+        if answer.outcome != "succeeded":
+            return answer
+        confirm = widget.confirm(on=on)
+        expected = self._expected(confirm, {})
+        reported = self._confirmations.confirmed_since(confirm, expected, since)
+        unconfirmed = Unconfirmed(command, confirm, expected, since, answer.text)
+        return reported or await self._confirmations.wait(unconfirmed, prepared.handle)
+
+    def _check_switch(self, widget: Switch, fields: dict[str, Any]) -> TextLike:
+        command, sent = widget.command(on=fields["value"]), _sent_by(fields)
+        if isinstance(command, Publish):
+            return self._check_message(command, sent)
+        return self._check_call(command, sent)
+
     async def _start(self, widget: Action, prepared: PreparedPress) -> Outcome:
         return await self.actions.start(widget, prepared.fields, prepared.handle)
 
@@ -230,3 +256,9 @@ class Dispatcher:
                 raise InputError(f'the input "{name}" is missing')
             values[name] = find_row(self.checks, field)(field, inputs[name])
         return values
+
+
+def _sent_by(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that a switch sends for its new position, of its filled-in template."""
+    sent: dict[str, Any] = fields["on" if fields["value"] else "off"]
+    return sent

@@ -45,7 +45,7 @@ class TopicChecks:
                 self._check_listened(topic, wanted)
         for topic, wanted in self._panel.publications().items():
             self._check_published(topic, wanted)
-        calls = {w.service: w.type for w in self._panel.widgets() if isinstance(w, Call)}
+        calls = {w.service: w.type for w in self._panel.senders() if isinstance(w, Call)}
         for name, wanted in calls.items():
             self._check_server("service", name, wanted, self._behind.services(name))
         for name, wanted in self._panel.actions().items():

@@ -46,6 +46,7 @@ from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
+from app.panel.widgets.switch import confirms_of, parts_of
 from app.panel.widgets.templated import is_stop
 from app.pictures import picture_files
 
@@ -144,6 +145,10 @@ class Panel(Description):
         for page in self.pages:
             yield from page.widgets
         yield from self.frame_widgets
+
+    def senders(self) -> Iterator[Command]:
+        """The commands that send something: those of a switch in its place."""
+        return (part for command in self.commands for part in parts_of(command))
 
     def widget(self, widget_id: str, kind: type[Kind]) -> Kind:
         """The widget of a kind with this id; NotFound for every other id."""
@@ -250,8 +255,7 @@ class Panel(Description):
 
     def confirmations(self) -> Iterator[Confirm]:
         """The topics that confirm commands."""
-        presses = (widget for widget in self.widgets() if isinstance(widget, PublishPress))
-        yield from (press.confirm for press in presses if press.confirm is not None)
+        return (confirm for command in self.commands for confirm in confirms_of(command))
 
     def monitored(self) -> Iterator[TopicSource]:
         """What conditions, alarms and displays listen to."""
@@ -278,7 +282,7 @@ class Panel(Description):
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""
-        return {w.topic: w.type for w in self.widgets() if isinstance(w, PublishCommand)}
+        return {w.topic: w.type for w in self.senders() if isinstance(w, PublishCommand)}
 
     @cached_property
     def adaptive_topics(self) -> frozenset[str]:
@@ -291,6 +295,6 @@ class Panel(Description):
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, the same in all places of the panel file."""
-        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}
+        named = {w.topic: w.qos for w in self.senders() if isinstance(w, TopicWidget)}
         named |= {source.topic: source.qos for source in self.monitored()}
         return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())

@@ -10,7 +10,7 @@ from app.panel.widgets.service_action import ServerCommand
 def used_names(panel: Panel) -> Mapping[Use, Mapping[str, str]]:
     """Use → name → type. A topic is one that the panel listens to, a publication one that it
     publishes."""
-    servers = [widget for widget in panel.widgets() if isinstance(widget, ServerCommand)]
+    servers = [widget for widget in panel.senders() if isinstance(widget, ServerCommand)]
     return {
         "topic": panel.listened(),
         "publication": panel.publications(),

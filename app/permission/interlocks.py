@@ -23,6 +23,7 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
 from app.permission.conditions import (
     ConditionState,
     condition_state,
@@ -206,6 +207,7 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
 COMMAND_CHECKS: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
     PublishCommand: lambda command, robot, _: publish_blocked(command, robot),
     Step: step_blocked,
+    Switch: lambda switch, robot, now: command_blocked(switch.parts[0], robot, now),
     ServerCommand: call_blocked,
     Parameter: lambda parameter, robot, _: set_blocked(parameter, robot),
 }

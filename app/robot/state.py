@@ -106,6 +106,7 @@ class RobotState:
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
         self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic
+        self.switched_to: dict[str, bool] = {}  # by switch id: the position that was sent last
         self.alarm_actions: tuple[AlarmAction, ...] = ()
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self.alarmed = NO_ALARMED

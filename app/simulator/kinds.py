@@ -30,6 +30,7 @@ from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call, ServerCommand
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
 
@@ -238,6 +239,12 @@ def _stepped(widget: Step, interfaces: Interfaces) -> Iterator[Need]:
     yield Shown(topic=source.topic, type=source.type, field=source.field, low=middle, high=middle)
 
 
+def _switched(switch: Switch, interfaces: Interfaces) -> Iterator[Need]:
+    for part in switch.parts:
+        yield from needs_of(part, interfaces)
+    yield replace(_of_field(switch.reported), values=(switch.off_value, switch.on_value))
+
+
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
     if command.server_role == "SS":
         yield Served(service=command.server_name, type=command.type)
@@ -284,6 +291,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     PublishCommand: _published,
     PublishPress: _pressed,
     Step: _stepped,
+    Switch: _switched,
     ServerCommand: _server,
     Call: _call,
     Action: _action,

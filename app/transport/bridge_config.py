@@ -31,7 +31,7 @@ class BridgeOptions:
 
 def allowed(panel: Panel) -> dict[str, list[str]]:
     """The names that the bridge must allow, by kind of endpoint, as the robot's nodes have them."""
-    servers = [w for w in panel.widgets() if isinstance(w, ServerCommand)]
+    servers = [w for w in panel.senders() if isinstance(w, ServerCommand)]
     nodes = {widget.node for widget in panel.parameters()}
     services = {w.service for w in servers if isinstance(w, Call)}
     services |= {f"{node}/{service}" for node in nodes for service, _ in (GET, DESCRIBE, SET)}
@@ -50,7 +50,7 @@ def timeouts(panel: Panel) -> tuple[dict[str, float], dict[str, float]]:
     """Services and actions with a longer timeout than the bridge's default, by name in seconds."""
     services: dict[str, float] = {}
     actions: dict[str, float] = {}
-    for widget in panel.widgets():
+    for widget in panel.senders():
         if isinstance(widget, Call) and widget.timeout_s > TIMEOUT_S:
             services[widget.service] = max(widget.timeout_s, services.get(widget.service, 0))
         elif isinstance(widget, Action) and widget.timeout_s > TIMEOUT_S:

@@ -69,7 +69,7 @@ def _latched(panel: Panel, robot: RobotState) -> Iterator[str]:
 
 
 def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
-    for widget in panel.widgets():
+    for widget in panel.senders():
         if isinstance(widget, Call):
             yield robot.key(widget.service), widget.type
     for action, name in panel.actions().items():

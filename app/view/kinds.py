@@ -25,6 +25,7 @@ from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
 from app.permission.verdict import PERMITTED, Verdict
@@ -42,6 +43,7 @@ from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
 from app.view.sequence_values import sequence
 from app.view.step_values import step
+from app.view.switch_values import switch
 from app.view.table_values import table
 from app.view.trend_values import trend
 
@@ -147,6 +149,12 @@ def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> A
     return pressed | reported, until
 
 
+def _switched(widget: Switch, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
+    pressed, _ = _pressed(widget, robot, verdict, now)
+    reported, until = switch(widget, robot, now)
+    return pressed | reported, until
+
+
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: lambda widget, robot, verdict, now: ({}, math.inf),
     Input: lambda widget, robot, verdict, now: ({}, math.inf),
@@ -154,6 +162,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     PressCommand: _pressed,
     PublishPress: _published,
     Step: _stepped,
+    Switch: _switched,
     HoldCommand: _held,
     Parameter: _parameter,
     Display: lambda widget, robot, verdict, now: value(widget, robot, now),

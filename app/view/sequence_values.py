@@ -1,7 +1,7 @@
 """What a sequence of steps shows: pure, from (widget, robot, time)."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import repeat
@@ -18,6 +18,12 @@ from app.view.display_values import FieldState, field_state, shown_value
 
 StepState = Literal["done", "now", "next", "past"]
 States = tuple[StepState, ...]
+WORDS: Final[Mapping[StepState, str]] = {
+    "done": "sequence_done",
+    "now": "sequence_now",
+    "next": "sequence_next",
+    "past": "sequence_past",
+}
 DONE: Final[StepState] = "done"
 NEXT: Final[StepState] = "next"
 NO_FAULT: Final = FieldState("live", "")
@@ -165,7 +171,7 @@ def _shown(
                 "text": steps.texts[number],
                 "note": steps.steps[number].note or "",
                 "state": states[number],
-                "word": say(f"sequence_{states[number]}"),
+                "word": say(WORDS[states[number]]),
             }
             for number in window
         ],

@@ -32,6 +32,7 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "action.action": ("action name", TOPIC.pattern),
     "node": ("node name", TOPIC.pattern),
     "type": ("message type", MESSAGE_TYPE.pattern),
+    "switch.type": ("message or service type", ""),
     "call.type": ("service type", SERVICE_TYPE.pattern),
     "action.type": ("action type", ACTION_TYPE.pattern),
     "parameter.type": ("", ""),

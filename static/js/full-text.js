@@ -17,7 +17,9 @@ let timer = 0;
 let looks = 0; // at the server: only the answer to the last one counts
 
 /** @param {HTMLElement} key */
-const isLocked = (key) => key.dataset.enabled === "false" || key.querySelector("button")?.disabled === true;
+function isLocked(key) {
+  return key.dataset.enabled ? key.dataset.enabled === "false" : key.querySelector("button")?.disabled === true;
+}
 
 const isOpen = () => sheet.matches(":popover-open");
 
@@ -139,10 +141,10 @@ function markAll() {
   for (const { key, cut } of keys) showMore(key, cut);
 }
 
-// A key, or a step, whose two keys have one text between them.
+// A key, or a step or a switch, whose two keys have one text.
 /** @param {HTMLElement} key */
 function equip(key) {
-  const face = find(key, ".face, .reported");
+  const face = find(key, ".face, .reported, .told");
   const more = copyOf(find(document, "template#more"));
   more.setAttribute("aria-describedby", find(key, "button").getAttribute("aria-describedby") ?? "");
   more.addEventListener("blur", () => mark(key));
@@ -158,7 +160,7 @@ function equip(key) {
   });
 }
 
-for (const key of document.querySelectorAll('.key, [data-kind="step"]')) equip(key);
+for (const key of document.querySelectorAll('.key, [data-kind="step"], [data-kind="switch"]')) equip(key);
 
 sheet.addEventListener("beforetoggle", ({ newState }) => newState === "closed" && release());
 find(sheet, ".close").addEventListener("click", close);

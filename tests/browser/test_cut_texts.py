@@ -15,11 +15,12 @@ from tests.support.servers import ready
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280))
 PANELS: Final = (SHIPPED, ROOT / "docs/examples/palletizer.toml")
 # Texts beyond the box that cuts them, and tabs that are broken inside a word. Left out: what a touch
-# shows whole (reasons and receipts), a title beside a long state, limits and switches of narrow inputs,
-# words of gauges, cells of tables.
+# shows whole (reasons and receipts), a title beside a long state, limits of parameters, switches of
+# narrow inputs, words of gauges, cells of tables.
 CUT: Final = """() => {
   const LEFT_OUT =
-    "h1, .why, .reasons, .receipt, .result, .limits, .switch, .said, td, script, template";
+    "h1, .why, .reasons, .receipt, .result, [data-kind=parameter] .limits, .switch, .said, td, " +
+    "script, template";
   const found = [];
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   const rects = (element) => {

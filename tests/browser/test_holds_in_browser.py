@@ -188,11 +188,14 @@ def test_long_touch_holds_and_shows_its_duration(finger: Finger, jogger: RosNode
         finger.down()
         finger.page.wait_for_timeout(1500)
         state, pressed = finger.state, finger.button.get_attribute("aria-pressed")
+        seconds = finger.page.locator(".held-for").inner_text()
         colour = finger.button.evaluate("(button) => getComputedStyle(button).backgroundColor")
         finger.up()
         until(partial(has_ended, finger.server, ends), "it ends")
         if codes(finger.server)[ends] == "hold_released":
             break
     assert (state, pressed, colour) == ("held", "true", "rgb(18, 23, 27)")
+    assert re.fullmatch(r"[1-9]\.[05] s", seconds), seconds
+    expect(finger.page.locator(".held-for")).to_be_empty()
     assert finger.page.evaluate("() => getSelection().toString()") == ""
     expect(finger.page.locator("#receipt-jog")).to_contain_text(re.compile(r"after 1\.[4-9] s|after 2"))

@@ -33,6 +33,7 @@ from app.panel.widgets.families import (
 from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.switch import parts_of
 from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
 
 
@@ -238,8 +239,8 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
         if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())
             places.extend(at)
-        if isinstance(widget, TopicWidget) and not isinstance(widget, DisplayWidget):
-            places.append((place, widget))
+        for part in parts_of(widget)[:1] if isinstance(widget, Command) else ():
+            places += [(place, part)] if isinstance(part, TopicWidget) else []
         if isinstance(widget, PublishPress) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
     firsts: dict[str, tuple[str, Condition | TopicWidget | TopicSource | Confirm]] = {}

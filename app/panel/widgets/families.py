@@ -79,12 +79,9 @@ class BaseWidget(Description):
     grow: bool = False
     kind: str
 
-    # Why a key is required, if that is not obvious.
-    why_needed: ClassVar[Mapping[str, str]] = {}
-    # The types that the server needs for this kind.
-    required_types: ClassVar[tuple[str, ...]] = ()
-    # Whether the frame around the pages may have it.
-    allowed_in_frame: ClassVar[bool] = False
+    why_needed: ClassVar[Mapping[str, str]] = {}  # why a key is required, if that is not obvious
+    required_types: ClassVar[tuple[str, ...]] = ()  # that the server needs for this kind
+    allowed_in_frame: ClassVar[bool] = False  # whether the frame around the pages may have it
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         """Faults of a widget whose keys and types are valid; `place` is its place in the panel file."""
@@ -143,8 +140,7 @@ class Input(EntryWidget):
         return value
 
     def describe_value(self, value: Any, *, narrow: bool) -> str:
-        """The text for a `value` that does not fit its field; `narrow`: only the value is out of range,
-        the type fits."""
+        """The text for a `value` that does not fit its field; `narrow`: only its range does not fit."""
         return format_value(value) if narrow else self.value_description
 
 

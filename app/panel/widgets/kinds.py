@@ -28,6 +28,7 @@ from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.static import PageLink, Picture, TextLabel
 from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.tiles import Tile
 from app.panel.widgets.trend import Trend
@@ -60,6 +61,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
     "hold": WidgetKind(Hold, tiles.KEY, styles=(), script=True),
     "step": WidgetKind(Step, tiles.STEP, styles=("own",), script=True),
+    "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries", "own"), script=True),
     "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script=True),
     "call": WidgetKind(Call, tiles.KEY, styles=(), script=False),
     "action": WidgetKind(Action, tiles.ACTION, styles=(), script=False),

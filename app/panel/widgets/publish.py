@@ -69,7 +69,7 @@ class SinglePublish(PublishPress):
 
     def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.confirm is not None:
-            yield from _confirm_faults(f"{place}.confirm", self.confirm, checking)
+            yield from confirm_faults(f"{place}.confirm", self.confirm, checking)
         elif self.one_shot:
             message = "needs `confirm`: without it the panel does not know when the command is done"
             yield Fault(f"{place}.one_shot", message)
@@ -79,7 +79,8 @@ class Publish(SinglePublish):
     kind: Literal["publish"]
 
 
-def _confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Iterator[Fault]:
+def confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Iterator[Fault]:
+    """Faults of the table at `place` that says what confirms a command."""
     known = confirm.type or checking.types.get(confirm.topic)
     if known is None:
         message = f"is missing: nothing else in the panel says what {confirm.topic} is"

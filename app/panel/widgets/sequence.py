@@ -105,7 +105,7 @@ class Sequence(DisplayWidget):
     @property
     def has_picture(self) -> bool:
         """Whether it has a place for pictures."""
-        return bool(self.picture or self.alarms) or any(step.picture for _, step in self.all_steps)
+        return self.picture is not None or any(step.picture for _, step in self.all_steps)
 
     @property
     def values(self) -> tuple[Any, ...]:

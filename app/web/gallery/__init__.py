@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from app.web.gallery.controls import ACTIONS, JOYSTICKS, KEYS, ROLES, STEPS
+from app.web.gallery.controls import ACTIONS, JOYSTICKS, KEYS, ROLES, STEPS, SWITCHES
 from app.web.gallery.displays import CAMERAS, LAMPS, LOGS, READOUTS
 from app.web.gallery.examples import Part
 from app.web.gallery.indicators import CHECKS, FIGURES, GAUGES, JOINT_ROWS, PALLETS, TABLES
@@ -26,6 +26,7 @@ PARTS: Final = (
     Part("Inputs", 3, INPUTS),
     Part("Parameters", 3, PARAMETERS),
     Part("Steps", 3, STEPS),
+    Part("Switches", 3, SWITCHES),
     Part("Joysticks", 4, JOYSTICKS),
     Part("Cameras", 3, CAMERAS),
     Part("Logs", 2, LOGS),

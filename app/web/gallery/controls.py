@@ -138,6 +138,44 @@ STEPS: Final = (
         for state, note in NOT_LIVE.items()
     ),
 )
+SWITCH: Final[Table] = {
+    "label": texts.LIGHT.table,
+    "service": "/light",
+    "type": "std_srvs/srv/SetBool",
+    "on_request": {"data": True},
+    "off_request": {"data": False},
+    "reported": {"topic": "/light_is_on", "type": "std_msgs/msg/Bool"},
+    "interlock": "automatic",
+}
+SWITCHED: Final[Table] = STEPPED | {"note": "", "at": "on", "text": say("on"), "awaited": ""}
+UNKNOWN_AT: Final[Table] = {"at": "", "text": say("condition_unknown")}
+SWITCHES: Final = (
+    Example("on", "switch", SWITCH, SWITCHED),
+    Example("off", "switch", SWITCH, SWITCHED | {"at": "off", "text": say("off")}),
+    Example("locked", "switch", SWITCH, SWITCHED | LOCKED),
+    Example(
+        "sent, waiting",
+        "switch",
+        SWITCH,
+        SWITCHED
+        | {"enabled": False, "reason": say("press_in_progress"), "busy": True, "awaited": "off"}
+        | {"result": say("confirmation_waiting", topic="/light_is_on")},
+    ),
+    Example(
+        "not reported",
+        "switch",
+        SWITCH,
+        SWITCHED
+        | {
+            "outcome": "unknown",
+            "result": say("confirmation_missing", topic="/light_is_on", seconds="2"),
+        },
+    ),
+    *(
+        Example(state, "switch", SWITCH, SWITCHED | UNKNOWN_AT | {"state": state, "note": note})
+        for state, note in NOT_LIVE.items()
+    ),
+)
 JOYSTICK: Final[Table] = {
     "label": texts.DRIVE.table,
     "topic": "/cmd_vel",
