@@ -11,8 +11,9 @@ from typing import Final
 
 from app.alarms.entries import AlarmEntry
 from app.alarms.evaluation import levels_of, read_alarm
+from app.alarms.first_out import FirstOut
 from app.alarms.instance import AlarmInstance, Definition, Transition, define
-from app.alarms.records import entry_in, status_in
+from app.alarms.records import entry_in, leader_in, status_in
 from app.alarms.source_watch import SourceWatch
 from app.alarms.sources import read_suppression
 from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level, update_suppression
@@ -51,6 +52,7 @@ class AlarmEngine:
         self._entries: dict[tuple[str, str], list[AlarmInstance]] = {}  # by the same
         self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
         self._watch = SourceWatch()
+        self._first_out = FirstOut(panel.alarm_rules.first_out_s)
         self._refused = 0  # entries beyond `MAX_ENTRIES`
         self.alarms: dict[str, AlarmInstance] = {}
         self._lock_changes = 0
@@ -251,13 +253,13 @@ class AlarmEngine:
                 missing.append(alarm_id)
             elif not alarm.status.occurrence:  # else it was raised before the disk was read
                 alarm.restore(status_in(record, now))
+                alarm.leader = leader_in(record)
                 self._waiting[alarm_id] = None
         return missing
 
     def _restored_entry(self, alarm_id: str, record: str) -> AlarmInstance | None:
         entry = entry_in(record)
-        candidates = self._sources.values()
-        source = next((s for s in candidates if alarm_id.startswith(f"{s.id}:")), None)
+        source = next((s for s in self._sources.values() if alarm_id.startswith(f"{s.id}:")), None)
         if entry is None or source is None:
             return None
         alarm = self._new_entry(source.of_entry(entry))
@@ -288,6 +290,7 @@ class AlarmEngine:
         self, alarm: AlarmInstance, before: AlarmStatus, now: Moment, act: str = "", actor: str = ""
     ) -> Transition:
         self._seq += 1
+        self._first_out.update(alarm, before, now, self.alarms)
         return Transition(
             self._seq, now, alarm.definition.id, before, alarm.status, act, actor, alarm.value
         )

@@ -109,9 +109,9 @@ def read_page(path: Path | None, wanted: HistoryFilter, limit: int) -> HistoryPa
 
 
 @contextmanager
-def reading(path: Path | None) -> Iterator[sqlite3.Connection]:
+def reading(path: Path | None, longest_s: float = LONGEST_SEARCH_S) -> Iterator[sqlite3.Connection]:
     """A connection that only reads, to an empty history without a file; errors as `read_history`."""
-    end = time.monotonic() + LONGEST_SEARCH_S
+    end = time.monotonic() + longest_s
     name = f"{path.as_uri()}?mode=ro" if path and path.exists() else ":memory:"
     try:
         with as_log_error(), closing(sqlite3.connect(name, uri=True, timeout=5.0)) as db:

@@ -59,10 +59,19 @@ def _define(alarm: Alarm, robot: str) -> Definition:
     )
 
 
+class Leader(NamedTuple):
+    """An alarm that another one follows: it was raised `after_s` seconds before that."""
+
+    id: str
+    text: TextLike
+    after_s: float
+
+
 @dataclass(slots=True)
 class AlarmInstance:
     """`value` is the last one of its field, `limit` the last limit that it exceeded. `entry` is what
-    the robot published, for diagnostics and lists, and `heard_at` when. `due` is when time alone
+    the robot published, for diagnostics and lists, and `heard_at` when. `leader` is the alarm of its
+    group that it followed when it was raised, None if there was none. `due` is when time alone
     changes it, and `timer` when the engine looks at that. All in monotonic seconds."""
 
     definition: Definition
@@ -72,6 +81,7 @@ class AlarmInstance:
     limit: float | None = None
     entry: AlarmEntry | None = None
     heard_at: float = -math.inf
+    leader: Leader | None = None
     is_evaluated: bool = False
     due: float = math.inf
     timer: float = math.inf

@@ -8,7 +8,7 @@ from typing import Any
 from app.alarms.entries import AlarmEntry
 from app.alarms.event_names import event_of, lasted
 from app.alarms.history import HistoryRow
-from app.alarms.instance import AlarmInstance, Transition
+from app.alarms.instance import AlarmInstance, Leader, Transition
 from app.alarms.rows import state_of
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, TakenOut
@@ -38,6 +38,12 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
             "unit": _as_json(described.unit),
         },
     }
+    if (leader := alarm.leader) is not None:
+        record["leader"] = {
+            "id": leader.id,
+            "text": _as_json(leader.text),
+            "after_s": round(leader.after_s, 3),
+        }
     if entry is not None:
         record["entry"] = {
             "name": entry.name,
@@ -105,6 +111,12 @@ def entry_in(record: str) -> AlarmEntry | None:
     text, cause, consequence, action = (text_of(values.get(key, "")) for key in keys)
     name, priorities = values["name"], tuple(values["priorities"])
     return AlarmEntry(name, int(values["level"]), text, priorities, cause, consequence, action)
+
+
+def leader_in(record: str) -> Leader | None:
+    """The alarm that it followed; None if it followed none."""
+    values = json.loads(record).get("leader")
+    return values and Leader(values["id"], text_of(values["text"]), float(values["after_s"]))
 
 
 def _wall(moment: Moment | None) -> float | None:

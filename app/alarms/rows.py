@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final, Literal, TypedDict
 
-from app.alarms.instance import AlarmInstance
+from app.alarms.instance import AlarmInstance, Leader
 from app.alarms.states import State
 from app.alarms.status import HIGH, AlarmStatus, Moment, TakenOut
 from app.clock import format_time, iso_time
@@ -58,7 +58,8 @@ class AlarmRow(TypedDict):
     if its source were known. `since` (RFC 3339) is when it was raised, "" if it was not. `value` is
     that of its last change, null without one; `limit` the limit that it exceeds. `details` are key
     values of a diagnostic status. `acts` are the acts that are possible now. `follows` is the id of the
-    alarm of its group that was raised first, "" for none. `order` sorts rows: the most urgent first.
+    alarm of its group that was raised first, "" for none, and `follows_text` says how long before.
+    `order` sorts rows: the most urgent first.
     Keys that end with `_text` are for people."""
 
     id: str
@@ -91,14 +92,15 @@ class AlarmRow(TypedDict):
     out_of_service: TakenOutRow | None
     acts: list[str]
     follows: str
+    follows_text: TextLike
     order: list[float]
 
 
-def row_of(alarm: AlarmInstance, now: Moment, follows: str = "") -> AlarmRow:
+def row_of(alarm: AlarmInstance, now: Moment) -> AlarmRow:
     """The row of an alarm as it is now."""
     status, definition = alarm.status, alarm.definition
     described, entry, raised_at = definition.alarm, alarm.entry, status.raised_at
-    limit = alarm.limit
+    limit, leader = alarm.limit, alarm.leader
     return AlarmRow(
         id=definition.id,
         robot=definition.robot,
@@ -129,7 +131,8 @@ def row_of(alarm: AlarmInstance, now: Moment, follows: str = "") -> AlarmRow:
         shelf=_taken_out(status.shelf, now),
         out_of_service=_taken_out(status.out_of_service, now),
         acts=list(_acts(alarm)),
-        follows=follows,
+        follows=leader.id if leader else "",
+        follows_text=_follows(leader) if leader else "",
         order=_order(alarm),
     )
 
@@ -168,6 +171,10 @@ def _order(alarm: AlarmInstance) -> list[float]:
     first, by priority, then the newest."""
     acknowledged, priority, raised = alarm.order
     return [int(alarm.status.override is not None), int(acknowledged), priority, raised]
+
+
+def _follows(leader: Leader) -> TextLike:
+    return say("alarms_follows_after", seconds=number(f"{leader.after_s:.1f}", "s"), name=leader.text)
 
 
 def _number(alarm: AlarmInstance, value: float | None) -> TextLike:

@@ -227,11 +227,13 @@ class Alarm(Description):
 
 class AlarmRules(Description):
     """The table `[alarms]`. `panel`: the panel raises alarms of its own. `low_screens`: what shows
-    alarms on pages of low screens. The oldest entries of the history are removed after `days`, or when
-    the file is larger than `size_mb` megabytes."""
+    alarms on pages of low screens. Alarms of a group that are raised within `first_out_s` of the first
+    follow it. The oldest entries of the history are removed after `days`, or when the file is larger
+    than `size_mb` megabytes."""
 
     panel: bool = True
     disk_free_mb: Annotated[float, Field(ge=1, le=1_000_000, allow_inf_nan=False)] = 500.0
     low_screens: Literal["line", "badge"] = "line"
+    first_out_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 2.0
     days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
     size_mb: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 64.0

@@ -139,6 +139,7 @@ class AlarmAnswer(BaseModel):
     out_of_service: TakenOutAnswer | None
     acts: list[str]
     follows: str
+    follows_text: str
     order: list[float]
 
 

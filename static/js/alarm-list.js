@@ -1,7 +1,16 @@
 // The list on the page of alarms: a row for each alarm, kept in the server's order.
 import { copyOf, find, setText } from "./show.js";
 
-const TEXTS = ["priority_text", "state_text", "since_text", "text", "group", "value_text", "limit_text"];
+const TEXTS = [
+  "priority_text",
+  "state_text",
+  "since_text",
+  "text",
+  "group",
+  "follows_text",
+  "value_text",
+  "limit_text",
+];
 
 /** @type {Map<string, Data>} */
 const rows = new Map();
@@ -17,10 +26,12 @@ export function showRows(alarms, isSnapshot) {
   }
   const shown = new Map([...list.querySelectorAll("li")].map((item) => [item.dataset.alarm ?? "", item]));
   for (const [id, item] of shown) if (!rows.has(id)) item.remove();
+  const firsts = new Set([...rows.values()].map(({ follows }) => follows));
   let next = list.firstElementChild;
   for (const row of [...rows.values()].sort(compare)) {
     const item = shown.get(row.id) ?? copyOf(find(document, "template#alarm-row"));
     showRow(item, row);
+    item.dataset.first = String(firsts.has(row.id));
     if (item === next) next = item.nextElementSibling;
     else list.insertBefore(item, next);
   }

@@ -38,6 +38,22 @@ def written(folder: Path, now: float) -> None:
     store.close()
 
 
+def chatter(folder: Path, at: float) -> None:
+    """An alarm that was raised five times in 40 s, for 2 s each."""
+    store = AlarmStore(folder / NAME, days=1000, size_mb=64)
+    record = json.dumps({"about": {"text": "Infeed full", "group": "Belt"}})
+    for n in range(5):
+        times = ((at + 10.0 * n, "raised", None), (at + 10.0 * n + 2.0, "returned", 2.0))
+        store.write(
+            [
+                HistoryRow(when, "infeed", "active", 1, "", "", record, event, 3, "", "Belt", lasted)
+                for when, event, lasted in times
+            ],
+            {},
+        )
+    store.close()
+
+
 @pytest.fixture
 def cell(tmp_path: Path) -> Iterator[Server]:
     data = tmp_path / "data"
@@ -85,7 +101,7 @@ def test_events_are_found_by_text_priority_group_and_time(cell: Server, without_
     page.get_by_label("Group").select_option(label="Air")
     page.get_by_label("Priority").select_option(label="Low")
     page.get_by_role("button", name="Show").click()
-    expect(page.locator(".empty")).to_have_text("No event has this.")
+    expect(page.locator(".entries .empty")).to_have_text("No event has this.")
     page.get_by_label("Priority").select_option(label="all")
     page.get_by_role("button", name="Show").click()
     assert shown(page)[:2] == ["pump119", "pump117"]
@@ -93,6 +109,7 @@ def test_events_are_found_by_text_priority_group_and_time(cell: Server, without_
     assert shown(page) == ["pump119", "pump117", "pump115", "pump113", "pump111", "pump11"]
     since = time.strftime("%Y-%m-%dT%H:%M", time.localtime(time.time() - 600))
     page.get_by_label("Text").fill("")
+    page.locator(".times summary").click()
     page.get_by_label("From").fill(since)
     page.get_by_role("button", name="Show").click()
     assert all(int(str(name)[4:]) >= 109 for name in shown(page))
@@ -115,3 +132,32 @@ def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page
         sized(axe_page, width, height).evaluate(DRAWN)
         assert axe_page.evaluate("document.documentElement.scrollWidth") == width
         assert violations(axe_page) == [], width
+
+
+def test_the_page_has_the_figures_of_the_chosen_time(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms/history")
+    figures = page.locator(".alarm-figures")
+    expect(figures).to_contain_text(re.compile("Alarms per hour, limit 6\\s*5\\s*most"))
+    expect(figures.locator("[data-over]")).to_contain_text("most 11, over the limit")
+    assert page.locator(".alarm-plot rect").count() in (24, 25)
+    expect(page.locator(".ranking ol li")).to_have_count(10)
+    expect(page.locator(".ranking")).to_contain_text("10 of 120")
+    expect(page.locator(".ranking")).to_contain_text("No alarm chatters.")
+    page.locator(".ranking ol a").first.click()
+    assert len(shown(page)) == 1
+    page.get_by_role("link", name="Show all alarms").click()
+    page.get_by_role("link", name="7 days").click()
+    expect(page.locator(".plot-head").first).to_contain_text("Raised in each day")
+    assert page.locator(".alarm-plot rect").count() in (7, 8)
+
+
+def test_an_alarm_that_chatters_is_shown_with_its_delay(tmp_path: Path, page: Page) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    chatter(data, time.time() - 600)
+    with server_with(tmp_path, HEALTHY, data=data) as server:
+        started(page, f"{server.url}/alarms/history")
+        row = page.locator("[data-chatters=infeed]")
+        expect(row).to_contain_text("5 in 40 s at ")
+        expect(row).to_contain_text("off_delay_s = 9 would leave 1.")
+        expect(row).to_contain_text("on_delay_s = 3 would leave 0.")

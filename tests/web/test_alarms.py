@@ -317,3 +317,35 @@ values = ["RUNNING"]
         assert server.snapshot()["widgets"]["machine_state"]["colour"] == "red"
         until(lambda: says("Running"), "the alarm is latched, and no longer active")
         assert listed(server)["air_latched"]["state"] == "latched"
+
+
+def test_figures_of_the_history_are_json(cell: Server) -> None:
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    figures = cell.http.get("/alarms/figures?span=24h", headers={"accept-language": "ja"}).json()
+    assert (figures["raised"], figures["worst_10_min"], figures["standing_24_h"]) == (2, 2, 0)
+    assert figures["by_priority"] == {"1": 1, "2": 1, "3": 0, "4": 0}
+    assert figures["per_hour"] == pytest.approx(2 / 24)
+    assert figures["acknowledge_median_s"] > 0
+    assert sum(figures["by_hour"].values()) == 2
+    assert {(row["id"], row["raised"], row["share"]) for row in figures["top"]} == {
+        ("air_low", 1, 0.5),
+        ("air_latched", 1, 0.5),
+    }
+    assert "空気圧低下" in {row["text"] for row in figures["top"]}
+    assert figures["chattering"] == []
+    past = cell.http.get("/alarms/figures?until=2020-01-01T00:00").json()
+    assert (past["raised"], past["top"]) == (0, [])
+    described = cell.http.get("/openapi.json").json()["components"]["schemas"]["FiguresAnswer"]
+    assert set(figures) == set(described["properties"])
+
+
+def test_an_alarm_that_follows_another_of_its_group_says_so(tmp_path: Path) -> None:
+    panel = PANEL.replace('text = "Air was lost"', 'text = "Air was lost"\ngroup = "Air"')
+    with demo_server(tmp_path, panel % LOW) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        first, second = sorted(listed(server).values(), key=lambda alarm: alarm["follows"])
+        assert (first["follows"], second["follows"]) == ("", first["id"])
+        assert second["follows_text"].endswith(f"s after {first['text']}")
+        page = server.http.get("/alarms", headers={"accept": "text/html"}).text
+        assert f'data-alarm="{first["id"]}"' in page
+        assert page.count('data-first="true"') == 1

@@ -2,17 +2,20 @@
 
 import math
 import time
+from collections.abc import Callable
 from typing import Annotated, Final, Literal, TypedDict
 from urllib.parse import urlencode
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.alarms.figures import Figures
 from app.alarms.history import NEWEST, HistoryFilter, HistoryPage
 from app.alarms.rows import PRIORITY_WORDS
 from app.i18n import Text, TextLike, number, say
 from app.panel.model import Panel
 from app.printable import printable_texts
 from app.web.rendering.alarm_events import ShownEvent, events_by_day, shown_events
+from app.web.rendering.alarm_figures import FiguresContext, figures_context
 from app.web.rendering.alarms_page import word
 from app.web.typed_times import TypedTime, typed_ms
 
@@ -22,24 +25,14 @@ Span = Literal["24h", "7d", "30d", "all"]
 SPANS: Final[dict[Span, float]] = {"24h": DAY_S, "7d": 7 * DAY_S, "30d": 30 * DAY_S, "all": math.inf}
 
 
-class HistoryQuery(BaseModel):
-    """What the page shows: the transitions of a `span` up to now, or those from `since` on and before
-    `until` if one of these is there; with `text` in the alarm's id, texts or group or in the name of
-    who acted; of a `priority` (0: all), `group`, `robot` and `alarm`; before the number `before`. `act`
-    is the id of an act whose receipt is shown."""
+class TimesQuery(BaseModel):
+    """A `span` up to now, or the time from `since` on and before `until` if one of these is there."""
 
     model_config = ConfigDict(extra="forbid")
 
     span: Span = "24h"
     since: TypedTime = ""
     until: TypedTime = ""
-    text: Annotated[str, Field(max_length=100)] = ""
-    priority: Annotated[int, Field(ge=0, le=4)] = 0
-    group: Annotated[str, Field(max_length=400)] = ""
-    robot: Annotated[str, Field(max_length=64)] = ""
-    alarm: Annotated[str, Field(max_length=300)] = ""
-    before: Annotated[int, Field(ge=1, lt=NEWEST)] | None = None
-    act: Annotated[str, Field(max_length=400)] = ""
 
     def times(self, now: float) -> tuple[float, float]:
         """From when and to when, in seconds since the epoch; InputError for what is no time."""
@@ -50,6 +43,20 @@ class HistoryQuery(BaseModel):
             -math.inf if since is None else since / 1000,
             math.inf if until is None else until / 1000,
         )
+
+
+class HistoryQuery(TimesQuery):
+    """What the page shows: the transitions of a time, with `text` in the alarm's id, texts or group or
+    in the name of who acted; of a `priority` (0: all), `group`, `robot` and `alarm`; before the number
+    `before`. `act` is the id of an act whose receipt is shown."""
+
+    text: Annotated[str, Field(max_length=100)] = ""
+    priority: Annotated[int, Field(ge=0, le=4)] = 0
+    group: Annotated[str, Field(max_length=400)] = ""
+    robot: Annotated[str, Field(max_length=64)] = ""
+    alarm: Annotated[str, Field(max_length=300)] = ""
+    before: Annotated[int, Field(ge=1, lt=NEWEST)] | None = None
+    act: Annotated[str, Field(max_length=400)] = ""
 
     def filter(self, now: float) -> HistoryFilter:
         return HistoryFilter(
@@ -86,9 +93,13 @@ class HistoryContext(TypedDict):
     newest: str
     query: str
     without_alarm: str
+    of_time: FiguresContext
+    address_of: Callable[[str], str]
 
 
-def history_context(panel: Panel, wanted: HistoryQuery, shown: HistoryPage) -> HistoryContext:
+def history_context(
+    panel: Panel, wanted: HistoryQuery, shown: HistoryPage, figures: Figures
+) -> HistoryContext:
     """The history as it is now."""
     rows = shown.rows[:ROWS_ON_PAGE]
     has_times = bool(wanted.since or wanted.until)
@@ -115,6 +126,8 @@ def history_context(panel: Panel, wanted: HistoryQuery, shown: HistoryPage) -> H
         newest=newest,
         query=newest,
         without_alarm=wanted.address(before=None, alarm=""),
+        of_time=figures_context(figures),
+        address_of=lambda alarm: wanted.address(before=None, alarm=alarm),
     )
 
 

@@ -14,14 +14,15 @@ REASONS: Final = ("maintenance", "repair", "sensor", "known")
 
 class AlarmsContext(TypedDict):
     """The variables of `alarms.html`, beside those of the frame. `chosen` is the alarm whose details
-    are shown, None for none; `gone`: it was asked for and is no longer listed. `leader` is the text of
-    the alarm that it follows."""
+    are shown, None for none; `gone`: it was asked for and is no longer listed. `firsts` are the ids of
+    alarms that others followed, `followers` those that followed the chosen one."""
 
     rows: list[AlarmRow]
     show: Show
     chosen: AlarmRow | None
     gone: bool
-    leader: TextLike
+    firsts: set[str]
+    followers: list[AlarmRow]
     more: TextLike
     steps: list[str]
     reasons: list[Text]
@@ -37,14 +38,14 @@ def alarms_context(state: AppState, show: Show, chosen: str, language: str) -> A
     rows = state.fleet.alarms.rows()
     of_id = {row["id"]: row for row in rows}
     row = of_id.get(chosen)
-    leader = of_id.get(row["follows"]) if row else None
     shown = rows[:MAX_ROWS]
     return AlarmsContext(
         rows=shown,
         show=show,
         chosen=row,
         gone=bool(chosen) and row is None,
-        leader=leader["text"] if leader else "",
+        firsts={follower["follows"] for follower in rows},
+        followers=[follower for follower in rows if follower["follows"] == row["id"]] if row else [],
         more=say("alarms_more", count=number(str(len(rows) - len(shown)))) if rows != shown else "",
         steps=_lines(row["action"], language) if row else [],
         reasons=[word(f"reason_{name}") for name in REASONS],

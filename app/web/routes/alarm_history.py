@@ -1,19 +1,28 @@
-"""The history of alarms as a page with a filter, and as CSV."""
+"""The history of alarms as a page with a filter and figures, and as CSV; the figures as JSON."""
 
 from contextlib import AsyncExitStack
 from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import HTMLResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 
+from app.alarms.figures import Figures, read_figures
 from app.alarms.history import read_page
-from app.web.app_state import CurrentState
+from app.i18n import localized
+from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import set_client_cookie
 from app.web.exported import Exported
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
-from app.web.rendering.alarm_history_page import ROWS_ON_PAGE, HistoryQuery, history_context, now
+from app.web.rendering.alarm_figures import FiguresAnswer, figures_json
+from app.web.rendering.alarm_history_page import (
+    ROWS_ON_PAGE,
+    HistoryQuery,
+    TimesQuery,
+    history_context,
+    now,
+)
 from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import word as log_word
 from app.web.routes.audit_log import page_frame
@@ -32,7 +41,8 @@ async def page(
 ) -> Response:
     read = partial(read_page, wanted=wanted.filter(now()), limit=ROWS_ON_PAGE + 1)
     shown = await state.fleet.alarms.history.read(read)
-    context = history_context(state.fleet.panel, wanted, shown)
+    figures = await read_figures_of(state, wanted)
+    context = history_context(state.fleet.panel, wanted, shown, figures)
     path = f"alarms/history?{wanted.address()}"
     frame, token = page_frame(request, state, word("history_title"), alarms_page=path)
     html = state.templates.render(
@@ -40,6 +50,29 @@ async def page(
     )
     headers = {"cache-control": "no-store"}
     return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+
+
+async def read_figures_of(state: AppState, wanted: TimesQuery) -> Figures:
+    """The figures of a time; LogError, TooMany."""
+    at = now()
+    since, until = wanted.times(at)
+    alarms = state.fleet.alarms
+    delays = {alarm.definition.id: alarm.definition.delays for alarm in alarms.engine.alarms.values()}
+    read = partial(read_figures, since=since, until=until, now=at, delays=delays)
+    return await alarms.history.read(read)
+
+
+@router.get(
+    "/alarms/figures",
+    response_model=FiguresAnswer,
+    summary="Figures of the history of alarms, after EEMUA 191",
+    responses=errors(403, 422, 429, 503),
+)
+async def figures(
+    request: Request, state: CurrentState, wanted: Annotated[TimesQuery, Query()]
+) -> Response:
+    content = localized(figures_json(await read_figures_of(state, wanted)), language_of(request))
+    return JSONResponse(content, headers={"cache-control": "no-store"})
 
 
 @router.get(
