@@ -14,6 +14,7 @@
     ├── RecordingError         –    a recording can't be replayed
     ├── DecodeError            –    bytes are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
+    ├── DoctorError            503  the doctor could not check, or collected no bundle
     └── LogError               503  the operator's log can't be written or read
         ├── SearchTooLong      503  a search takes too long
         ├── LogCorrupt         –    the log's file is damaged; a new one is needed
@@ -183,6 +184,10 @@ class DecodeError(KioskError):
 
 
 class LinkError(KioskError):
+    status = 503
+
+
+class DoctorError(KioskError):
     status = 503
 
 

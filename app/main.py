@@ -29,6 +29,7 @@ from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.repeated_records import RepeatedRecords
 from app.runtime.assembly import check_zenoh, open_fleet, open_log
+from app.runtime.doctor_process import DoctorProcess
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
@@ -48,6 +49,7 @@ from app.web.routes import (
     alarms,
     control,
     description,
+    diagnostics,
     display,
     events,
     frames,
@@ -128,7 +130,16 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    for routes in (*ROBOT_ROUTES, alarms, alarm_history, static, health, display, description):
+    for routes in (
+        *ROBOT_ROUTES,
+        alarms,
+        alarm_history,
+        diagnostics,
+        static,
+        health,
+        display,
+        description,
+    ):
         app.include_router(routes.router)
     if dev:
         _add_gallery(app)
@@ -214,10 +225,21 @@ async def _app_state(
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
-        async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
+        doctor = _doctor(settings, server)
+        async with open_fleet(settings, panel, revision, oplog, in_process, doctor) as fleet:
             metrics = Metrics(fleet, lambda: oplog.left_out, lambda: limits.refused)
             made = PageTemplates(templates, page_parts(panel))
-            yield AppState(fleet, assets, made, metrics, oplog, limits)
+            try:
+                yield AppState(fleet, assets, made, metrics, oplog, limits, doctor)
+            finally:
+                await doctor.stop()
+
+
+def _doctor(settings: Settings, server: ServerConfig | None) -> DoctorProcess:
+    """The doctor, which asks this server where it listens."""
+    if server is None:
+        return DoctorProcess(settings)
+    return DoctorProcess(settings, server.host, server.port)
 
 
 async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:

@@ -16,7 +16,16 @@ from typing import Any, Final, Literal, NamedTuple, Self
 from app.i18n import ENGLISH, TextLike, render, text_in
 
 Kind = Literal[
-    "began", "pressed", "closed", "corrected", "refused", "control", "alarm", "removed", "resumed"
+    "began",
+    "pressed",
+    "closed",
+    "corrected",
+    "refused",
+    "control",
+    "alarm",
+    "diagnostics",
+    "removed",
+    "resumed",
 ]
 
 LONGEST_VALUES: Final = 2000

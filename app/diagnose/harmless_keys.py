@@ -40,7 +40,10 @@ _PANEL_TEXTS: Final = """
     template text title unit value values
 """
 PANEL: Final = rules(
-    ("page widget group robot frame screen control record qos confirm sort column pen", None),
+    (
+        "page widget group robot frame screen control diagnostics record qos confirm sort column pen",
+        None,
+    ),
     ("joint states x_axis y_axis", None),
     (_NUMBERS, NUMBER),
     ("step", NUMBER),

@@ -30,7 +30,7 @@ from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
 from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
-from app.panel.rules import BrandRules, ControlRules, EmbedRules, LogRules, RecordRules
+from app.panel.rules import BrandRules, ControlRules, DiagnosticRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.stories import StoryName
 from app.panel.texts import panel_texts
@@ -100,6 +100,7 @@ class Panel(Description):
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
+    diagnostics: DiagnosticRules = DiagnosticRules()
     demo_story: StoryName | None = None
     demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
     alarm_rules: AlarmRules = Field(AlarmRules(), alias="alarms")

@@ -1,4 +1,5 @@
-"""The tables `[brand]`, `[control]`, `[embed]`, `[log]` and `[record]` of a panel file."""
+"""The tables `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]` and `[record]` of a panel
+file."""
 
 from typing import Annotated, Final
 
@@ -43,6 +44,12 @@ class EmbedRules(Description):
 
     origins: Annotated[tuple[Origin, ...], Field(strict=False, max_length=20)] = ()
     controls: bool = False
+
+
+class DiagnosticRules(Description):
+    """Whether the panel has the page of diagnostics."""
+
+    enabled: bool = True
 
 
 class LogRules(Description):

@@ -33,6 +33,7 @@ from app.robot.log_lines import LogLines
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.replayed import ReplayedMessages
+from app.robot.round_trips import RoundTrips
 from app.robot.sample import Buffer as Buffer
 from app.robot.sample import Sample as Sample
 from app.robot.sample import SkippedPayload as SkippedPayload
@@ -43,6 +44,7 @@ from app.robot.table_entries import TableEntries
 from app.robot.topic_publishers import Publishers, TopicPublishers
 from app.robot.topics import Reading as Reading
 from app.robot.topics import Topic
+from app.robot.traffic import Traffic
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.robot")
@@ -74,13 +76,11 @@ class RobotState:
 
         `on_late_reading` is called with (key, reading) of a message that took more than one turn to
         decode, `on_entries_decoded` with the key of a topic of which the entries in tables changed."""
-        self.dialect = dialect
-        self.traits = traits
+        self.dialect, self.traits = dialect, traits
         self.title: TextLike = entry.name if entry else ""
         self.name = str(self.title)  # for the server's log
         self.namespace = entry.namespace if entry else panel.namespace
-        self.link_up = False
-        self.endpoints = endpoints
+        self.link_up, self.endpoints = False, endpoints
         self.settled_at = math.inf  # monotonic seconds: then a new peer has set up its routes
         self._keys: dict[str, str] = {}  # ROS name → key
         self._shared = {topic: possible_keys(topic, self.namespace) for topic in SHARED_TOPICS}
@@ -115,9 +115,9 @@ class RobotState:
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
         self.presence = EndpointPresence(needed, self.key)
         self.undecodable: Counter[str] = Counter()
+        self.traffic, self.round_trips = Traffic(), RoundTrips()
         self.slices = slices or Slices()
-        self._on_late_reading = on_late_reading
-        self._interfaces = interfaces
+        self._on_late_reading, self._interfaces = on_late_reading, interfaces
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
@@ -295,6 +295,7 @@ class RobotState:
     def count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
         """Counts a sample that can't be decoded; logs at most one of a topic in `UNREADABLE_LOG_S`."""
         self.undecodable[key] += 1
+        self.traffic.record_undecodable(key, sample, error)
         if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
             self._logged_at[key] = sample.at
             self._log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])

@@ -10,6 +10,7 @@ from app.audit import Limits, NullLog, OperatorLog
 from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.panel.widgets.trend import trends_of
+from app.runtime.doctor_process import DoctorProcess
 from app.runtime.fleet import Fleet
 from app.settings import Mode, Settings
 from app.transport.zenoh_config import Config, config_from, config_to
@@ -59,6 +60,7 @@ async def open_fleet(
     revision: str,
     oplog: OperatorLog | NullLog,
     simulated_robot: SimulatedRobot,
+    doctor: DoctorProcess | None = None,
 ) -> AsyncIterator[Fleet]:
     """The robots of the panel, real or simulated. `revision` is that of the page's files."""
     demo = mode_of(settings, panel) == "demo"
@@ -78,6 +80,7 @@ async def open_fleet(
             recordings=recordings,
             simulated=demo,
             root_path=settings.root_path,
+            doctor=doctor,
         )
         trends = _trend_disk(settings, panel, fleet)
         try:

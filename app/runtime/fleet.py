@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
 from app.audit.press_record import Log
+from app.commands.diagnostic_acts import Doctor, NoDoctor
 from app.errors import NotFound
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
@@ -40,6 +41,7 @@ class Fleet:
         recordings: "Recordings | None" = None,
         simulated: bool = False,
         root_path: str = "",
+        doctor: Doctor | None = None,
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
@@ -47,7 +49,15 @@ class Fleet:
         self._sessions: dict[str | None, RobotSession] = {}
         self.alarms = Alarms(panel)
         server = ServerParts(
-            panel, revision, operators_log, recordings, Slices(), simulated, root_path, self.alarms
+            panel,
+            revision,
+            operators_log,
+            recordings,
+            Slices(),
+            simulated,
+            root_path,
+            self.alarms,
+            doctor or NoDoctor(),
         )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]
@@ -101,6 +111,10 @@ class Fleet:
             raise NotFound(f"this panel has {has}: begin with {self.first.base}/")
         known = ", ".join(str(name) for name in self._sessions if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
+
+    def of_robot(self, robot_id: str) -> RobotSession:
+        """The session of the robot with this id; the first for another id, and for a robot without."""
+        return self._sessions.get(robot_id, self.first)
 
     # The protocol `refresh.OtherRobots`, for each robot's session.
 

@@ -108,6 +108,7 @@ class Ingest:
         for key, sample in ordered:
             sample = self._with_peer(sample)
             updates.topics.add(key)
+            self._robot.traffic.record(key, sample)
             if sample.overrun and key in self._interlocks:
                 self._robot.invalidate(key)
                 yield updates.step()

@@ -14,6 +14,7 @@ from typing import Protocol
 from app.alarms.engine import AlarmEngine
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActRunner
+from app.commands.diagnostic_acts import Doctor
 from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
 from app.commands.press_guard import PressGuard
@@ -29,7 +30,9 @@ from app.permission.verdict import Verdict, locked
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.runtime.frames import Frames
+from app.runtime.graph_survey import GraphSurvey
 from app.runtime.ingest import Ingest, SampleListener
+from app.runtime.live_look import LiveLooks
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
@@ -61,6 +64,7 @@ class RobotSession:
     control: ControlAuthority
     control_acts: ActRunner[ControlAuthority]
     alarm_acts: ActRunner[AlarmEngine]
+    diagnostic_acts: ActRunner[Doctor]
     press_guard: PressGuard
     press_log: PressLog
     refresher: ViewRefresher
@@ -69,6 +73,8 @@ class RobotSession:
     ingest: Ingest
     turn: Turn
     frames: Frames
+    survey: GraphSurvey
+    looks: LiveLooks
     renewal: Renewal
     rosout: Rosout
     recorders: Sequence[SessionRecorder]
@@ -135,6 +141,8 @@ class RobotSession:
         self.rosout.stop()
         self.refresher.stop()
         self.press_guard.close()
+        await self.looks.stop()
+        await self.survey.stop()
         await self.renewal.stop()
         await self.peer.stop()
         await self.commands.stop()

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
@@ -12,6 +12,7 @@ from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
+from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
 from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
@@ -25,7 +26,9 @@ from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.runtime.alarms import Alarms
 from app.runtime.frames import Frames
+from app.runtime.graph_survey import GraphSurvey
 from app.runtime.ingest import Ingest
+from app.runtime.live_look import LiveLooks
 from app.runtime.renewal import Renewal
 from app.runtime.robot_alarms import RobotAlarms
 from app.runtime.robot_commands import RobotCommands
@@ -60,6 +63,7 @@ class ServerParts:
     simulated: bool = False
     root_path: str = ""
     alarms: Alarms | None = None
+    doctor: Doctor = field(default_factory=NoDoctor)
 
 
 def wire_session(
@@ -131,6 +135,7 @@ def wire_session(
         control=control,
         control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
         alarm_acts=ActRunner("alarm", ALARM_ACTS, alarms.engine, act_context),
+        diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
         press_guard=press_guard,
         press_log=press_log,
         refresher=refresher,
@@ -139,6 +144,8 @@ def wire_session(
         ingest=ingest,
         turn=Turn(context, peer, control, ingest, commands, refresher, robot_alarms),
         frames=Frames(context, partial(peer.on_graph_change, False)),
+        survey=GraphSurvey(context, access.observe),
+        looks=LiveLooks(context),
         renewal=Renewal(link, robot),
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),
         recorders=recorders,
@@ -168,7 +175,7 @@ def _context(
         on_late_reading=signals.late_reading.emit,
         on_entries_decoded=signals.entries_decoded.emit,
     )
-    return RobotContext(panel, interfaces, robot, link, signals)
+    return RobotContext(panel, interfaces, robot, link, signals, config)
 
 
 def _connect(signals: RobotSignals, robot_alarms: RobotAlarms, session: RobotSession) -> None:

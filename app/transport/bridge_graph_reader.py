@@ -81,7 +81,8 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
         ask_json(link, entities.DDS),
         ask_json(link, entities.EVERY_ROUTE),
     )
-    return ros_graph(
+    return await asyncio.to_thread(
+        ros_graph,
         GraphAnswers(
             zid=zid,
             tokens=tokens,
@@ -95,5 +96,5 @@ async def read_graph(link: GraphLink, zid: str) -> GraphSnapshot:
             nodes=nodes,
             entities=dds,
             routes=routes,
-        )
+        ),
     )

@@ -196,7 +196,9 @@ class PeerLiveness:
         finally:
             answer.cancel()
         if answered:
-            detector.on_reply(sent_at, self._monotonic())
+            replied_at = self._monotonic()
+            detector.on_reply(sent_at, replied_at)
+            self.robot.round_trips.record(replied_at - sent_at, replied_at)
             self._publish_state()
             self._on_reply(sent_at)
         return answered

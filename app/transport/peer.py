@@ -12,6 +12,7 @@ from app.robot.state import RobotState
 from app.survey.model import GraphSnapshot
 from app.transport.admin_space import GraphLink
 from app.transport.robot_signals import RobotSignals
+from app.transport.zenoh_config import Config
 from app.transport.zenoh_session import ZenohSession
 
 
@@ -62,13 +63,19 @@ class Observe(Protocol):
 
 @dataclass(frozen=True)
 class RobotContext:
-    """One robot of a panel, the link to it, and what its parts signal to each other."""
+    """One robot of a panel, the link to it, what its parts signal to each other, and the configuration
+    of the link."""
 
     panel: Panel
     interfaces: Interfaces
     robot: RobotState
     link: ZenohSession
     signals: RobotSignals
+    config: Config
+
+    def another_session(self) -> ZenohSession:
+        """A further session with the robot. Its data waits until it is drained."""
+        return ZenohSession(self.config, lambda _: None, self.robot.dialect)
 
 
 @dataclass(frozen=True, slots=True)

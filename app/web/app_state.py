@@ -13,6 +13,7 @@ from app.commands.receipts import Receipt
 from app.concurrency import InFlight
 from app.i18n import TextLike
 from app.permission.clients import Clients
+from app.runtime.doctor_process import DoctorProcess
 from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
@@ -30,6 +31,7 @@ class AppState:
     metrics: Metrics
     log: OperatorLog | NullLog
     limits: PressLimits
+    doctor: DoctorProcess
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
 

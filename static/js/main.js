@@ -52,10 +52,7 @@ class Screen {
 
   async start() {
     const bar = document.querySelector("form#control");
-    if (bar) {
-      const { Control } = await import("./control.js");
-      this.#control = new Control(bar, (event) => this.#source.timeOf(event));
-    }
+    if (bar) this.#control = new (await import("./control.js")).Control(bar, (event) => this.#source.timeOf(event));
     this.#load();
     window.operatorPanel = { eventAgeMs: () => this.#source.ageMs }; // for the watcher of a kiosk's screen
     pageGuard.onFail = () => this.#source.stop();
@@ -66,6 +63,7 @@ class Screen {
   #load() {
     const source = this.#source;
     if (document.querySelector("[data-step]")) source.load(import("./inputs.js"), noop);
+    if (document.querySelector("[data-poll]")) import("./diagnostics.js").catch(pageGuard.fail);
     for (const kind of this.#data.kinds) {
       /** @type {Promise<Hooks>} */
       const script = import(`./kinds/${kind}.js`);

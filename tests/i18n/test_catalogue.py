@@ -19,6 +19,8 @@ PREFIXES = (
     "alarms_",
     "alarms_reason_",
     "condition_",
+    "diagnostics_",
+    "look_",
     "gauge_",
     "joint_",
     "control_",
@@ -34,6 +36,7 @@ PREFIXES = (
     "log_outcome_",
     "log_page_control_",
     "log_page_alarm_",
+    "log_page_diagnostics_",
     "state_",
 )  # of codes that are put together
 SENTENCES = sentences(ENGLISH)

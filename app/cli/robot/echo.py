@@ -14,11 +14,11 @@ from typing import Any
 from app.cli.arguments import seconds, whole_number
 from app.cli.parser import Parser
 from app.cli.robot.link import GONE, add_options, ended, opened, place_of
-from app.cli.robot.message_text import Shape, csv_line, yaml_text
 from app.cli.robot.topic_reader import TopicReader, value_in
 from app.errors import DecodeError
 from app.interfaces import Interfaces, to_plain
 from app.printable import printable
+from app.view.message_text import Shape, csv_line, yaml_text
 
 PROG = "python -m app.cli echo"
 SEPARATOR = "---"

@@ -53,6 +53,7 @@ class PageContext(TypedDict):
     railed: bool
     is_log: bool
     is_alarms: bool
+    is_diagnostics: bool
     inside: Markup | None
     base: str
     robot: str
@@ -87,9 +88,11 @@ def page_context(
     refresh_s: int,
     embedded: bool = False,
     alarms_page: str | None = None,
+    diagnostics_query: str | None = None,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
-    `alarms_page`: the path and query of a page of the alarms, for such a page.
+    `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
+    query of the page of diagnostics, for that page.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
@@ -103,9 +106,11 @@ def page_context(
         of_client = audience_of(who, publisher.view["control"], rules, language)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
-    is_alarms = alarms_page is not None
-    is_log = page.id == FRAME_ONLY and not is_alarms
+    is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
+    is_log = page.id == FRAME_ONLY and not is_alarms and not is_diagnostics
     back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
+    if is_diagnostics:
+        back = f"{state.root}/diagnostics?{diagnostics_query}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -121,9 +126,10 @@ def page_context(
         choices=[*language_choice(panel, language), *choices(display)],
         panel=panel,
         page=page,
-        railed=panel.has_rail or is_log or is_alarms,
+        railed=panel.has_rail or page.id == FRAME_ONLY,
         is_log=is_log,
         is_alarms=is_alarms,
+        is_diagnostics=is_diagnostics,
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

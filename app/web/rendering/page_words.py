@@ -40,6 +40,7 @@ WORDS: Final = (
     "clean",
     "cleaning",
     "cleaning_end",
+    "diagnostics_title",
 )
 TREND_WORDS: Final = (
     "trend_earlier",

@@ -54,7 +54,9 @@ AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
 DISK_TIMEOUT_S: Final = 2.0  # then the receipt says that the act is not safely on the disk
 FORM_FIELDS_MOST: Final = 600
-OWN_PAGE: Final = re.compile(r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log)(\?[!-~]*)?")
+OWN_PAGE: Final = re.compile(
+    r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics)(\?[!-~]*)?"
+)
 OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
 TOO_OFTEN: Final = say("control_too_often")
 TOO_SOON: Final = say("press_too_soon")

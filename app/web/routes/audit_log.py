@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.audit import Entry, Filter, OperatorLog, Row
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
+from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.errors import NotFound
 from app.i18n import Text, TextLike, number, say
 from app.panel.layout import FRAME_ONLY, Page
@@ -47,6 +48,7 @@ CONTROL_ACTIONS: Final = (
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
 ALARM_ACTIONS: Final = tuple(f"alarm_{act}" for act in ALARM_ACTS)
+DIAGNOSTIC_ACTIONS: Final = tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS)
 
 
 class Wanted(BaseModel):
@@ -127,7 +129,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         entered={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         robots={str(robot.name): robot.name for robot in panel.robots},
-        acts={action: word(action) for action in (*CONTROL_ACTIONS, *ALARM_ACTIONS)},
+        acts={a: word(a) for a in (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS)},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
         count=word("head", count=number(f"{head.count:,d}")) if head else "",
@@ -154,18 +156,31 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
 
 
 def page_frame(
-    request: Request, state: AppState, title: Text, robot: str = "", alarms_page: str | None = None
+    request: Request,
+    state: AppState,
+    title: Text,
+    robot: str = "",
+    alarms_page: str | None = None,
+    diagnostics_query: str | None = None,
 ) -> tuple[PageContext, str]:
-    """The frame around the log, or a page of the alarms with this path and query, of a robot or else
-    the first; and the token of a new client."""
-    entry_of = {session.entry.id: session for session in state.fleet.sessions if session.entry}
-    session = entry_of.get(robot, state.fleet.first)
+    """The frame around the log, or a page of the alarms with this path and query, or the diagnostics
+    with this query, of a robot or else the first; and the token of a new client."""
+    session = state.fleet.of_robot(robot)
     who, token = principal_with_new_token(request, state, embedded=False)
     if session.control.rules.required:
         session.control.loaded(who, REFRESH_S, opened_by_person(request))
         session.show()
     shown = Page.model_construct(None, id=FRAME_ONLY, title=title, own=(), groups=())
-    context = page_context(request, state, session, shown, who, REFRESH_S, alarms_page=alarms_page)
+    context = page_context(
+        request,
+        state,
+        session,
+        shown,
+        who,
+        REFRESH_S,
+        alarms_page=alarms_page,
+        diagnostics_query=diagnostics_query,
+    )
     return context, token
 
 

@@ -17,11 +17,16 @@ _WORDS: Final = frozenset(("true", "false", "yes", "no", "on", "off", "null", "y
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
     """How much of a message is written: `most` elements of a list and characters of a text (None: all);
-    lists, or texts, left out."""
+    lists, or texts, left out. `counted`: what is cut is counted, which ROS 2's command does not."""
 
     most: int | None = 128
     lists: bool = True
     texts: bool = True
+    counted: bool = False
+
+    def cut(self, length: int) -> str:
+        """Stands for the rest of a list or text of this length."""
+        return f"{CUT} {length - (self.most or 0)} more" if self.counted else CUT
 
 
 def yaml_text(value: Any, shape: Shape) -> str:
@@ -63,7 +68,7 @@ def _elements(value: Any, shape: Shape, indent: str) -> Iterator[str]:
         yield f"{indent}- {first[len(indent) + 2 :]}"
         yield from rest
     if shape.most is not None and len(value) > shape.most:
-        yield f"{indent}- '{CUT}'"
+        yield f"{indent}- '{shape.cut(len(value))}'"
 
 
 def _one_line(value: Any, shape: Shape) -> str:
@@ -100,7 +105,7 @@ def _text(value: str, shape: Shape) -> str:
     if not shape.texts:
         return f"<{len(value)} characters>"
     cut = shape.most is not None and len(value) > shape.most
-    return value[: shape.most] + CUT if cut else value
+    return value[: shape.most] + shape.cut(len(value)) if cut else value
 
 
 def csv_line(value: Any, shape: Shape) -> str:

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from app.cli.robot.message_text import Shape, csv_line, yaml_text
 from app.cli.robot.topic_reader import value_in
 from app.interfaces import load_interfaces
+from app.view.message_text import Shape, csv_line, yaml_text
 
 INTERFACES = load_interfaces("jazzy")
 STATE = "sensor_msgs/msg/JointState"

@@ -1,0 +1,91 @@
+"""How often the topics of a robot arrive, how large the newest message is, and what can't be decoded.
+
+A sample costs an addition: rates are computed from marks, one a second, when someone asks for them.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from app.errors import DecodeError
+from app.robot.sample import Sample
+
+WINDOW_S: Final = 10.0
+SLOW_WINDOW_S: Final = 60.0  # of a topic with fewer than `ENOUGH` messages in `WINDOW_S`
+ENOUGH: Final = 5
+MARK_EVERY_S: Final = 1.0
+MOST_MARKS: Final = 61
+STOPPED: Final = 3.0  # periods without a message: then the pause counts too
+FIRST_BYTES: Final = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Undecodable:
+    """The newest message that could not be decoded: its first bytes, its size, why, and when (seconds
+    since the epoch)."""
+
+    first: bytes
+    size: int
+    reason: str
+    wall: float
+
+
+class TopicTraffic:
+    """The messages of one topic: how many arrived, and size (bytes) and time of the newest. `at` is in
+    monotonic seconds, `wall` in seconds since the epoch."""
+
+    __slots__ = ("_marks", "at", "count", "size", "undecodable", "wall")
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.size = 0
+        self.at = self.wall = 0.0
+        self.undecodable: Undecodable | None = None
+        self._marks: deque[tuple[float, int]] = deque(maxlen=MOST_MARKS)  # (at, count with it)
+
+    def record(self, sample: Sample) -> None:
+        """The newest sample, and those before it that were not read. What a cache had kept is no
+        message of now."""
+        self.size, self.at, self.wall = len(sample.payload), sample.at, sample.wall
+        if sample.cached:
+            return
+        self.count += sample.skipped + 1
+        if not self._marks or sample.at - self._marks[-1][0] >= MARK_EVERY_S:
+            self._marks.append((sample.at, self.count))
+
+    def rate(self, now: float) -> float | None:
+        """Messages a second at `now`, over the last seconds, or the last minute of a slow topic. None
+        if that is not known: fewer than two arrived in a minute."""
+        for window_s, enough in ((WINDOW_S, ENOUGH), (SLOW_WINDOW_S, 1)):
+            began = next((mark for mark in self._marks if now - mark[0] <= window_s), None)
+            if began is None or self.count - began[1] < enough:
+                continue
+            number, took_s = self.count - began[1], self.at - began[0]
+            has_stopped = now - self.at > STOPPED * took_s / number
+            return number / max(now - began[0] if has_stopped else took_s, 1e-3)
+        return None
+
+
+class Traffic:
+    """The traffic of one robot's topics, by their keys. Used on the event loop only."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, TopicTraffic] = {}
+
+    @property
+    def topics(self) -> Mapping[str, TopicTraffic]:
+        return self._topics
+
+    def record(self, key: str, sample: Sample) -> None:
+        """A topic's newest sample was drained."""
+        topic = self._topics.get(key)
+        if topic is None:
+            topic = self._topics[key] = TopicTraffic()
+        topic.record(sample)
+
+    def record_undecodable(self, key: str, sample: Sample, error: DecodeError) -> None:
+        """A sample could not be decoded. Its bytes were copied already: they are decoded as bytes."""
+        topic = self._topics.setdefault(key, TopicTraffic())
+        data = bytes(sample.payload)
+        topic.undecodable = Undecodable(data[:FIRST_BYTES], len(data), str(error), sample.wall)

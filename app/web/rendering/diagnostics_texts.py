@@ -1,0 +1,81 @@
+"""Values of the page of diagnostics as texts, in no language yet."""
+
+from typing import Any, Final
+
+from app.clock import format_age, format_time
+from app.i18n import Param, Text, TextLike, number, say
+from app.view.diagnostic_rows import TopicRow
+
+NOTHING: Final = "–"
+
+
+def word(name: str, **about: Param) -> Text:
+    return say(f"diagnostics_{name}", **about)
+
+
+def look_word(name: str, **about: Param) -> Text:
+    return say(f"look_{name}", **about)
+
+
+def milliseconds(ms: float) -> TextLike:
+    return number(f"{ms:.1f}" if ms < 10 else f"{ms:.0f}", "ms")
+
+
+def rate_text(rate_hz: float | None) -> TextLike:
+    if rate_hz is None:
+        return NOTHING
+    return number(f"{rate_hz:.{0 if rate_hz >= 100 else 1 if rate_hz >= 1 else 2}f}")
+
+
+def size_text(size: int | None) -> TextLike:
+    """Bytes, in units of 1000."""
+    if size is None:
+        return NOTHING
+    if size < 1000:
+        return number(str(size), "B")
+    return number(f"{size / 1000:.1f}", "kB") if size < 1e6 else number(f"{size / 1e6:.1f}", "MB")
+
+
+def age_text(age_s: float | None) -> TextLike:
+    if age_s is None:
+        return word("never")
+    return number(f"{age_s:.1f}", "s") if age_s < 60 else format_age(age_s)
+
+
+def qos_words(row: TopicRow) -> TextLike:
+    """The QoS of both sides, as one text where they are alike. Volatile is what has no other word."""
+    if not row.robot_qos:
+        return word("no_subscriber" if row.use == "published" else "no_publisher")
+    theirs, own = (_short(" / ".join(row.robot_qos)), _short(row.own_qos))
+    if len(row.robot_qos) == 1 and {*own.split(", ")} - {""} <= {*theirs.split(", ")}:
+        return word("qos_both", qos=theirs)
+    return word("qos_sides", own=own or word("as_published"), theirs=theirs)
+
+
+def _short(qos: str) -> str:
+    return qos.replace(", volatile", "")
+
+
+def undecodable_text(row: TopicRow) -> TextLike:
+    """ "" if all could be decoded."""
+    if row.undecodable is None:
+        return ""
+    return word(
+        "undecodable",
+        count=row.undecodable_count,
+        time=format_time(row.undecodable.wall),
+        why=row.undecodable.reason,
+        first=row.undecodable.first.hex(" "),
+    )
+
+
+TEXTS: Final[dict[str, Any]] = {
+    "word": word,
+    "look_word": look_word,
+    "rate_text": rate_text,
+    "size_text": size_text,
+    "age_text": age_text,
+    "qos_words": qos_words,
+    "undecodable_text": undecodable_text,
+    "time_text": lambda wall: format_time(wall) if wall else NOTHING,
+}

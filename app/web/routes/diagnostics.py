@@ -1,0 +1,242 @@
+"""The page of diagnostics, the same as JSON, a live look into a topic, and the acts of the page."""
+
+import asyncio
+import secrets
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Annotated, Any, Final
+from urllib.parse import quote, urlencode
+
+from fastapi import APIRouter, Path, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+
+from app.commands.acts import ActReceipt, ActRequest
+from app.commands.control_acts import TOO_OFTEN
+from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.commands.press import PRESS_ID
+from app.commands.press_limits import RETRY_AFTER_S
+from app.errors import InputError, KioskError, NotFound
+from app.i18n import TextLike, localized, say
+from app.interfaces.names import Qos
+from app.runtime.live_look import Look, LookedTopic
+from app.runtime.robot_session import RobotSession
+from app.survey.forwarding import topic_forwarding
+from app.survey.model import SurveyedTopic
+from app.view.diagnostic_graph import robots_in
+from app.web.app_state import AppState, CurrentState
+from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.diagnostics_answer import (
+    DiagnosticActBody,
+    DiagnosticReceipt,
+    DiagnosticsAnswer,
+    DiagnosticsQuery,
+    LookAnswer,
+    LookQuery,
+)
+from app.web.language import language_of
+from app.web.openapi_parts import FORM, JSON, PAGE, described_body, errors, fields
+from app.web.rendering.diagnostics_json import diagnostics_json, look_json
+from app.web.rendering.diagnostics_page import diagnostics_context, versions
+from app.web.rendering.diagnostics_texts import TEXTS, word
+from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.routes.audit_log import page_frame
+from app.web.routes.presses import STATUS
+
+router = APIRouter()
+
+DiagnosticAct = Annotated[str, Path(json_schema_extra={"enum": list(DIAGNOSTIC_ACTS)})]
+HEADERS: Final[Mapping[str, str]] = {"cache-control": "no-store", "vary": "accept"}
+FORM_FIELDS_MOST: Final = 8
+DEPTH: Final = 10  # of the bridge's reader for a look: two messages a second are shown
+ZIP: Final = "application/zip"
+
+
+@router.get(
+    "/diagnostics",
+    response_model=DiagnosticsAnswer,
+    summary="Links, topics, services, parameters, the ROS graph and the doctor's findings",
+    responses=errors(403, 404, 422) | {200: {"content": PAGE}},
+)
+async def diagnostics(
+    request: Request, state: CurrentState, query: Annotated[DiagnosticsQuery, Query()]
+) -> Response:
+    session = _session(state, query.robot)
+    if not _for_browser(request):
+        survey = await session.survey.read()
+        content = diagnostics_json(session, survey, state.doctor, versions())
+        answer = await asyncio.to_thread(localized, content, language_of(request))
+        return JSONResponse(answer, headers=HEADERS)
+    return await _page(request, state, session, query)
+
+
+@router.get(
+    "/diagnostics/look",
+    response_model=LookAnswer,
+    summary="The newest messages of any topic of the robot, read only",
+    responses=errors(403, 404, 422) | {200: {"content": PAGE}},
+)
+async def look(request: Request, state: CurrentState, query: Annotated[LookQuery, Query()]) -> Response:
+    """Goes on for six seconds after each request."""
+    session, language = _session(state, query.robot), language_of(request)
+    looked = await _look(session, query.topic)
+    if not _for_browser(request):
+        return JSONResponse(localized(look_json(looked), language), headers=HEADERS)
+    html = state.templates.render("_look.html", language, looked=looked, form=query.form, **TEXTS)
+    return HTMLResponse(html, headers=HEADERS)
+
+
+@router.post(
+    "/diagnostics/{act}",
+    summary="Begin a check by the doctor, or get the support bundle",
+    responses=errors(403, 404, 408, 413, 422)
+    | {
+        200: {
+            "content": {
+                JSON: {"schema": DiagnosticReceipt.model_json_schema()},
+                ZIP: {"schema": {"type": "string", "format": "binary"}},
+            },
+            "description": "of `check` the receipt, of `bundle` the zip",
+        },
+        303: {"description": "of a form: back to the page, with the receipt's id"},
+        409: {"model": DiagnosticReceipt, "description": "it was not done"},
+        429: {
+            "model": DiagnosticReceipt,
+            "description": "more than a client may",
+            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
+        },
+        503: {"description": "the operator's log can't be written, or the bundle not be made"},
+    },
+    openapi_extra=described_body(
+        DiagnosticActBody, fields(id={"pattern": PRESS_ID}, page={}), required=False
+    ),
+)
+async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Response:
+    session = _session(state, "")
+    is_form, content = await _body(request)
+    body = as_model(DiagnosticActBody, {k: v for k, v in content.items() if k != "page" or not is_form})
+    who, token = principal_with_new_token(request, state)
+    act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
+    at = body.at.timestamp() if body.at and not is_form else None
+    requested = ActRequest(act, who, at=at, scripted=not is_form)
+    runner = session.diagnostic_acts
+    if not state.limits.admit(who):
+        receipt = runner.limited(requested, act_id, TOO_OFTEN)
+    else:
+        with state.in_flight.track():
+            receipt = await runner.act(requested, act_id)
+    if receipt.done and act == "bundle":
+        answer = await _bundle(state)
+    else:
+        answer = _back(state, content, receipt) if is_form else _receipt(request, receipt)
+    return set_client_cookie(answer, request, token)
+
+
+def _session(state: AppState, robot: str) -> RobotSession:
+    """NotFound on a panel without the page."""
+    if not state.fleet.panel.diagnostics.enabled:
+        raise NotFound(word("off"))
+    return state.fleet.of_robot(robot)
+
+
+def _for_browser(request: Request) -> bool:
+    return "text/html" in request.headers.get("accept", "")
+
+
+async def _page(
+    request: Request, state: AppState, session: RobotSession, query: DiagnosticsQuery
+) -> Response:
+    """The whole page, or its content alone."""
+    language = language_of(request)
+    looked, refused = await _looked(session, "" if query.paused else query.look)
+    survey = await session.survey.read()
+    context = diagnostics_context(session, survey, state.doctor, query, looked, refused, language)
+    again = urlencode({"robot": query.robot}) if query.robot else ""
+    frame, token = page_frame(request, state, word("title"), query.robot, diagnostics_query=again)
+    name = "_diagnostics.html" if query.part else "diagnostics.html"
+    refusal = _refusal(session, query.act)
+    html = state.templates.render(name, language, **frame, **context, **TEXTS, act_refused=refusal)
+    return set_client_cookie(HTMLResponse(html, headers=HEADERS), request, token)
+
+
+async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
+    """A look for the page, or why there is none; without a key neither."""
+    if not key:
+        return None, ""
+    try:
+        return await _look(session, key), ""
+    except KioskError as error:
+        return None, error.text
+
+
+async def _look(session: RobotSession, key: str) -> Look:
+    """A look into a topic that is in the robot's graph; NotFound for others, TooMany for more than a
+    few."""
+    robot = session.robot
+    survey = await session.survey.read()
+    used = {robot.key(name) for name in (*session.panel.listened(), *session.panel.publications())}
+    for behind in robots_in(survey.graph, robot.graph.every_peer):
+        for topic in behind.topics:
+            if topic.key != key:
+                continue
+            name = f"{behind.namespace}{topic.name}"
+            if topic_forwarding(behind, topic) == "denied":
+                raise NotFound(say("look_not_forwarded", topic=name))
+            return await session.looks.look(
+                _looked_topic(name, topic, bool(behind.bridges) and topic.key not in used)
+            )
+    raise NotFound(say("look_no_topic", topic=f"/{key}"))
+
+
+def _looked_topic(name: str, topic: SurveyedTopic, held: bool) -> LookedTopic:
+    types = dict.fromkeys(end.type for end in topic.publishers or topic.subscribers)
+    hashes = {end.type_hash for end in topic.publishers} - {""}
+    return LookedTopic(
+        name=name,
+        key=topic.key,
+        types=tuple(types),
+        hashes=tuple(sorted(hashes)),
+        qos=Qos(topic.reliable, topic.latched, DEPTH),
+        held=held and bool(topic.publishers),
+    )
+
+
+async def _body(request: Request) -> tuple[bool, dict[str, Any]]:
+    """Whether the body is a form, and its content: JSON, a form, or nothing at all."""
+    kind, content = kind_of(request), await body_of(request)
+    if kind == FORM:
+        return True, dict(form_of(content, FORM_FIELDS_MOST))
+    if kind not in (JSON, ""):
+        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
+    decoded = json_of(content or b"{}")
+    if not isinstance(decoded, dict):
+        raise InputError("the body must be an object")
+    return False, decoded
+
+
+async def _bundle(state: AppState) -> Response:
+    data = await state.doctor.bundle()
+    name = f"operator-panel-support-{datetime.now().strftime('%Y%m%d-%H%M%S')}.zip"
+    headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+    return Response(data, media_type=ZIP, headers=headers | {"content-encoding": "identity"})
+
+
+def _receipt(request: Request, receipt: ActReceipt) -> Response:
+    content = localized({**receipt.as_json(), "done": receipt.done}, language_of(request))
+    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
+    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+
+
+def _back(state: AppState, form: Mapping[str, str], receipt: ActReceipt) -> Response:
+    """A redirect to the page, which shows why the act was refused."""
+    query = form.get("page", "")
+    shown = receipt.code if receipt.cause == "limit" else receipt.id
+    if receipt.reason:
+        query += f"{'&' if query else ''}act={quote(shown, safe='')}"
+    return RedirectResponse(f"{state.root}/diagnostics{f'?{query}' if query else ''}", status_code=303)
+
+
+def _refusal(session: RobotSession, query: str) -> TextLike:
+    if query == TOO_OFTEN.code:
+        return TOO_OFTEN
+    receipt = session.diagnostic_acts.receipt(query)
+    return receipt.reason if receipt else ""

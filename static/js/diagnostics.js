@@ -1,0 +1,117 @@
+// The page of diagnostics: fetched again while it is seen, and put into the page that is there: texts and
+// attributes, in place. Nothing is asked for while the last answer is still awaited.
+import { closest, find } from "./show.js";
+
+const CONTENT_MS = 2000;
+const LOOK_MS = 500;
+const LONGEST_MS = 10_000; // for an answer
+
+const main = find(document, "main[data-poll]");
+let isTouched = false; // under a finger nothing changes
+let roundTripMs = 0;
+
+poll(CONTENT_MS, async () => {
+  const rtt = roundTripMs ? `&rtt=${roundTripMs.toFixed(1)}` : "";
+  const began = performance.now();
+  const fresh = await fetched(`${main.dataset.poll}&part=content${rtt}${isPaused() ? "&paused=true" : ""}`);
+  roundTripMs = performance.now() - began;
+  if (fresh && !isTouched) update(main, fresh);
+});
+poll(LOOK_MS, async () => {
+  const messages = main.querySelector("[data-look]");
+  const pause = main.querySelector("button.pause");
+  if (pause) pause.hidden = false;
+  if (!messages || isPaused()) return;
+  const fresh = await fetched(messages.dataset.look ?? "");
+  if (fresh && messages.isConnected) update(messages, fresh);
+});
+
+main.addEventListener("pointerdown", () => (isTouched = true));
+for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => (isTouched = false));
+main.addEventListener("click", ({ target }) => {
+  const pause = closest(target, "button.pause");
+  if (pause) pause.setAttribute("aria-pressed", String(pause.getAttribute("aria-pressed") !== "true"));
+});
+
+function isPaused() {
+  return main.querySelector("button.pause")?.getAttribute("aria-pressed") === "true";
+}
+
+// Each time after the answer, so that a slow server is asked less often.
+/** @param {number} everyMs @param {() => Promise<void>} work */
+async function poll(everyMs, work) {
+  for (;;) {
+    await new Promise((resolve) => setTimeout(resolve, everyMs));
+    if (!document.hidden) await work().catch(() => {}); // the page itself shows that the server is lost
+  }
+}
+
+/** @param {string} address @returns {Promise<Element | null>} */
+async function fetched(address) {
+  const answer = await fetch(address, {
+    headers: { accept: "text/html" },
+    signal: AbortSignal.timeout(LONGEST_MS),
+  });
+  if (!answer.ok) return null;
+  return new DOMParser().parseFromString(`<div>${await answer.text()}</div>`, "text/html").body.firstElementChild;
+}
+
+// The children of an element become those of another: rows are found by their data-row, others by their place.
+/** @param {Element} old @param {Element} fresh */
+function update(old, fresh) {
+  const rows = new Map([...old.children].map((child) => [keyOf(child), child]));
+  const places = telling(old).filter((node) => !keyOf(node));
+  /** @type {ChildNode | null} */
+  let place = tellingFrom(old.firstChild);
+  const kept = new Set();
+  for (const wanted of telling(fresh)) {
+    const key = keyOf(wanted);
+    const found = key ? rows.get(key) : places.shift();
+    const node = found && found.nodeName === wanted.nodeName ? found : document.importNode(wanted, true);
+    if (node === found) updateNode(node, wanted);
+    if (node !== place) old.insertBefore(node, place);
+    kept.add(node);
+    place = tellingFrom(node.nextSibling);
+  }
+  // A look that is paused is in no answer.
+  for (const node of telling(old)) {
+    if (!kept.has(node) && !(isPaused() && node instanceof Element && node.matches(".look"))) node.remove();
+  }
+}
+
+/** @param {Node} node @param {Node} wanted */
+function updateNode(node, wanted) {
+  if (node instanceof Element && wanted instanceof Element) {
+    updateAttributes(node, wanted);
+    update(node, wanted);
+  } else if (node.nodeValue !== wanted.nodeValue) node.nodeValue = wanted.nodeValue;
+}
+
+// The children without the white space between elements.
+/** @param {Element} parent @returns {ChildNode[]} */
+function telling(parent) {
+  return [...parent.childNodes].filter(isTelling);
+}
+
+/** @param {ChildNode | null} node @returns {ChildNode | null} */
+function tellingFrom(node) {
+  return node && !isTelling(node) ? tellingFrom(node.nextSibling) : node;
+}
+
+/** @param {Node} node */
+function isTelling(node) {
+  return node instanceof Element || Boolean(node.nodeValue?.trim());
+}
+
+/** @param {Node} node */
+function keyOf(node) {
+  return node instanceof Element ? (node.getAttribute("data-row") ?? "") : "";
+}
+
+// What the page has set itself stays: what is typed, the pause, and its messages, which are newer.
+/** @param {Element} old @param {Element} fresh */
+function updateAttributes(old, fresh) {
+  if (old.matches("input, button.pause")) return;
+  for (const { name, value } of fresh.attributes) if (old.getAttribute(name) !== value) old.setAttribute(name, value);
+  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name)) old.removeAttribute(name);
+}
