@@ -6,7 +6,7 @@ number of them. Used on the event loop only.
 
 import heapq
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from app.alarms.entries import AlarmEntry
@@ -23,7 +23,6 @@ from app.robot.state import RobotState
 
 MAX_EVALUATED: Final = 2_000  # in one evaluation
 MAX_ENTRIES: Final = 10_000  # alarms that the robots publish themselves
-
 
 Act = Callable[[AlarmStatus, Definition], ActResult]
 
@@ -53,7 +52,8 @@ class AlarmEngine:
         self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
         self._watch = SourceWatch()
         self._first_out = FirstOut(panel.alarm_rules.first_out_s)
-        self._refused = 0  # entries beyond `MAX_ENTRIES`
+        self._entry_count = 0
+        self.refused_entries = 0  # that were not kept, as there were too many
         self.alarms: dict[str, AlarmInstance] = {}
         self._lock_changes = 0
 
@@ -96,11 +96,6 @@ class AlarmEngine:
         if self._waiting:
             return 0.0
         return min(self._timers[0][0] if self._timers else math.inf, self._watch.due)
-
-    @property
-    def refused_entries(self) -> int:
-        """How many entries of robots were not kept, as there were too many."""
-        return self._refused
 
     @property
     def lock_changes(self) -> int:
@@ -150,9 +145,11 @@ class AlarmEngine:
         entries: Iterable[AlarmEntry],
         at: float,
         is_whole: bool = True,
+        earlier: Collection[str] = (),
     ) -> None:
         """A robot published entries of an alarm with `diagnostics` or a list; `at` in monotonic
-        seconds. A list without `active` has all of its active entries, if it was read as a whole."""
+        seconds. A list without `active` has all of its active entries, if it was read as a whole;
+        `earlier` are those of the same message before."""
         self._watch.heard(robot, alarm_id, at)
         source = self._sources[robot, alarm_id]
         named = {entry.name: entry for entry in entries}
@@ -164,7 +161,7 @@ class AlarmEngine:
                 self._receive_entry(alarm, source, entry, at)
         listed = source.alarm.listed
         if listed is not None and listed.active is None and is_whole:
-            self._end_missing(source, named)
+            self._end_missing(source, {*named, *earlier})
 
     def _receive_entry(
         self, alarm: AlarmInstance, source: Definition, entry: AlarmEntry, at: float
@@ -172,20 +169,23 @@ class AlarmEngine:
         is_new = alarm.entry != entry or alarm.status.unknown_since or not alarm.is_evaluated
         alarm.heard_at = at
         if is_new:
-            alarm.definition, alarm.entry = source.of_entry(entry), entry
+            if alarm.entry is None or alarm.entry.priorities != entry.priorities:
+                alarm.definition = source.of_entry(entry)
+            alarm.entry = entry
             self._waiting[alarm.definition.id] = None
 
     def _new_entry(self, definition: Definition) -> AlarmInstance | None:
-        if sum(map(len, self._entries.values())) >= MAX_ENTRIES:
-            self._refused += 1
+        if self._entry_count >= MAX_ENTRIES:
+            self.refused_entries += 1
             return None
+        self._entry_count += 1
         alarm = self._keep(definition)
         if definition.alarm.suppressed_while is not None:
             self._listen(definition, definition.alarm.suppressed_while.topic)
         self._entries[definition.robot, definition.alarm.id].append(alarm)
         return alarm
 
-    def _end_missing(self, source: Definition, named: Mapping[str, AlarmEntry]) -> None:
+    def _end_missing(self, source: Definition, named: Collection[str]) -> None:
         for alarm in self._entries[source.robot, source.alarm.id]:
             entry = alarm.entry
             if entry is not None and entry.name not in named and entry.level:
@@ -291,9 +291,8 @@ class AlarmEngine:
     ) -> Transition:
         self._seq += 1
         self._first_out.update(alarm, before, now, self.alarms)
-        return Transition(
-            self._seq, now, alarm.definition.id, before, alarm.status, act, actor, alarm.value
-        )
+        name, after = alarm.definition.id, alarm.status
+        return Transition(self._seq, now, name, before, after, act, actor, alarm.value)
 
     def _emit(self, transitions: Sequence[Transition]) -> None:
         if transitions:

@@ -53,6 +53,13 @@ def entries_of(
             )
 
 
+def status_key(row: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What decides the entry of a diagnostic status, beside its name: its key values only if it is not
+    OK."""
+    _, level, message, hardware, pairs = row
+    return level, message, hardware, _details(pairs) if _number(level) else ""
+
+
 def _details(pairs: Any) -> str:
     """The first key values of a status as text: "rpm: 1200, load: 80 %"."""
     texts = (f"{pair.key}: {pair.value}"[:LONGEST_NAME] for pair in islice(pairs or (), MAX_PAIRS))

@@ -33,8 +33,11 @@ class Definition:
 
     def of_entry(self, entry: AlarmEntry) -> "Definition":
         """The definition of an alarm that the robot publishes itself."""
-        rules = replace(self.rules, priorities=entry.priorities)
-        return replace(self, id=f"{self.id}:{entry.name}", rules=rules)
+        rules = self.rules
+        if entry.priorities != rules.priorities:
+            rules = replace(rules, priorities=entry.priorities)
+        name = f"{self.id}:{entry.name}"
+        return Definition(name, self.robot, self.alarm, rules, self.delays, self.thresholds)
 
 
 def define(panel: Panel, robot: str) -> Iterator[Definition]:

@@ -4,11 +4,12 @@ Messages are queued as they arrive. The queue, the entries of a message and the 
 no size that a message claims is trusted.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
-from app.alarms.entries import DIAGNOSTIC_FIELDS, AlarmEntry, entries_of
+from app.alarms.entries import DIAGNOSTIC_FIELDS, AlarmEntry, entries_of, status_key
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import Interfaces, RowReader, Rows, Walk
@@ -23,9 +24,32 @@ MAX_QUEUED_BYTES: Final = 8_000_000
 MAX_STATUSES: Final = 2_000  # of one message of diagnostics
 STATUS: Final = "status"  # the field of a DiagnosticArray
 
-# (the alarm's id, its entries, when they were received in monotonic seconds, whether the whole list was
-# read)
-OnEntries = Callable[[str, Sequence[AlarmEntry], float, bool], None]
+CHUNK: Final = 50  # entries that are passed on at a time: 2 ms if all of them are new
+
+# (the alarm's id, its entries, when they were received in monotonic seconds, whether they are the last
+# ones of a list that was read as a whole, and the names of those before them)
+OnEntries = Callable[[str, Sequence[AlarmEntry], float, bool, Collection[str]], None]
+
+
+@dataclass(slots=True, eq=False)
+class _Batch:
+    """The rows of a message, of which the first `done` were passed on. `names` are those of a list."""
+
+    rows: Sequence[tuple[Any, ...]]
+    at: float
+    is_whole: bool
+    done: int = 0
+    names: set[str] = field(default_factory=set)
+
+    def take(self) -> Sequence[tuple[Any, ...]]:
+        """The next rows."""
+        part = self.rows[self.done : self.done + CHUNK]
+        self.done += len(part)
+        return part
+
+    @property
+    def is_done(self) -> bool:
+        return self.done >= len(self.rows)
 
 
 @dataclass(slots=True, eq=False)
@@ -39,10 +63,28 @@ class _Source:
         default_factory=lambda: BoundedQueue(MAX_QUEUED, MAX_QUEUED_BYTES)
     )
     walk: tuple[Walk[Rows], Sample] | None = None
+    batch: _Batch | None = None
+    statuses: dict[str, tuple[Any, AlarmEntry | None]] = field(default_factory=dict)  # as last heard
 
     @property
     def is_pending(self) -> bool:
-        return self.walk is not None or len(self.queued) > 0
+        return self.batch is not None or self.walk is not None or len(self.queued) > 0
+
+    def entries(self, rows: Sequence[tuple[Any, ...]]) -> list[AlarmEntry]:
+        """The entries of rows. A status that has not changed is the same entry again: most of them are
+        the same in each message."""
+        if self.alarm.listed is not None:
+            return list(entries_of(self.alarm, rows, self.catalogue))
+        return [entry for row in rows if (entry := self._status(row)) is not None]
+
+    def _status(self, row: tuple[Any, ...]) -> AlarmEntry | None:
+        name, heard = row[0], status_key(row)
+        known = self.statuses.get(name)
+        if known is None or known[0] != heard:
+            if len(self.statuses) >= MAX_STATUSES:
+                self.statuses.clear()
+            known = self.statuses[name] = heard, next(entries_of(self.alarm, (row,)), None)
+        return known[1]
 
     def decode_one(self, slices: Slices, until: float) -> tuple[Rows, Sample] | None:
         """Decodes the oldest message, or as much of it as the time allows: its rows when it is done."""
@@ -114,10 +156,24 @@ class PublishedAlarms:
     def _decode(self, until: float) -> bool:
         """Decodes until a time (monotonic seconds); returns whether nothing is left."""
         for source in self._sources:
-            if source.is_pending and (decoded := source.decode_one(self._slices, until)):
+            if source.batch is None and (
+                decoded := source.is_pending and source.decode_one(self._slices, until)
+            ):
                 rows, sample = decoded
-                is_whole = rows.total <= len(rows.values)
-                entries = list(entries_of(source.alarm, rows.values, source.catalogue))
-                self._on_entries(source.alarm.id, entries, sample.at, is_whole)
+                source.batch = _Batch(rows.values, sample.at, rows.total <= len(rows.values))
+            while source.batch is not None:
+                self._pass_on(source, source.batch)
+                if time.monotonic() >= until:
+                    break
         self._scheduled = any(source.is_pending for source in self._sources)
         return not self._scheduled
+
+    def _pass_on(self, source: _Source, batch: _Batch) -> None:
+        """Passes on some of the entries of a message."""
+        entries = source.entries(batch.take())
+        is_last = batch.is_done
+        self._on_entries(source.alarm.id, entries, batch.at, batch.is_whole and is_last, batch.names)
+        if is_last:
+            source.batch = None
+        elif source.alarm.listed is not None:
+            batch.names.update(entry.name for entry in entries)

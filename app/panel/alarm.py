@@ -118,7 +118,8 @@ class SuppressingCondition(Condition):
 class Alarm(Description):
     """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
     publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
-    the value times `scale`. `state` is the machine's state while it is active."""
+    the value times `scale`. `state` is the machine's state while it is active. `ack_command` is the
+    control that is pressed when it is acknowledged, with its name or code in `ack_input`."""
 
     id: Id
     robot: Id | None = None
@@ -134,6 +135,8 @@ class Alarm(Description):
     ack: Literal["required", "none"] = "required"
     inhibits: Widgets = ()
     state: StateValue | None = None
+    ack_command: Id | None = None
+    ack_input: Id | None = None
     on_delay_s: Delay = 0.0
     off_delay_s: Delay = 0.0
     on_unknown: Literal["keep", "raise"] = "keep"

@@ -271,14 +271,13 @@ class Panel(Description):
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
     def parameters(self) -> Iterator[Parameter]:
-        yield from (w for w in self.widgets() if isinstance(w, Parameter))
+        return (w for w in self.widgets() if isinstance(w, Parameter))
 
     def logs(self) -> dict[str, int]:
         """Topic → number of lines to keep, of all logs that the panel shows."""
         kept: dict[str, int] = {}
-        for w in self.widgets():
-            if isinstance(w, LogView):
-                kept[w.topic] = max(w.keep, kept.get(w.topic, 0))
+        for w in (w for w in self.widgets() if isinstance(w, LogView)):
+            kept[w.topic] = max(w.keep, kept.get(w.topic, 0))
         return kept
 
     def publications(self) -> dict[str, str]:

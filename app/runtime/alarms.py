@@ -7,6 +7,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,7 +21,7 @@ from app.alarms.marks import AlarmMarks
 from app.alarms.own import is_kept
 from app.alarms.records import history_row, record_of
 from app.alarms.rows import AlarmRow, row_of
-from app.alarms.shown import NO_ALARMS, AlarmsView, ShownAlarms
+from app.alarms.shown import MAX_ROWS, NO_ALARMS, AlarmsView, ShownAlarms
 from app.alarms.status import Moment
 from app.audit.press_record import Log
 from app.i18n import TextLike
@@ -33,6 +34,8 @@ log = logging.getLogger("kiosk.alarms")
 
 AT_ONCE: Final = 25  # alarms that are evaluated in one turn: 2 ms if all are raised
 SHOW_EVERY_S: Final = 0.05
+ROWS_AT_ONCE: Final = 100  # that have changed: 10 ms to render
+ROW_S: Final = 0.001  # the pause is so much longer for each: in a flood, presses go first
 # A change is shown when it is on the disk, or after this time: no slow disk hides an alarm.
 SHOWN_WITHIN_S: Final = 0.5
 LOAD_TIMEOUT_S: Final = 5.0  # the panel starts without earlier alarms if the disk takes longer
@@ -64,6 +67,7 @@ class Alarms:
         self._disk: AlarmDisk | None = None
         self._loaded: asyncio.Future[None] = self._loop.create_future()
         self._pending: deque[_Pending] = deque()
+        self._shown_to = 0.0  # the last change that may be shown
         self._written_to = 0  # the number of the last change that is on the disk
         self._seq = 0
         self._overrun: dict[str, None] = {}  # ids of alarms of which a change found no room
@@ -74,6 +78,8 @@ class Alarms:
         self._lock_changes = 0
         self._show_timer: asyncio.TimerHandle | None = None
         self._shown_at = -math.inf
+        self._pause_s = SHOW_EVERY_S  # until the views are notified again
+        self._changed_rows = 0  # since they were
         self._slow_timer: asyncio.TimerHandle | None = None
         self._due_timer: asyncio.TimerHandle | None = None
         self._due = math.inf
@@ -89,8 +95,7 @@ class Alarms:
         return robot_alarms
 
     async def start(self, folder: Path, operators_log: Log) -> None:
-        """Loads the alarms that stood when the server ended, from a folder. Does nothing for a panel
-        without alarms."""
+        """Loads the alarms that stood when the server ended; nothing for a panel without alarms."""
         if not self._panel.may_raise:
             return
         if self._panel.alarm_rules.panel:
@@ -226,15 +231,17 @@ class Alarms:
         self._show_until(last)
         if self._pending:
             wait_s = self._pending[0].since + SHOWN_WITHIN_S - time.monotonic()
-            self._slow_timer = self._loop.call_later(max(0.0, wait_s), self._show_slow)
+            self._slow_timer = self._loop.call_later(max(SHOW_EVERY_S, wait_s), self._show_slow)
 
     def _show_until(self, seq: float) -> None:
-        changed = False
-        while self._pending and self._pending[0].seq <= seq:
+        """Shows changes up to this number, as many as readers get at once; the others follow."""
+        self._shown_to = max(self._shown_to, min(seq, self._seq))
+        room = ROWS_AT_ONCE - self._changed_rows
+        while room > 0 and self._pending and self._pending[0].seq <= self._shown_to:
             change = self._pending.popleft()
             self._shown.update(change.id, change.row)
-            changed = True
-        if changed:
+            self._changed_rows, room = self._changed_rows + 1, room - 1
+        if self._changed_rows:
             self._show()
 
     def _set_fault(self, fault: TextLike) -> None:
@@ -245,18 +252,21 @@ class Alarms:
         self._show()
 
     def _show(self) -> None:
-        """Notifies the views, at most once in `SHOW_EVERY_S`."""
+        """Notifies the views, at most once in `SHOW_EVERY_S`, and less often after many rows."""
         if self._show_timer is None and not self._stopped:
-            wait_s = self._shown_at + SHOW_EVERY_S - time.monotonic()
+            wait_s = self._shown_at + self._pause_s - time.monotonic()
             self._show_timer = self._loop.call_later(max(0.0, wait_s), self._notify)
 
     def _notify(self) -> None:
         self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
+        self._pause_s = SHOW_EVERY_S + ROW_S * self._changed_rows
+        self._changed_rows = 0
         marked = self._shown.marks.take_changes()
         for robot in self._robots:
             if topics := marked.get(robot.robot_id):
                 robot.show_marks(self._shown.marks.of_robot(robot.robot_id), topics)
-            robot.show(self._shown.listed())
+            robot.show(islice(self._shown.listed(), MAX_ROWS))
+        self._show_until(0)
 
     # Restart, and a new file.
 

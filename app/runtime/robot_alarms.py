@@ -45,10 +45,15 @@ class RobotAlarms:
         self._evaluate()
 
     def entries_received(
-        self, alarm_id: str, entries: Sequence[AlarmEntry], at: float, is_whole: bool
+        self,
+        alarm_id: str,
+        entries: Sequence[AlarmEntry],
+        at: float,
+        is_whole: bool,
+        earlier: Collection[str],
     ) -> None:
-        """The robot published alarms itself."""
-        self._engine.entries_received(self.robot_id, alarm_id, entries, at, is_whole)
+        """The robot published alarms itself: see the engine's function of this name."""
+        self._engine.entries_received(self.robot_id, alarm_id, entries, at, is_whole, earlier)
         self._evaluate()
 
     def show(self, rows: Iterable[AlarmRow]) -> None:

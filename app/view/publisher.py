@@ -17,10 +17,12 @@ from typing import Any, Final, NamedTuple
 from pydantic_core import to_json
 
 from app.i18n import ENGLISH, localized
+from app.panel.layout import FRAME_ONLY
 from app.permission.control_authority_view import Role
 from app.view.audience import EVERYONE, Audience
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
+from app.view.rendered_rows import RenderedRows
 from app.view.sections import CHANGES, PERMISSION_EVENT, Events, difference
 from app.view.view import View, for_audience
 
@@ -32,7 +34,11 @@ SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"
 
 def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
     """JSON in one line, for clients that read lines. NaN and infinity are null; a Text is rendered."""
-    text = to_json(localized(data, language), inf_nan_mode="null")
+    return _line(localized(data, language))
+
+
+def _line(rendered: Any) -> bytes:
+    text = to_json(rendered, inf_nan_mode="null")
     if not text.isascii():
         for separator, escaped in SEPARATORS.items():
             text = text.replace(separator, escaped)
@@ -76,6 +82,7 @@ class ViewPublisher:
         self._prepared: dict[Variant, bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._lock_changes: dict[str, int] = {}
+        self._rows = RenderedRows()
         self.closed = False
 
     @property
@@ -133,7 +140,8 @@ class ViewPublisher:
         key = audience, page
         if key not in self._snapshots:
             view = self.for_audience(audience)
-            whole = {**view, "widgets": self._of_page(view["widgets"], page)}
+            shown = {"widgets": self._of_page(view["widgets"], page)}
+            whole = {**view, **shown, "alarms": alarms_of_page(view["alarms"], page)}
             about = {"id": self.id, "revision": self.revision}
             self._snapshots[key] = self._event("snapshot", {**about, **whole}, audience.language)
         return self._snapshots[key]
@@ -169,7 +177,7 @@ class ViewPublisher:
         shown = by_change(self._of_page(events.get("update", NOTHING), page))
         for name, data in events.items():
             if name != "update" and not name.endswith(PERMISSION_EVENT):
-                shown[name] = data
+                shown[name] = alarms_of_page(data, page) if name == "alarms" else data
         return shown
 
     def _of_page(self, widgets: Mapping[str, Any], page: str) -> Mapping[str, Any]:
@@ -187,9 +195,29 @@ class ViewPublisher:
             whole = self._whole[key] = self._event(name, data, language)
         return whole
 
+    def _with_rows(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
+        """The JSON of an event with rows of alarms, which are many; b"" for another event."""
+        alarms = (
+            data if name == "alarms" else data.get("alarms", NOTHING) if name == "snapshot" else NOTHING
+        )
+        if not alarms.get("rows"):
+            return b""
+        rest = localized({**alarms, "rows": {}}, language)
+        rest["rows"] = self._rows.render(alarms["rows"], language)
+        if name == "alarms":
+            return _line(rest)
+        others = {key: value for key, value in data.items() if key != "alarms"}
+        return _line({**localized(others, language), "alarms": rest})
+
     def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
-        lines = (name.encode(), encoded(data, language), self.id.encode())
+        line = self._with_rows(name, data, language)
+        lines = (name.encode(), line or encoded(data, language), self.id.encode())
         return b"event: %b\ndata: %b\nid: %b\n\n" % lines
+
+
+def alarms_of_page(alarms: Mapping[str, Any], page: str) -> Mapping[str, Any]:
+    """The section of alarms for a page: only that of their list has the rows."""
+    return alarms if page in ("", FRAME_ONLY) else {**alarms, "rows": {}}
 
 
 def by_change(widgets: Mapping[str, Attributes]) -> Events:

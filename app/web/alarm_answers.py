@@ -14,6 +14,8 @@ from app.clock import iso_time
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
+from app.commands.receipts import Receipt
+from app.web.receipt_answer import ReceiptAnswer
 
 MAX_ACKNOWLEDGED: Final = 500  # alarms in one request
 MAX_OCCURRENCE: Final = 2**53
@@ -183,7 +185,9 @@ class HistoryAnswer(BaseModel):
 
 
 class AlarmReceipt(BaseModel):
-    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name."""
+    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name. `command` is
+    the receipt of the alarm's `ack_command`, null if none was sent or answered; `reason` then says
+    what became of it."""
 
     id: str
     alarm: str
@@ -193,6 +197,7 @@ class AlarmReceipt(BaseModel):
     reason: str
     at: AwareDatetime
     done: bool
+    command: ReceiptAnswer | None
 
 
 class AlarmReceipts(BaseModel):
@@ -234,5 +239,6 @@ def transition(row: HistoryRow) -> dict[str, Any]:
     }
 
 
-def receipt_json(alarm: str, receipt: ActReceipt) -> dict[str, Any]:
-    return {**receipt.as_json(), "alarm": alarm, "done": receipt.done}
+def receipt_json(alarm: str, receipt: ActReceipt, command: Receipt | None) -> dict[str, Any]:
+    sent = command and command.as_json()
+    return {**receipt.as_json(), "alarm": alarm, "done": receipt.done, "command": sent}

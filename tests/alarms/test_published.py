@@ -1,11 +1,11 @@
 """Messages of diagnostics and lists become alarms, whatever a robot sends."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from app.alarms.entries import AlarmEntry
-from app.alarms.published import MAX_QUEUED, MAX_STATUSES, PublishedAlarms
+from app.alarms.published import CHUNK, MAX_QUEUED, MAX_STATUSES, PublishedAlarms
 from app.i18n import render
 from app.panel import load_panel
 from app.panel.model import Panel
@@ -27,9 +27,17 @@ class Received:
             panel, "", INTERFACES, lambda topic: [topic.lstrip("/")], Slices(), self.receive
         )
 
-    def receive(self, _: str, entries: Sequence[AlarmEntry], __: float, is_whole: bool) -> None:
+    def receive(
+        self,
+        _: str,
+        entries: Sequence[AlarmEntry],
+        __: float,
+        is_whole: bool,
+        earlier: Collection[str],
+    ) -> None:
         self.entries += entries
         self.whole.append(is_whole)
+        self.earlier = set(earlier)
 
     def send(self, *statuses: Mapping[str, Any], topic: str = "diagnostics") -> None:
         self.send_bytes(INTERFACES.encode(ARRAY, {"status": list(statuses)}), topic)
@@ -60,7 +68,7 @@ def test_a_message_with_more_statuses_than_are_read_is_bounded(tmp_path: Path) -
     robot = received(tmp_path, HEALTH)
     robot.send(*({"name": f"motor {i}", "level": 1} for i in range(MAX_STATUSES + 3)))
     assert len(robot.entries) == MAX_STATUSES
-    assert robot.whole == [False]
+    assert set(robot.whole) == {False}
 
 
 def test_bytes_that_are_no_message_raise_nothing(tmp_path: Path) -> None:
@@ -88,3 +96,25 @@ def test_a_fault_catalogue_has_texts_and_actions_by_code(tmp_path: Path) -> None
     assert (render(known.text, "ja"), render(known.action, "ja")) == ("軸過熱", "掃除する")
     assert (render(known.cause, "de"), known.priorities) == ("Fan", (1,))
     assert (other.text, other.action, other.priorities) == ("Other", "", (3,))
+
+
+def test_a_long_list_is_passed_on_in_parts_and_is_whole_with_the_last(tmp_path: Path) -> None:
+    robot = received(tmp_path, FAULTS)
+    count = 2 * CHUNK + 1
+    robot.send(
+        *({"hardware_id": f"E{i}", "message": "Hot", "level": 2} for i in range(count)), topic="faults"
+    )
+    assert len(robot.entries) == count
+    assert robot.whole == [False, False, True]
+    assert robot.earlier == {f"E{i}" for i in range(2 * CHUNK)}
+
+
+def test_a_status_that_is_the_same_again_is_the_same_entry(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    for load, level in (("1 %", 0), ("2 %", 0), ("3 %", 2), ("3 %", 2), ("4 %", 2)):
+        values = [{"key": "load", "value": load}]
+        robot.send({"name": "motor 1", "level": level, "message": "Warm", "values": values})
+    first, second, third, fourth, fifth = robot.entries
+    assert first is second
+    assert third is fourth
+    assert (third.details, fifth.details) == ("load: 3 %", "load: 4 %")

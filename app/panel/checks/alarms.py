@@ -14,7 +14,10 @@ from app.panel.constants import NUMBERS
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
 from app.panel.faults.wording import list_names
 from app.panel.model import Panel
+from app.panel.template import input_ids
 from app.panel.values import number_text, same_value
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Call
 
 RESERVED: Final = "panel_"  # begins the ids of the panel's own alarms
 NO_SOURCE: Final = (
@@ -50,6 +53,7 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
         yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
         yield from _stop_faults(place, alarm, panel)
         yield from _state_faults(place, alarm, panel)
+        yield from _command_faults(place, alarm, panel, faulty)
         for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
             if condition is not None:
                 yield from condition_faults(f"{place}.{key}", condition, interfaces)
@@ -79,6 +83,28 @@ def _state_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
     elif not any(same_value(value, alarm.state) for value in known):
         message = f"no state {format_value(alarm.state)}; there is {list_names(map(str, known))}"
         yield Fault(place, message, cause=cause)
+
+
+def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[str]) -> Iterator[Fault]:
+    """What is pressed at an acknowledgement is a button that publishes or calls."""
+    if alarm.ack_command is None:
+        if alarm.ack_input is not None:
+            yield Fault(f"{place}.ack_input", "is an input of ack_command: name the control there")
+        return
+    if alarm.ack_command in faulty:
+        return
+    pressed = {w.id: w for w in panel.commands if isinstance(w, Publish | Call)}
+    place_of = f"{place}.ack_command"
+    yield from _reference_faults(place_of, "publish or call", alarm.ack_command, pressed)
+    widget = pressed.get(alarm.ack_command)
+    if widget is None:
+        return
+    if alarm.ack != "required":
+        yield Fault(place_of, 'is sent when it is acknowledged: leave out ack = "none"')
+    inputs = [name for name in input_ids(widget) if name not in faulty]
+    yield from _reference_faults(
+        f"{place}.ack_input", f'input of "{widget.id}"', alarm.ack_input, inputs
+    )
 
 
 def _reference_faults(

@@ -22,6 +22,7 @@ from app.runtime.robot_session import RobotSession
 from app.view.audience import audience, audience_of
 from app.view.sections import SECTIONS, Section
 from app.view.view import View
+from app.web.alarm_runs import command_text
 from app.web.app_state import AppState
 from app.web.assets import PICTURES
 from app.web.embedding import QUERY as EMBED
@@ -172,5 +173,7 @@ def _alarm_refused(state: AppState, query: str) -> TextLike:
     kept."""
     if query in (TOO_OFTEN.code, TOO_SOON.code):
         return say(query)
-    receipts = (session.alarm_acts.receipt(query) for session in state.fleet.sessions)
-    return next((receipt.reason for receipt in receipts if receipt), "")
+    for session in state.fleet.sessions:
+        if receipt := session.alarm_acts.receipt(query):
+            return command_text(session, query) or receipt.reason
+    return ""

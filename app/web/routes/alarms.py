@@ -3,10 +3,7 @@ and scripts, forms without them."""
 
 import asyncio
 import re
-import secrets
-import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Final
 from urllib.parse import quote, urlencode, urlsplit
@@ -17,14 +14,12 @@ from pydantic import BaseModel
 
 from app import clock
 from app.alarms.history import read_history
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError
 from app.i18n import localized, say
-from app.permission.principal import Principal
-from app.runtime.robot_session import RobotSession
 from app.web.alarm_answers import (
     AcknowledgeBody,
     AlarmActBody,
@@ -37,6 +32,7 @@ from app.web.alarm_answers import (
     receipt_json,
     transition,
 )
+from app.web.alarm_runs import AlarmRun, AlarmRuns
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.language import language_of
@@ -52,7 +48,6 @@ router = APIRouter()
 AlarmId = Annotated[str, Path(max_length=300, description="the id of an alarm")]
 AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
-DISK_TIMEOUT_S: Final = 2.0  # then the receipt says that the act is not safely on the disk
 FORM_FIELDS_MOST: Final = 600
 OWN_PAGE: Final = re.compile(
     r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics)(\?[!-~]*)?"
@@ -200,52 +195,15 @@ async def _answer(
     refusal = TOO_SOON if form is not None and _is_second_tap(form) else None
     if not state.limits.admit(who):
         refusal = TOO_OFTEN
+    runs = AlarmRuns(state, who, refusal, scripted=form is None)
     with state.in_flight.track():
-        receipts = await asyncio.gather(
-            *(
-                _run(state, who, act, alarm, body, form is None, refusal)
-                for alarm, body in bodies.items()
-            )
-        )
-    pairs = list(zip(bodies, receipts, strict=True))
-    response = (
-        _back(request, state, form, receipts) if form is not None else _json(request, pairs, several)
-    )
+        answers = await asyncio.gather(*(runs.run(act, alarm, body) for alarm, body in bodies.items()))
+    pairs = list(zip(bodies, answers, strict=True))
+    if form is not None:
+        response: Response = _back(request, state, form, [answer.receipt for answer in answers])
+    else:
+        response = _json(request, pairs, several)
     return set_client_cookie(response, request, token)
-
-
-async def _run(
-    state: AppState,
-    who: Principal,
-    act: str,
-    alarm: str,
-    body: AlarmActBody,
-    scripted: bool,
-    refusal: Any,
-) -> ActReceipt:
-    runner = _session(state, alarm).alarm_acts
-    # One rendered page has one id for all its buttons, and each is an act of its own.
-    act_id = f"{body.id}.{act}.{alarm}" if body.id else secrets.token_hex(8)
-    at = body.at.timestamp() if scripted and body.at else None
-    values = body.values(alarm, time.time())
-    if body.id and body.for_s is not None and (earlier := runner.request(act_id)):
-        values = dict(earlier.values)  # its end was that of the first request
-    requested = ActRequest(act, who, alarm, values, at, scripted)
-    if refusal is not None:
-        return runner.limited(requested, act_id, refusal)
-    receipt = await runner.act(requested, act_id)
-    if not receipt.done or await state.fleet.alarms.written(DISK_TIMEOUT_S):
-        return receipt
-    return replace(receipt, reason=receipt.reason or say("alarm_act_not_on_disk"))
-
-
-def _session(state: AppState, alarm: str) -> RobotSession:
-    """The session of an alarm's robot: who has control there may act. The panel's own alarms are of the
-    first robot."""
-    instance = state.fleet.alarms.engine.alarms.get(alarm)
-    robot = instance.definition.robot if instance else ""
-    known = {session.entry.id if session.entry else "": session for session in state.fleet.sessions}
-    return known.get(robot, state.fleet.first)
 
 
 def _is_second_tap(form: Mapping[str, str]) -> bool:
@@ -257,9 +215,9 @@ def _is_second_tap(form: Mapping[str, str]) -> bool:
     return clock.server_now() - shown_at < TAP_AGAIN_S
 
 
-def _json(request: Request, pairs: list[tuple[str, ActReceipt]], several: bool) -> Response:
-    receipts = [receipt_json(alarm, receipt) for alarm, receipt in pairs]
-    cause = next((receipt.cause for _, receipt in pairs if not receipt.done), "")
+def _json(request: Request, pairs: list[tuple[str, AlarmRun]], several: bool) -> Response:
+    receipts = [receipt_json(alarm, *answer) for alarm, answer in pairs]
+    cause = next((answer.receipt.cause for _, answer in pairs if not answer.receipt.done), "")
     headers = {"retry-after": str(RETRY_AFTER_S)} if cause == "limit" else None
     content = {"receipts": receipts} if several else receipts[0]
     return JSONResponse(

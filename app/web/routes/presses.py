@@ -30,6 +30,7 @@ from app.web.openapi_parts import (
     errors,
     fields,
 )
+from app.web.receipt_answer import ReceiptAnswer
 from app.web.rendering.display_choice import display_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import PressForm, Reader, page_after, pressed_by_form
@@ -73,17 +74,6 @@ class Cancel(BaseModel):
     under way. What else comes with it is not judged: stopping stays easy."""
 
     press: str = ""
-
-
-class ReceiptAnswer(BaseModel):
-    """The receipt of a press."""
-
-    id: str
-    widget: str
-    outcome: str
-    code: Annotated[str | None, Field(description="the stable name of the reason, null without one")]
-    reason: Annotated[str, Field(description="a sentence for the operator, in the request's language")]
-    at: AwareDatetime
 
 
 RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
