@@ -15,6 +15,7 @@ from app.commands.reason_codes import reason_code
 from app.errors import Cause
 from app.i18n import TextLike, render, say
 from app.panel.widgets.families import Command, EntryWidget
+from app.robot.command_status import GOOD_OUTCOMES as GOOD_OUTCOMES
 from app.robot.command_status import Outcome, OutcomeCode
 
 RECEIPTS_KEPT: Final = 1000
@@ -22,7 +23,6 @@ MAX_FINAL_CHECKS: Final = 20  # if data keeps arriving faster than it is ingeste
 PAST_IDS_KEPT: Final = 20_000  # ids of presses whose receipts are no longer kept
 MAX_LOGGED_CHARS: Final = 300
 MAX_KEPT_CHARS: Final = 4000  # characters of all inputs of a press
-GOOD_OUTCOMES: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 
 
 class Refusal(NamedTuple):

@@ -1,8 +1,9 @@
 """The status of the latest command of each widget."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from app.i18n import TextLike
 
@@ -18,6 +19,9 @@ OutcomeCode = Literal[
     "refused",
     "unknown",
 ]
+
+
+GOOD_OUTCOMES: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,26 @@ class CommandStatus:
 
 
 IDLE = CommandStatus()
+
+
+class CommandStatuses(dict[str, CommandStatus]):
+    """The statuses by widget id. `set_at` has when each was set: monotonic seconds, and seconds since
+    the epoch."""
+
+    def __init__(
+        self,
+        monotonic: Callable[[], float] = time.monotonic,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        super().__init__()
+        self.set_at: dict[str, tuple[float, float]] = {}
+        self._clocks = monotonic, wall
+
+    def __setitem__(self, widget: str, status: CommandStatus) -> None:
+        if self.get(widget) != status:
+            monotonic, wall = self._clocks
+            self.set_at[widget] = monotonic(), wall()
+        super().__setitem__(widget, status)
 
 
 @dataclass(frozen=True, slots=True)

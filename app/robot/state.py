@@ -25,7 +25,7 @@ from app.panel.widgets.parameter import GET
 from app.robot.alarm_action import AlarmAction
 from app.robot.alarmed import NO_ALARMED
 from app.robot.camera_topic import CameraTopicState
-from app.robot.command_status import CommandStatus
+from app.robot.command_status import CommandStatuses
 from app.robot.definitions import Difference, difference
 from app.robot.graph import LiveGraph
 from app.robot.history import History
@@ -102,7 +102,7 @@ class RobotState:
         self.replayed = ReplayedMessages()
         self._adaptive_keys = frozenset(map(self.key, panel.adaptive_topics))
         self.reliable_readers: set[str] = set()  # keys of subscriptions that began as reliable
-        self.command_status: dict[str, CommandStatus] = {}  # by widget id
+        self.command_status = CommandStatuses()  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
         self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic

@@ -41,6 +41,7 @@ from app.view.log_values import log
 from app.view.machine_values import machine_state
 from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
+from app.view.result_age import result_age
 from app.view.sequence_values import sequence
 from app.view.step_values import step
 from app.view.switch_values import switch
@@ -97,11 +98,13 @@ def all_reasons(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
 def progress(status: CommandStatus) -> Attributes:
     """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
     is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
-    both "" where there is none. `doing` says how far a goal is that is under way."""
+    both "" where there is none. `doing` says how far a goal is that is under way; `aged`: the result is
+    an old one."""
     return {
         "busy": status.busy,
         "outcome": status.outcome,
         "result": status.text,
+        "aged": False,
         "progress": status.fraction,
         "stoppable": status.can_cancel,
         "goal": status.goal,
@@ -119,10 +122,11 @@ def _doing(status: CommandStatus) -> TextLike:
     return say("goal_state_percent", state=state, percent=int(100 * status.fraction))
 
 
-def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> AttributesUntil:
-    """The lock, and the result of the last press."""
-    came = progress(robot.command_status.get(widget.id, IDLE))
-    return {**lock(widget, verdict), **came}, math.inf
+def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
+    """The lock, and the result of the last press, for as long as it is shown."""
+    status = robot.command_status.get(widget.id, IDLE)
+    came, until = result_age(status, robot.command_status.set_at.get(widget.id, (now, 0.0)), now)
+    return {**lock(widget, verdict), **progress(status), **came}, until
 
 
 def _published(
@@ -144,9 +148,9 @@ def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: floa
 
 
 def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
-    pressed, _ = _pressed(widget, robot, verdict, now)
+    pressed, ages = _pressed(widget, robot, verdict, now)
     reported, until = step(widget, robot, now)
-    return pressed | reported, until
+    return pressed | reported, min(ages, until)
 
 
 def _switched(widget: Switch, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:

@@ -2,6 +2,7 @@
 // with why it is locked and what to do, and so does the "…" of the key, which a keyboard reaches. An open sheet follows
 // its key. A touch on the bar of control shows its text in full.
 import { placeBeside, uncoverPage } from "./beside.js";
+import { sayOnce } from "./group-locks.js";
 import { lockHelp } from "./lock-help.js";
 import { closest, copyOf, find, setText } from "./show.js";
 
@@ -120,6 +121,7 @@ function showMore(key, cut) {
   const more = find(key, ".more");
   const isComplete = !cut && !isLocked(key) && !key.querySelector('[data-text="more"]')?.textContent;
   more.toggleAttribute("hidden", isComplete && document.activeElement !== more);
+  more.toggleAttribute("data-cut", cut);
   const focused = document.activeElement;
   if (isLocked(key) && focused?.matches("button:disabled") && key.contains(focused)) more.focus();
   follow(key);
@@ -139,6 +141,8 @@ function markAll() {
   const keys = [...changed].map((key) => ({ key, cut: [...key.querySelectorAll(".face > p")].some(isCut) }));
   changed.clear();
   for (const { key, cut } of keys) showMore(key, cut);
+  const roots = keys.map(({ key }) => key);
+  sayOnce(roots, isLocked);
 }
 
 // A key, or a step or a switch, whose two keys have one text.

@@ -1,6 +1,7 @@
 // Hold-to-run, by a key or a joystick: acts while it is held. Every event that may mean a release ends the hold, and
 // only a new press starts another one. The page shows the server's response, nothing else.
 import { enteredValues } from "./entries.js";
+import { showOutcome } from "./receipts.js";
 import { find } from "./show.js";
 
 // On the page's own thread on purpose: a page that stalls must not keep a hold alive.
@@ -158,9 +159,7 @@ export class Holding {
 
   /** @param {string} outcome @param {string | undefined} reason */
   #show(outcome, reason) {
-    const receipt = find(this.root, ".receipt");
-    receipt.dataset.outcome = outcome;
-    receipt.textContent = reason ?? "";
+    showOutcome(find(this.root, ".receipt"), outcome, reason);
   }
 }
 

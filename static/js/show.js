@@ -1,5 +1,6 @@
 // Shows the attributes and receipts of widgets: texts and element properties, in place. Composes no sentence.
 import { releaseEntry } from "./entries.js";
+import { showOutcome } from "./receipts.js";
 
 // What the scripts of widget kinds register, by the kind.
 /** @type {Map<string | undefined, Hooks>} */
@@ -96,6 +97,7 @@ const SHOW = {
   press: (root, value) => assign(root.querySelector("button.cancel"), { value }),
   held: (root, value) => root.toggleAttribute("data-held", value),
   outcome: (root, outcome) => assign(find(root, ".result").dataset, { outcome }),
+  aged: (root, value) => find(root, ".result").toggleAttribute("data-aged", value),
   busy: (root, value) => {
     root.toggleAttribute("data-busy", value);
     assign(root.querySelector("progress"), { hidden: !value });
@@ -167,15 +169,11 @@ export function showReceipt(widgets, root, { id, outcome, reason }) {
   if (outcome === "succeeded") releaseEntry(root);
   for (const widget of widgets) {
     const old = widget.querySelector(".receipt");
-    if (!old) continue;
-    old.textContent = "";
-    delete old.dataset.outcome;
+    if (old) showOutcome(old, "", "");
   }
   // The result of a call is an attribute of the widget, shown in every browser. The receipt of a cancel has
   // no id: the goal's state shows that the cancel was requested.
   const shared = id ? outcome !== "refused" : outcome === "accepted";
   if (root.querySelector(".result") && shared) return;
-  const receipt = find(root, ".receipt");
-  receipt.dataset.outcome = outcome;
-  receipt.textContent = reason;
+  showOutcome(find(root, ".receipt"), outcome, reason);
 }

@@ -79,6 +79,7 @@ LOCKED_BY_TWO: Final[Table] = LOCKED | {
 REST: Final[Table] = {
     "busy": False,
     "outcome": "",
+    "aged": False,
     "result": "",
     "progress": None,
     "stoppable": False,

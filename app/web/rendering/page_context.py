@@ -3,6 +3,8 @@
 import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
 from typing import Any, Final, TypedDict
 from urllib.parse import urlencode
 
@@ -18,8 +20,10 @@ from app.panel.layout import FRAME_ONLY, Page
 from app.panel.model import Panel
 from app.permission.principal import Principal
 from app.printable import printable_texts
+from app.robot.command_status import GOOD_OUTCOMES
 from app.runtime.robot_session import RobotSession
 from app.view.audience import audience, audience_of
+from app.view.result_age import BAD_S, GOOD_S
 from app.view.sections import SECTIONS, Section
 from app.view.view import View
 from app.web.alarm_runs import command_text
@@ -96,7 +100,7 @@ def page_context(
     query of the page of diagnostics, for that page.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
-    receipt = session.presses.receipt(request.query_params.get("receipt", ""))
+    receipt = _faded(session.presses.receipt(request.query_params.get("receipt", "")))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     again |= {EMBED: 1} if embedded else {}
     now, wall = clock.server_now(), time.time()
@@ -158,6 +162,15 @@ def page_context(
         back=f"{state.root}/{alarms_page}" if is_alarms else back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
+
+
+def _faded(receipt: Receipt | None) -> Receipt | None:
+    """The receipt, without its sentence once that is too old to be shown."""
+    if receipt is None:
+        return None
+    age_s = time.time() - datetime.fromisoformat(receipt.at).timestamp()
+    kept_s = GOOD_S if receipt.outcome in GOOD_OUTCOMES else BAD_S
+    return receipt if age_s < kept_s else replace(receipt, reason="")
 
 
 def _refused(session: RobotSession, query: str) -> TextLike:
