@@ -110,8 +110,7 @@ class Panel(Description):
         (), alias="condition"
     )
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
-    # Computed from the file: differs when loaded pages are out of date.
-    revision: Annotated[str, Field(exclude=True)] = ""
+    revision: Annotated[str, Field(exclude=True)] = ""  # of the file: other pages are out of date
 
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ Keeps the latest sample of each topic as raw bytes, and decodes it at the first 
 import logging
 import math
 import time
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,6 @@ from typing import Any
 from app.dialect.dialect import Dialect
 from app.dialect.endpoint import Role
 from app.dialect.peer_traits import PeerTraits
-from app.errors import DecodeError
 from app.i18n import Text, TextLike
 from app.interfaces import Interfaces, has_key
 from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of, possible_keys
@@ -48,8 +46,6 @@ from app.robot.traffic import Traffic
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.robot")
-
-UNREADABLE_LOG_S = 60.0  # at most one log line for each topic in this time
 
 
 class RobotState:
@@ -114,8 +110,7 @@ class RobotState:
         self.is_responding = True  # False: its peers do not respond
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
         self.presence = EndpointPresence(needed, self.key)
-        self.undecodable: Counter[str] = Counter()
-        self.traffic, self.round_trips = Traffic(), RoundTrips()
+        self.traffic, self.round_trips = Traffic(self._log), RoundTrips()
         self.slices = slices or Slices()
         self._on_late_reading, self._interfaces = on_late_reading, interfaces
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
@@ -128,7 +123,6 @@ class RobotState:
             for lines in [LogLines(interfaces, keep)]
             for key in self.possible_keys(topic)
         }
-        self._logged_at: dict[str, float] = {}
         self.history = History(time.monotonic(), time.time())
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
@@ -143,7 +137,7 @@ class RobotState:
                 self._interfaces.field_reader(type_name, paths),
                 self.slices,
                 lossless=topic in lossless,
-                on_unreadable=partial(self.count_unreadable, key),
+                on_unreadable=partial(self.traffic.count_undecodable, key),
                 on_late_reading=partial(self._on_late_reading, key),
                 keyed=[path for path in dict.fromkeys(paths) if has_key(path)],
                 timed=[panel.state.field] if panel.state and panel.state.topic == topic else (),
@@ -291,11 +285,3 @@ class RobotState:
     def constants(self, display: HasField) -> Mapping[str, Any]:
         """Name → value of the constants of the message that contains a display's field."""
         return self._interfaces.constants(parent_type(display, self._interfaces))
-
-    def count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
-        """Counts a sample that can't be decoded; logs at most one of a topic in `UNREADABLE_LOG_S`."""
-        self.undecodable[key] += 1
-        self.traffic.record_undecodable(key, sample, error)
-        if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
-            self._logged_at[key] = sample.at
-            self._log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])

@@ -3,13 +3,15 @@
 A sample costs an addition: rates are computed from marks, one a second, when someone asks for them.
 """
 
-from collections import deque
+import math
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from app.errors import DecodeError
 from app.robot.sample import Sample
+from app.ros_logging import RobotLog
 
 WINDOW_S: Final = 10.0
 SLOW_WINDOW_S: Final = 60.0  # of a topic with fewer than `ENOUGH` messages in `WINDOW_S`
@@ -18,6 +20,7 @@ MARK_EVERY_S: Final = 1.0
 MOST_MARKS: Final = 61
 STOPPED: Final = 3.0  # periods without a message: then the pause counts too
 FIRST_BYTES: Final = 32
+LOG_EVERY_S: Final = 60.0  # at most one log line for each topic in this time
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +73,11 @@ class TopicTraffic:
 class Traffic:
     """The traffic of one robot's topics, by their keys. Used on the event loop only."""
 
-    def __init__(self) -> None:
+    def __init__(self, log: RobotLog) -> None:
+        self._log = log
         self._topics: dict[str, TopicTraffic] = {}
+        self._logged_at: dict[str, float] = {}
+        self.undecodable: Counter[str] = Counter()  # messages that could not be decoded
 
     @property
     def topics(self) -> Mapping[str, TopicTraffic]:
@@ -84,8 +90,12 @@ class Traffic:
             topic = self._topics[key] = TopicTraffic()
         topic.record(sample)
 
-    def record_undecodable(self, key: str, sample: Sample, error: DecodeError) -> None:
-        """A sample could not be decoded. Its bytes were copied already: they are decoded as bytes."""
-        topic = self._topics.setdefault(key, TopicTraffic())
+    def count_undecodable(self, key: str, sample: Sample, error: DecodeError) -> None:
+        """Counts a sample that can't be decoded; logs at most one of a topic in `LOG_EVERY_S`."""
+        self.undecodable[key] += 1
         data = bytes(sample.payload)
+        topic = self._topics.setdefault(key, TopicTraffic())
         topic.undecodable = Undecodable(data[:FIRST_BYTES], len(data), str(error), sample.wall)
+        if sample.at - self._logged_at.get(key, -math.inf) >= LOG_EVERY_S:
+            self._logged_at[key] = sample.at
+            self._log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])

@@ -114,7 +114,7 @@ def _heard(topic: _Known, robot: RobotState, now: float, on_demand: bool) -> Top
     mismatch = _mismatch("MS", topic, robot)
     there, arrived = robot.graph.has_endpoint("MP", key), traffic.size > 0
     state: RowState = "ok" if there and (arrived or on_demand) else "unknown"
-    if mismatch or robot.undecodable[key]:
+    if mismatch or robot.traffic.undecodable[key]:
         state = "problem"
     return TopicRow(
         name=topic.topic,
@@ -130,7 +130,7 @@ def _heard(topic: _Known, robot: RobotState, now: float, on_demand: bool) -> Top
         rate_hz=traffic.rate(now),
         size=traffic.size if arrived else None,
         age_s=max(now - traffic.at, 0.0) if arrived else None,
-        undecodable_count=robot.undecodable[key],
+        undecodable_count=robot.traffic.undecodable[key],
         undecodable=traffic.undecodable,
     )
 

@@ -76,6 +76,6 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
         up.add_metric([name], int(robot.link_up))
         bridges.add_metric([name], len(robot.graph.peers))
         ready.add_metric([name], int(session.link_verdict.permitted))
-        for key, count in robot.undecodable.items():
+        for key, count in robot.traffic.undecodable.items():
             unreadable.add_metric([name, key], count)
     yield from (up, bridges, ready, unreadable)

@@ -640,7 +640,7 @@ def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
             bench.actions.on_feedback("/count", garbage)
             bench.actions.on_status("/count", garbage)
         counted = {"count/_action/feedback": 100, "count/_action/status": 100}
-        assert bench.robot.undecodable == counted
+        assert bench.robot.traffic.undecodable == counted
         lines = [line for line in caplog.messages if "_action" in line]
         assert len(lines) == len(counted)
         assert bench.shown.goal == "ACCEPTED"

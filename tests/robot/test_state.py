@@ -9,7 +9,8 @@ from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import bridge_token, token
 from app.interfaces.names import Qos
 from app.panel.model import RobotEntry
-from app.robot.state import UNREADABLE_LOG_S, RobotState, Sample
+from app.robot.state import RobotState, Sample
+from app.robot.traffic import LOG_EVERY_S
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -108,12 +109,12 @@ def test_unreadable_samples_are_counted_by_key(robot: RobotState) -> None:
         broken(robot)
         robot.reading("/heard")
         robot.reading("/heard")
-    assert robot.undecodable == {"heard": 3}
+    assert robot.traffic.undecodable == {"heard": 3}
 
 
 def test_unreadable_samples_fill_no_log(robot: RobotState, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.ERROR, "kiosk.robot"):
-        for at in (0.0, 1.0, UNREADABLE_LOG_S - 1, UNREADABLE_LOG_S):
+        for at in (0.0, 1.0, LOG_EVERY_S - 1, LOG_EVERY_S):
             broken(robot, at=at)
             robot.reading("/heard")
     assert [r.getMessage().partition(" (")[2] for r in caplog.records] == ["1 so far)", "4 so far)"]

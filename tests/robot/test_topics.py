@@ -146,7 +146,7 @@ def test_truncated_message_locks() -> None:
         assert cell.locked_by == "interlock_reading"
         await cell.all_read()
         assert cell.locked_by == "interlock_unreadable"
-        assert cell.robot.undecodable == {"operation_enabled": 1}
+        assert cell.robot.traffic.undecodable == {"operation_enabled": 1}
 
     run(test)
 

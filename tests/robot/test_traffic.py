@@ -1,11 +1,14 @@
 """How often topics arrive, from counts: regular, slow and stopped ones, and what can't be decoded."""
 
+import logging
+
 import pytest
 
 from app.errors import DecodeError
 from app.robot.round_trips import EVERY_S, KEPT, MOST_IN_COLUMN, RoundTrips
 from app.robot.sample import Sample
 from app.robot.traffic import MOST_MARKS, TopicTraffic, Traffic
+from app.ros_logging import RobotLog
 
 BEGAN = 1000.0
 
@@ -58,8 +61,8 @@ def test_marks_are_bounded() -> None:
 
 
 def test_undecodable_message_has_its_first_bytes_and_size() -> None:
-    traffic = Traffic()
-    traffic.record_undecodable("speed", sample(BEGAN, size=5000), DecodeError("too short"))
+    traffic = Traffic(RobotLog(logging.getLogger("test"), ""))
+    traffic.count_undecodable("speed", sample(BEGAN, size=5000), DecodeError("too short"))
     undecodable = traffic.topics["speed"].undecodable
     assert undecodable is not None
     assert (undecodable.first, undecodable.size, undecodable.reason) == (b"x" * 32, 5000, "too short")

@@ -197,7 +197,7 @@ class GoalTracker:
                 self._robot.slices,
                 lossless=False,
                 on_unreadable=partial(
-                    self._robot.count_unreadable,
+                    self._robot.traffic.count_undecodable,
                     names.feedback(self._robot.key(widget.action)),
                 ),
                 on_late_reading=partial(self._apply_late_reading, widget.id),
@@ -225,7 +225,7 @@ class GoalTracker:
         try:
             return self._interfaces.decode(type_name, bytes(sample.payload))
         except DecodeError as error:
-            self._robot.count_unreadable(key, sample, error)
+            self._robot.traffic.count_undecodable(key, sample, error)
             return None
 
     def _advanced(self, goal: Goal) -> None:
