@@ -82,13 +82,17 @@ SPEAK_ZENOH = {
 OF_A_KIND: dict[tuple[str, ...], set[str]] = {
     ("app.dialect.bridge_", "app.transport.bridge_"): {
         "app.cli.bridge_config",
+        "app.dialect.auto_dialect",
         "app.runtime.robot_access",
         "app.simulator.zenoh_peer",
+        "app.transport.auto_peer",
         "app.simulator.zenoh_wire",
     },
     ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
+        "app.dialect.auto_dialect",
         "app.runtime.robot_access",
         "app.simulator.zenoh_wire",
+        "app.transport.auto_peer",
     },
 }
 KNOWN_TO_THE_SIMULATOR = (

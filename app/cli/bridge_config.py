@@ -13,6 +13,7 @@ from typing import Any, Final
 from app.cli.arguments import PANEL_HELP
 from app.cli.output import OutputError, add_force, draft_of
 from app.cli.parser import Parser
+from app.dialect.dialect import DOMAIN_MOST, WITHOUT_BRIDGE
 from app.errors import KioskError
 from app.interfaces.names import TOPIC
 from app.panel import Panel, load_panel
@@ -22,7 +23,10 @@ from app.settings import Settings
 from app.transport.bridge_config import LISTEN, BridgeOptions, bridge_config
 
 PROG: Final = "python -m app.cli bridge-config"
-HIGHEST_DOMAIN: Final = 232
+NO_BRIDGE: Final = (
+    "this robot needs no bridge: by the panel file its nodes run on rmw_zenoh, at the Zenoh router that"
+    " zenoh.json5 or `connect` names"
+)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -34,6 +38,8 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(error, file=sys.stderr)
         return 2
     entry = _robot(parser, panel, options.robot)
+    if (entry or panel).dialect in WITHOUT_BRIDGE:
+        parser.error(NO_BRIDGE)
     text = bridge_config(panel, entry, _options(options, entry))
     if options.output is None:
         print(text, end="")
@@ -71,8 +77,8 @@ def _options(options: Any, entry: RobotEntry | None) -> BridgeOptions:
 
 def _domain(text: str) -> int:
     domain = int(text) if text.isascii() and text.isdigit() else -1
-    if not 0 <= domain <= HIGHEST_DOMAIN:
-        raise ArgumentTypeError(f'"{text}" is not a ROS_DOMAIN_ID: 0 to {HIGHEST_DOMAIN}')
+    if not 0 <= domain <= DOMAIN_MOST:
+        raise ArgumentTypeError(f'"{text}" is not a ROS_DOMAIN_ID: 0 to {DOMAIN_MOST}')
     return domain
 
 

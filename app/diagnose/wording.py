@@ -87,6 +87,12 @@ ERRORS: Final[Rows] = {
         "The bridge {about} is known, but does not respond.",
         "Restart the bridge. If it happens again, look at its log.",
     ),
+    "link_no_peer": (
+        "Zenoh answers at {about}, but no ROS 2 bridge is connected to it.",
+        "Start zenoh-bridge-ros2dds on the robot: it must listen there or connect to this router. If "
+        "the robot's nodes run on rmw_zenoh, say so by `dialect` in the panel file: the doctor reads "
+        "them then.",
+    ),
     "link_no_ros_node": (
         "Zenoh answers at {about}, but no ROS 2 node on rmw_zenoh is there.",
         "Start the robot's nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp at this router, and set "

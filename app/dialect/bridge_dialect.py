@@ -19,6 +19,7 @@ from app.interfaces.names import (
 )
 
 TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and panel server
+EVERY_BRIDGE: Final = "@/*/@ros2_lv"  # those of bridges themselves
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
 CONFIG: Final = "@/*/ros2/config"  # a bridge's configuration: JSON with its `namespace`
@@ -108,7 +109,7 @@ def route_of(admin_key: str) -> tuple[str, Direction, str] | None:
 class BridgeDialect:
     """The `Dialect` of a robot behind zenoh-bridge-ros2dds."""
 
-    tokens: Final = TOKENS
+    tokens: Final = (TOKENS,)
     as_client: Final = False
 
     def topic(self, key: str, type_name: str) -> str:

@@ -5,10 +5,11 @@ from typing import Final, Literal, Protocol
 
 from app.dialect.endpoint import Endpoint, OwnEndpoint
 
-DialectName = Literal["bridge", "rmw_zenoh"]
-DEFAULT_DIALECT: Final[DialectName] = "bridge"  # where the panel file does not say
+DialectName = Literal["auto", "bridge", "rmw_zenoh"]
+DEFAULT_DIALECT: Final[DialectName] = "auto"  # where the panel file does not say: what is there decides
 # Those whose peers join a ROS domain by their own configuration.
 WITH_OWN_DOMAIN: Final[frozenset[DialectName]] = frozenset({"bridge"})
+WITHOUT_BRIDGE: Final[frozenset[DialectName]] = frozenset({"rmw_zenoh"})
 DOMAIN_MOST: Final = 232  # the last ROS_DOMAIN_ID
 ANY_HASH: Final = "*"
 TypeHash = Callable[[str], str]  # the name of a type → its hash in key expressions
@@ -28,8 +29,8 @@ class Dialect(Protocol):
     """
 
     @property
-    def tokens(self) -> str:
-        """The key expression of every liveliness token that shows the ROS graph."""
+    def tokens(self) -> tuple[str, ...]:
+        """The key expressions of the liveliness tokens that show the ROS graph."""
 
     @property
     def as_client(self) -> bool:

@@ -2,7 +2,7 @@
 each dialect. No I/O."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.dialect.dialect import DialectName
@@ -134,8 +134,29 @@ RMW_ZENOH_TRAITS: Final = PeerTraits(
         renewal="hold_by_reconnect",
     ),
 )
+# Until the tokens that are there have shown the kind of peer.
+AUTO_TRAITS: Final = replace(
+    BRIDGE_TRAITS,
+    title=BRIDGE_TRAITS.title,
+    start_hint=f"{BRIDGE_TRAITS.start_hint}; if the robot's nodes run on rmw_zenoh, start its Zenoh"
+    " router and its nodes",
+    sentences=replace(
+        BRIDGE_TRAITS.sentences, absent="link_no_peer", absent_named="link_no_peer_named"
+    ),
+)
+# Both kinds are there, and the panel file does not say which of them is the robot.
+AMBIGUOUS_TRAITS: Final = replace(
+    AUTO_TRAITS,
+    sentences=replace(
+        AUTO_TRAITS.sentences,
+        absent="link_two_kinds",
+        absent_named="link_two_kinds",
+        silent="link_two_kinds",
+    ),
+)
 PEER_TRAITS: Final[Mapping[DialectName, PeerTraits]] = {
+    "auto": AUTO_TRAITS,
     "bridge": BRIDGE_TRAITS,
     "rmw_zenoh": RMW_ZENOH_TRAITS,
 }
-EVERY_SENTENCES: Final = tuple(traits.sentences for traits in PEER_TRAITS.values())
+EVERY_SENTENCES: Final = tuple(traits.sentences for traits in (*PEER_TRAITS.values(), AMBIGUOUS_TRAITS))

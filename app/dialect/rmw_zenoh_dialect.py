@@ -35,8 +35,8 @@ class RmwZenohDialect:
     type_hash: TypeHash = any_hash
 
     @cached_property
-    def tokens(self) -> str:
-        return every_token(self.domain)
+    def tokens(self) -> tuple[str, ...]:
+        return (every_token(self.domain),)
 
     @property
     def as_client(self) -> bool:

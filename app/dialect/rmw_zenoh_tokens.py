@@ -34,6 +34,7 @@ from app.interfaces.names import (
 
 TokenKind = Literal["NN", "MP", "MS", "SS", "SC"]  # node, publisher, subscriber, service, client
 
+PREFIX: Final = "@ros2_lv/"
 PANEL_NODE: Final = "web_ui"
 PARTS: Final = 13  # of a token of an endpoint; that of a node ends with its name
 NODE_PARTS: Final = 9
@@ -63,6 +64,11 @@ class Token(NamedTuple):
 def every_token(domain: int) -> str:
     """The key expression of the tokens of a domain."""
     return f"@ros2_lv/{domain}/**"
+
+
+def every_node(domain: int) -> str:
+    """The key expression of the tokens of all nodes of a domain."""
+    return f"@ros2_lv/{domain}/*/*/*/NN/**"
 
 
 def parse_token(token: str) -> Token | None:

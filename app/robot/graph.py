@@ -191,8 +191,13 @@ class LiveGraph:
     @cached_until_change
     def nodes(self) -> frozenset[str]:
         """The names of the nodes that have tokens of their own, such as "/arm/driver"."""
-        every = (map(self.dialect.endpoint, tokens) for tokens in self._peers.values())
-        return frozenset(e.node for e in chain.from_iterable(every) if e is not None and e.node)
+        ends = map(self.dialect.endpoint, self.peer_tokens)
+        return frozenset(e.node for e in ends if e is not None and e.node)
+
+    @property
+    def peer_tokens(self) -> list[str]:
+        """The tokens of peers themselves."""
+        return [*chain.from_iterable(self._peers.values())]
 
     @cached_until_change
     def tokens_of(self, role: Role, key: str) -> Mapping[str, Endpoint]:

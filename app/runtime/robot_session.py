@@ -36,7 +36,7 @@ from app.runtime.live_look import LiveLooks
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
-from app.transport.declarations import declarations
+from app.transport.declarations import Declarations, declarations
 from app.transport.peer import Peer, RobotContext
 from app.transport.rosout import Rosout
 from app.transport.zenoh_session import ZenohSession
@@ -118,19 +118,19 @@ class RobotSession:
         self.interfaces.prepare_codecs(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
-        declared = declarations(self.panel, self.interfaces, self.robot)
-        ingest = self.ingest
-        self.link.start(
-            replace(
-                declared,
-                immediate=ingest.immediate,
-                lossless=ingest.lossless,
-                recorded=ingest.recorded,
-            )
-        )
+        self.link.start(self._declared())
         self.rosout.start()
         self.peer.start()
         self._listeners.enter_context(self.operators_log.notifying(self.show))
+
+    def _declared(self) -> Declarations:
+        declared = declarations(self.panel, self.interfaces, self.robot)
+        return replace(
+            declared,
+            immediate=self.ingest.immediate,
+            lossless=self.ingest.lossless,
+            recorded=self.ingest.recorded,
+        )
 
     async def stop(self) -> None:
         """Ends the streams, all tasks and the Zenoh session."""
@@ -191,4 +191,5 @@ class RobotSession:
         self.robot.mark_link_lost()
         self.turn.on_graph_change(peer_appeared=False)
         self.show()
+        self.link.expect(self._declared())  # the dialect may be another one
         self.renewal.begin()

@@ -13,7 +13,7 @@ from zenoh.ext import CacheConfig, declare_advanced_publisher
 from zenoh.handlers import Callback
 
 from app.dialect.bridge_dialect import BridgeDialect, bridge_token
-from app.dialect.dialect import WITH_OWN_DOMAIN, Dialect, DialectName
+from app.dialect.dialect import Dialect, DialectName
 from app.dialect.endpoint import DEMO_NODE, OwnEndpoint
 from app.dialect.rmw_zenoh_attachment import is_whole, parse_attachment
 from app.dialect.rmw_zenoh_dialect import RmwZenohDialect
@@ -24,6 +24,8 @@ from app.panel.model import Panel, RobotEntry
 log = logging.getLogger("kiosk.simulator")
 
 NODE: Final = "system_controller"
+# Where the panel file does not say how the robot is reached, the simulated one has a bridge.
+BEHIND_BRIDGE: Final[frozenset[DialectName]] = frozenset({"auto", "bridge"})
 Answer = Callable[[bytes], bytes | None]
 # (domain, interfaces, distribution) → the dialect of a robot.
 MakeDialect = Callable[[int, Interfaces, str], Dialect]
@@ -47,8 +49,8 @@ def way_of(
 ) -> Way:
     """As a panel file says of a robot, unless a dialect or a domain is given."""
     dialect = dialect or robot.dialect
-    if dialect in WITH_OWN_DOMAIN:
-        return Way(dialect)
+    if dialect in BEHIND_BRIDGE:
+        return Way()
     return Way(dialect, robot.domain if domain is None else domain, panel.distro)
 
 

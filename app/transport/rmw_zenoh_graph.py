@@ -34,13 +34,17 @@ ACTION_PART: Final = "/_action/"
 async def observe_nodes(
     link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
 ) -> GraphSnapshot:
-    """The `Observe` of robots without a bridge."""
+    """The `Observe` of robots without a bridge. Zenoh may answer early, with none or few of the tokens:
+    they are read until they stay the same."""
     end = time.monotonic() + ANNOUNCED_WITHIN_S
+    before: set[str] = set()
     while True:
         try:
-            graph = graph_of(await link.tokens(), zid)
-            if graph.robots or time.monotonic() > end:
+            tokens = set(await link.tokens())
+            graph = graph_of(tokens, zid)
+            if (graph.robots and before == tokens) or time.monotonic() > end:
                 return graph
+            before = tokens
         except LinkError:
             if time.monotonic() > end:
                 raise

@@ -3,6 +3,7 @@ ROS tools list them. Nodes on rmw_zenoh need none of these tokens to exchange me
 
 from collections.abc import Iterable, Iterator
 
+from app.dialect.auto_dialect import AutoDialect
 from app.dialect.endpoint import OwnEndpoint
 from app.dialect.rmw_zenoh_dialect import RmwZenohDialect
 from app.dialect.rmw_zenoh_tokens import PANEL_NODE, free_name, parse_token
@@ -22,10 +23,12 @@ class PanelNode:
         self._link = context.link
         self.name = PANEL_NODE
 
-    def choose_name(self, tokens: Iterable[str]) -> None:
-        """The first free name: another panel on this robot may have the usual one."""
-        parsed = (token for token in map(parse_token, tokens) if token is not None)
+    def choose_name(self, tokens: Iterable[str]) -> frozenset[str]:
+        """Takes the first free name: another panel on this robot may have the usual one. Returns the
+        names of all nodes."""
+        parsed = [token for token in map(parse_token, tokens) if token is not None]
         self.name = free_name(token for token in parsed if token.zid != self._link.zid)
+        return frozenset(token.node for token in parsed)
 
     def published_keys(self) -> list[str]:
         """The keys of the topics that the panel publishes, without its log."""
@@ -34,7 +37,7 @@ class PanelNode:
     def tokens(self) -> list[str]:
         """All tokens that the panel holds now. What has another type on the robot is left out."""
         dialect, graph = self._robot.dialect, self._robot.graph
-        assert isinstance(dialect, RmwZenohDialect)
+        assert isinstance(dialect, RmwZenohDialect | AutoDialect)
         own = [
             end
             for end in self._endpoints()

@@ -32,6 +32,7 @@ FAILED: Final = "joining the robot's topics failed"
 SETTLE_S: Final = 0.05
 SETTLE_MOST_S: Final = 2.0  # a press's receipt says if a subscriber is not matched by then
 ASK_AGAIN_S: Final = 0.5
+MOST_TRIES: Final = 20
 
 
 class RouterLiveness(PeerLiveness):
@@ -137,8 +138,10 @@ class RmwZenohPeer:
     async def _join(self) -> None:
         while not await self._liveness.flushed():  # before that, not all tokens have arrived
             await asyncio.sleep(ASK_AGAIN_S)
-        while not await self._named():
-            await asyncio.sleep(ASK_AGAIN_S)
+        for _ in range(MOST_TRIES):
+            if await self._named():
+                break
+            await asyncio.sleep(SETTLE_S)
         self._hold()
         await self._settle()
         self._robot.settled_at = time.monotonic()
@@ -146,13 +149,14 @@ class RmwZenohPeer:
         self._signals.graph_read.emit()
 
     async def _named(self) -> bool:
-        """Chooses a name that no other panel has; whether the tokens of others could be read."""
+        """Chooses a name that no other panel has; whether the tokens of others could be read. Zenoh may
+        answer early, with none or few of them."""
         try:
-            self._node.choose_name(await self._link.tokens())
+            nodes = self._node.choose_name(await self._link.tokens())
         except LinkError as error:
             self._log.warning("%s", error)
             return False
-        return True
+        return self._robot.graph.nodes <= nodes
 
     async def _settle(self) -> None:
         """Waits until every subscriber in the graph is matched: then the first message arrives."""

@@ -8,7 +8,10 @@ from contextlib import suppress
 import zenoh
 from zenoh.handlers import Callback
 
+from app.dialect.latched import newest
+
 COPIED_MOST = 16_384  # bytes of a sample
+CACHE_TIMEOUT_S = 10.0
 Ask = Callable[["Callback[zenoh.Reply]"], None]  # queries with this handler of its replies
 
 
@@ -64,3 +67,16 @@ def own_payload(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
     """A payload that may be kept for long. A small one is copied: it is a part of the buffer that the
     network was read into, and would keep all of it, so that the next message needs another."""
     return payload if len(payload) > COPIED_MOST else payload.to_bytes()
+
+
+def ask_newest(session: zenoh.Session, token: str, take: "Callback[zenoh.Reply]") -> None:
+    """Asks the cache of this token for its last message."""
+    with suppress(zenoh.ZError):  # the session is closed: the next one finds the cache again
+        session.get(
+            newest(token),
+            take,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            accept_replies=zenoh.ReplyKeyExpr.ANY,
+            timeout=CACHE_TIMEOUT_S,
+        )

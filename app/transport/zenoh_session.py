@@ -5,7 +5,7 @@ import asyncio
 import atexit
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -13,19 +13,18 @@ import zenoh
 from zenoh.handlers import Callback
 
 from app.dialect.dialect import Dialect
-from app.dialect.latched import caches, is_cache_of, newest
+from app.dialect.latched import caches, is_cache_of
 from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
 from app.transport.token_query import TokenQuery
-from app.transport.zenoh_answers import collected, first_answer, own_payload
+from app.transport.zenoh_answers import ask_newest, collected, first_answer, own_payload
 from app.transport.zenoh_config import endpoints_of, translated
-from app.transport.zenoh_opening import open_session
+from app.transport.zenoh_opening import in_own_thread, open_session, tokens_for_clients
 from app.transport.zenoh_publishers import declare_publisher
 
 ASK_TIMEOUT_S = 2.0
-CACHE_TIMEOUT_S = 10.0
 POLL_S = 0.02
 OnPayload = Callable[[Any], None]
 
@@ -53,14 +52,18 @@ class ZenohSession:
     def _open(self) -> None:
         self._session, self._is_final = open_session(self._config, self._dialect.as_client)
         self.zid = str(self._session.zid())
-        self._tokens = TokenQuery(self._session, self._dialect.tokens)
+        self._tokens = [TokenQuery(self._session, each) for each in self._dialect.tokens]
         atexit.register(self._leave)
 
     def start(self, declared: Declarations) -> None:
         """Declares everything, once in a session."""
+        self.expect(declared)
+        self._declare()
+
+    def expect(self, declared: Declarations) -> None:
+        """What the next session declares."""
         self._inbox.set_topics(declared.immediate, declared.lossless, declared.recorded)
         self._declared = declared
-        self._declare()
 
     def renew(self) -> None:
         """Opens a new session and declares everything; blocks for up to some tenths of a second.
@@ -85,8 +88,11 @@ class ZenohSession:
                 self._session.info.declare_transport_events_listener(
                     self._direct(self._on_transport), history=True
                 ),
-                self._session.liveliness().declare_subscriber(
-                    self._dialect.tokens, self._direct(self._on_token), history=True
+                *(
+                    self._session.liveliness().declare_subscriber(
+                        expression, self._direct(self._on_token), history=True
+                    )
+                    for expression in self._dialect.tokens
                 ),
             )
             self._publishers = {
@@ -147,15 +153,7 @@ class ZenohSession:
             if reply.ok is not None:
                 put(key, own_payload(reply.ok.payload), reply.ok.timestamp)
 
-        with suppress(zenoh.ZError):  # the session is closed: the next one finds the cache again
-            self._session.get(
-                newest(token),
-                self._direct(take),
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-                accept_replies=zenoh.ReplyKeyExpr.ANY,
-                timeout=CACHE_TIMEOUT_S,
-            )
+        ask_newest(self._session, token, self._direct(take))
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler that runs on Zenoh's receiving thread. It does nothing after `renew`."""
@@ -230,7 +228,11 @@ class ZenohSession:
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
         """The liveliness tokens of the ROS graph; LinkError if not all of them arrive in time."""
         with translated("can't ask for the ROS graph"):
-            return await self._tokens.keys(timeout_s)
+            return [key for query in self._tokens for key in await query.keys(timeout_s)]
+
+    async def tokens_for_clients(self, expressions: Collection[str]) -> list[str]:
+        """The tokens that a client of the router sees: a peer does not see those of other peers."""
+        return await in_own_thread(lambda: tokens_for_clients(self._config, expressions))
 
     async def connected(self, within_s: float) -> bool:
         """Whether it has a connection to any other peer or router, or gets one in time."""
@@ -255,7 +257,7 @@ class ZenohSession:
     def probe(self) -> None:
         """Returns when both the inbox and the session respond; blocks until then."""
         self._inbox.probe()
-        with suppress(LinkError):  # a session that is being renewed has responded too
+        with suppress(LinkError):  # one that is being renewed has responded too
             self.neighbours()
 
     def drain(self) -> Changes:

@@ -185,3 +185,11 @@ def test_a_panel_with_faults_is_refused(panel: Path, capsys: pytest.CaptureFixtu
     panel.write_text("title = 3")
     assert main(["bridge-config", str(panel)]) == 2
     assert "can't be used" in capsys.readouterr().err
+
+
+def test_a_robot_on_rmw_zenoh_needs_no_bridge(panel: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    panel.write_text(f'dialect = "rmw_zenoh"\n{panel.read_text()}')
+    with pytest.raises(SystemExit) as ended:
+        main(["bridge-config", str(panel)])
+    assert ended.value.code == 2
+    assert "needs no bridge" in capsys.readouterr().err

@@ -306,7 +306,7 @@ def test_a_port_where_no_zenoh_speaks(short_setup: Setup) -> None:
 
 def test_a_router_without_a_bridge(short_setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
     endpoint, _ = peer
-    assert named(short_setup.findings(WELL, endpoint)) == [("link_no_bridge", endpoint)]
+    assert named(short_setup.findings(WELL, endpoint)) == [("link_no_peer", endpoint)]
 
 
 def test_a_bridge_with_another_namespace(domain: int, setup: Setup) -> None:

@@ -63,7 +63,7 @@ class TinyDialect:
     """Key expressions with their types, and messages with their numbers: as a robot's own nodes have
     them, but shorter."""
 
-    tokens = "tiny/*/**"
+    tokens = ("tiny/*/**",)
     as_client = False
 
     def topic(self, key: str, type_name: str) -> str:

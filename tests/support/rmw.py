@@ -5,8 +5,10 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from tests.support.parts import ORDERS, ROOT, Bridge, Process, until
+from tests.support.parts import ORDERS, ROOT, Bridge, Process, RosNode, until
 from tests.support.processes.commanded import Commanded
+
+OWN_ORDERS = {**ORDERS, "hold": ("token",)}
 
 
 class Router(Bridge):
@@ -23,24 +25,22 @@ class Router(Bridge):
         assert process.running, process.text
 
 
-class RmwNode(Commanded):
+class RmwNode(RosNode):
     """A node on rmw_zenoh; see `tests/support/processes/rmw_node.py` for its commands."""
 
     def __init__(self, router: Bridge, name: str = "system_controller") -> None:
         module = "tests.support.processes.rmw_node"
-        super().__init__(
-            [sys.executable, "-m", module, name, router.endpoint, str(router.domain)], {}, cwd=ROOT
-        )
+        command = [sys.executable, "-m", module, name, router.endpoint, str(router.domain)]
+        Commanded.__init__(self, command, {}, cwd=ROOT)
+
+    def start(self) -> None:
+        Commanded.start(self)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def do(*arguments: Any, **named: Any) -> Any:
-            return self(name, **dict(zip(ORDERS.get(name, ()), arguments, strict=False)), **named)
+            return self(name, **dict(zip(OWN_ORDERS.get(name, ()), arguments, strict=False)), **named)
 
         return do
-
-    def heard_data(self, topic: str) -> list[Any]:
-        """The `data` field of all messages that a subscription received."""
-        return [message["data"] for message in self.heard(topic)]
 
     def kill(self) -> None:
         self._process.kill()

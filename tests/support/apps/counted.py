@@ -31,7 +31,8 @@ async def sizes(request: Request) -> dict[str, int]:
     text._rendered.cache_clear()  # it grows to its limit
     gc.collect()
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
-    wholes = (kiosk, kiosk.context, kiosk.commands, kiosk.peer)
+    chosen = getattr(kiosk.peer, "_chosen", None) or kiosk.peer  # the file does not say which
+    wholes = (kiosk, kiosk.context, kiosk.commands, kiosk.peer, chosen)
     held_by = [part for whole in wholes for part in vars(whole).values()]
     parts = [holder for holder in held_by if type(holder).__module__.startswith("app.")]
     for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):

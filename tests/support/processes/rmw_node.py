@@ -55,12 +55,6 @@ def place(type_name: str) -> str:
     return f"{package}::{kind}::dds_::{name}_/{TYPES.hash_rihs01(type_name)}"
 
 
-def tokens_in(session: zenoh.Session, expression: str) -> list[list[str]]:
-    """The parts of each token that is there."""
-    replies = session.liveliness().get(expression, timeout=5)
-    return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
-
-
 class Broken(Exception):
     """Something that ends a node."""
 
@@ -116,6 +110,10 @@ class Commands:
         self.session = zenoh.open(config)
         self.zid = str(self.session.zid())
         self._ids = itertools.count(1)
+        self._tokens: set[str] = set()
+        self._watch = self.session.liveliness().declare_subscriber(
+            f"@ros2_lv/{domain}/**", Callback(self._see, indirect=False), history=True
+        )
         self._kept: list[Any] = [
             self.session.liveliness().declare_token(f"@ros2_lv/{domain}/{self.zid}/0/0/NN/%/%/{name}")
         ]
@@ -125,6 +123,14 @@ class Commands:
         self.publishers: dict[str, Publisher] = {}
         self.timers: dict[str, threading.Event] = {}
         self.broken_by: list[str] = []
+
+    def _see(self, sample: zenoh.Sample) -> None:
+        change = self._tokens.add if sample.kind == zenoh.SampleKind.PUT else self._tokens.discard
+        change(str(sample.key_expr))
+
+    def _parts(self) -> list[list[str]]:
+        """The parts of each token that is there."""
+        return [token.split("/") for token in sorted(self._tokens)]
 
     def token(
         self, kind: str, topic: str, type_name: str, qos: dict[str, Any]
@@ -153,6 +159,10 @@ class Commands:
     def broken(self) -> list[str]:
         """What would have ended the node."""
         return self.broken_by
+
+    def hold(self, token: str) -> None:
+        """Holds one more liveliness token."""
+        self._kept.append(self.session.liveliness().declare_token(token))
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
         if (topic, type) in self.subscribed:
@@ -229,12 +239,12 @@ class Commands:
         return len(list(self._of_topic(topic, "MS")))
 
     def nodes(self) -> list[str]:
-        tokens = tokens_in(self.session, f"@ros2_lv/{self.domain}/*/*/*/NN/**")
-        return [f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}" for parts in tokens]
+        nodes = [parts for parts in self._parts() if parts[5] == "NN"]
+        return [f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}" for parts in nodes]
 
     def topics(self) -> dict[str, list[str]]:
         known: dict[str, set[str]] = {}
-        for parts in tokens_in(self.session, f"@ros2_lv/{self.domain}/**"):
+        for parts in self._parts():
             if parts[5] in ("MP", "MS"):
                 name = parts[10].removesuffix("_").replace("::dds_::", "/").replace("::", "/")
                 known.setdefault(parts[9].replace("%", "/"), set()).add(name)
@@ -242,8 +252,8 @@ class Commands:
 
     def clients(self) -> list[str]:
         """The services of which a client is there."""
-        tokens = tokens_in(self.session, f"@ros2_lv/{self.domain}/**")
-        return sorted(parts[9].replace("%", "/") for parts in tokens if parts[5] == "SC")
+        clients = [parts for parts in self._parts() if parts[5] == "SC"]
+        return sorted(parts[9].replace("%", "/") for parts in clients)
 
     def endpoints(self, topic: str) -> list[dict[str, Any]]:
         """The publishers of a topic."""
@@ -259,7 +269,7 @@ class Commands:
         ]
 
     def _of_topic(self, topic: str, kind: str) -> Iterator[list[str]]:
-        for parts in tokens_in(self.session, f"@ros2_lv/{self.domain}/**"):
+        for parts in self._parts():
             if parts[5] == kind and parts[9].replace("%", "/") == topic:
                 yield parts
 

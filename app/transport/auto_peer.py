@@ -1,0 +1,166 @@
+"""The `Peer` of a robot of which the panel file does not say how it is reached: a bridge or nodes on
+rmw_zenoh, whichever is there.
+
+What is there when the first of them is seen decides, until the session is lost. If both are there,
+everything stays locked: a command would go to one of them, and nobody said to which. A peer does not
+see other peers through a router, which nodes are: a client is opened to look for them.
+"""
+
+import asyncio
+import logging
+import math
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import Final
+
+from app.concurrency import spawn_logged
+from app.dialect.auto_dialect import AutoDialect, Kind
+from app.dialect.bridge_dialect import EVERY_BRIDGE
+from app.dialect.peer_traits import AMBIGUOUS_TRAITS, AUTO_TRAITS, PEER_TRAITS
+from app.dialect.rmw_zenoh_tokens import every_node
+from app.errors import LinkError
+from app.ros_logging import RobotLog
+from app.transport.bridge_graph_reader import observe_bridges
+from app.transport.bridge_peer import BridgePeer
+from app.transport.peer import Peer, RobotAccess, RobotContext
+from app.transport.rmw_zenoh_peer import RmwZenohPeer
+
+log = logging.getLogger("kiosk.auto")
+
+FAILED: Final = "finding out how the robot is reached failed"
+LOOK_EVERY_S: Final = 1.0
+
+
+class AutoPeer:
+    """The peer of the kind that was chosen; before that, only locks."""
+
+    def __init__(self, context: RobotContext) -> None:
+        dialect = context.robot.dialect
+        assert isinstance(dialect, AutoDialect)
+        self._dialect = dialect
+        self._context = context
+        self._robot = context.robot
+        self._link = context.link
+        self._signals = context.signals
+        self._log = RobotLog(log, context.robot.name)
+        self._peers: dict[Kind, Peer] = {
+            "bridge": BridgePeer(context),
+            "rmw_zenoh": RmwZenohPeer(context),
+        }
+        self._robot.nodes_are_read = False
+        self._started: set[Kind] = set()
+        self._chosen: Peer | None = None
+        self._reopening = False  # by a choice, which stays
+        self._changed = asyncio.Event()
+        self._looking: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        self._looking = spawn_logged(self._look(), self._log, FAILED)
+
+    async def stop(self) -> None:
+        if self._looking is not None:
+            self._looking.cancel()
+            await asyncio.gather(self._looking, return_exceptions=True)
+        for kind in self._started:
+            await self._peers[kind].stop()
+
+    def appeared(self, zids: Iterable[str]) -> None:
+        if self._chosen is not None:
+            self._chosen.appeared(zids)
+
+    def lost(self, zids: Iterable[str]) -> None:
+        if self._chosen is not None:
+            self._chosen.lost(zids)
+
+    def on_graph_change(self, peer_appeared: bool) -> None:
+        if not self._robot.link_up:
+            if not self._reopening:
+                self._forget_choice()
+            self._reopening = False
+        if self._chosen is not None:
+            self._chosen.on_graph_change(peer_appeared)
+            return
+        if self._robot.traits is AMBIGUOUS_TRAITS:
+            self._robot.graph.update_versions({})
+        self._changed.set()
+
+    def check_stall(self) -> None:
+        if self._chosen is not None:
+            self._chosen.check_stall()
+
+    async def flushed(self) -> bool:
+        return self._chosen is not None and await self._chosen.flushed()
+
+    async def answers(self) -> bool:
+        return self._chosen is not None and await self._chosen.answers()
+
+    def _forget_choice(self) -> None:
+        if self._chosen is None and self._robot.traits is AUTO_TRAITS:
+            return
+        if self._chosen is not None:
+            self._chosen.on_graph_change(False)  # it leaves
+        self._chosen, self._dialect.choice = None, None
+        self._robot.traits, self._robot.nodes_are_read = AUTO_TRAITS, False
+        self._robot.mark_link_lost()  # a graph without what was only of that kind
+
+    async def _look(self) -> None:
+        while True:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_EVERY_S):
+                    await self._changed.wait()
+            self._changed.clear()
+            if self._chosen is None and self._robot.link_up:
+                try:
+                    await self._choose_among(await self._kinds())
+                except LinkError as error:
+                    self._log.warning("%s", error)
+
+    async def _kinds(self) -> set[Kind]:
+        """The kinds of peers that are there now."""
+        peers = (EVERY_BRIDGE, every_node(self._dialect.nodes.domain))
+        others = await self._link.tokens_for_clients(peers)
+        kinds: set[Kind] = set()
+        for token in (*self._robot.graph.peer_tokens, *others):
+            if (end := self._dialect.nodes.endpoint(token)) and end.role is None:
+                kinds.add("rmw_zenoh")
+            elif (end := self._dialect.bridge.endpoint(token)) and end.role is None:
+                kinds.add("bridge")
+        return kinds
+
+    async def _choose_among(self, kinds: set[Kind]) -> None:
+        if not self._robot.link_up or self._chosen is not None:
+            return
+        traits = AMBIGUOUS_TRAITS if len(kinds) > 1 else AUTO_TRAITS
+        if traits is not self._robot.traits:
+            self._robot.traits = traits
+            self._robot.graph.cache.clear()
+            if traits is AMBIGUOUS_TRAITS:
+                self._log.error("a bridge and nodes on rmw_zenoh are there: say `dialect`")
+                self._robot.graph.update_versions({})
+            self._signals.changed.emit()
+        if len(kinds) == 1:
+            await self._choose(kinds.pop())
+
+    async def _choose(self, kind: Kind) -> None:
+        for other in self._started - {kind}:
+            await self._peers[other].stop()
+        self._robot.is_responding = self._robot.is_caught_up = True
+        if kind not in self._started:
+            self._peers[kind].start()
+        self._started = {kind}
+        self._log.info("the robot is reached by %s", kind)
+        before = self._dialect.chosen
+        self._dialect.choice, self._chosen = kind, self._peers[kind]
+        self._robot.traits = PEER_TRAITS[kind]
+        self._robot.nodes_are_read = kind == "bridge"
+        self._robot.settled_at = math.inf
+        if self._dialect.chosen is before:
+            self._chosen.on_graph_change(peer_appeared=True)
+            self._signals.changed.emit()
+        else:  # all key expressions are others
+            self._reopening = True
+            self._signals.link_lost.emit()
+
+
+# Commands that only read look for bridges: --dialect says that there is none.
+AUTO: Final = RobotAccess(AutoDialect, AUTO_TRAITS, AutoPeer, observe_bridges)
