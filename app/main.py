@@ -46,6 +46,7 @@ from app.web.request_body import LONGEST
 from app.web.root_path import RootPath, root_path_of
 from app.web.routes import (
     alarm_history,
+    alarm_report,
     alarms,
     control,
     description,
@@ -86,6 +87,7 @@ ROBOT_ROUTES: Final = (
     lock_help,
     trends,
 )
+ALARM_ROUTES: Final = (alarms, alarm_history, alarm_report)
 READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown
 RESPONSE_TIMEOUT_S: Final = 2.0  # for the robot's at shutdown; then the result of a press is unknown
 
@@ -130,16 +132,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    for routes in (
-        *ROBOT_ROUTES,
-        alarms,
-        alarm_history,
-        diagnostics,
-        static,
-        health,
-        display,
-        description,
-    ):
+    for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, diagnostics, static, health, display, description):
         app.include_router(routes.router)
     if dev:
         _add_gallery(app)

@@ -80,6 +80,7 @@ def _check_levels(value: Mapping[str, int]) -> Mapping[str, int]:
     return value
 
 
+TIME_OF_DAY: Final = re.compile(r"([01][0-9]|2[0-3]):[0-5][0-9]")
 LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
 Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
 Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
@@ -228,15 +229,34 @@ class Alarm(Description):
             yield TopicSource(topic, type_name, self.qos, fields)
 
 
+def _check_start(text: str) -> str:
+    if not TIME_OF_DAY.fullmatch(text):
+        raise ValueError(f'{format_value(text)} is not a time of day like "06:00"')
+    return text
+
+
+def _sorted(times: tuple[str, ...]) -> tuple[str, ...]:
+    if not times:
+        raise ValueError('is empty: leave the key out for shifts at "06:00", "14:00" and "22:00"')
+    if list(times) != sorted(set(times)):
+        raise ValueError("has times out of order: write the earliest first, each once")
+    return times
+
+
+ShiftStart = Annotated[str, AfterValidator(_check_start)]
+Shifts = Annotated[tuple[ShiftStart, ...], Field(strict=False, max_length=12), AfterValidator(_sorted)]
+
+
 class AlarmRules(Description):
     """The table `[alarms]`. `panel`: the panel raises alarms of its own. `low_screens`: what shows
     alarms on pages of low screens. Alarms of a group that are raised within `first_out_s` of the first
-    follow it. The oldest entries of the history are removed after `days`, or when the file is larger
-    than `size_mb` megabytes."""
+    follow it. `shifts` are times of day at which shifts begin. The oldest entries of the history are
+    removed after `days`, or when the file is larger than `size_mb` megabytes."""
 
     panel: bool = True
     disk_free_mb: Annotated[float, Field(ge=1, le=1_000_000, allow_inf_nan=False)] = 500.0
     low_screens: Literal["line", "badge"] = "line"
     first_out_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 2.0
+    shifts: Shifts = ("06:00", "14:00", "22:00")
     days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
     size_mb: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 64.0

@@ -6,12 +6,14 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
 from typing import TYPE_CHECKING
 
+from app.alarms.state_times import NAME as STATES
 from app.audit import Limits, NullLog, OperatorLog
 from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.panel.widgets.trend import trends_of
 from app.runtime.doctor_process import DoctorProcess
 from app.runtime.fleet import Fleet
+from app.runtime.state_recorder import StateRecorder
 from app.settings import Mode, Settings
 from app.transport.zenoh_config import Config, config_from, config_to
 
@@ -83,6 +85,8 @@ async def open_fleet(
             doctor=doctor,
         )
         trends = _trend_disk(settings, panel, fleet)
+        fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
+        states = StateRecorder(fleet.states, fleet.sessions) if panel.state else None
         try:
             if recordings is not None:
                 recordings.start()
@@ -90,11 +94,15 @@ async def open_fleet(
                 await trends.start()
             await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)), oplog)
             await fleet.start()
+            if states is not None:
+                states.start()
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet
         finally:
+            if states is not None:
+                await states.stop()
             await fleet.stop()
             await fleet.alarms.stop()
             if trends is not None:

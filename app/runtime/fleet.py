@@ -6,6 +6,7 @@ shows the link status of the other robots.
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.audit.press_record import Log
@@ -48,6 +49,7 @@ class Fleet:
         self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
         self.alarms = Alarms(panel)
+        self.states: Path | None = None  # the file of the machine's states
         server = ServerParts(
             panel,
             revision,

@@ -224,36 +224,37 @@ def figures_context(figures: Figures) -> FiguresContext:
 def _figures(figures: Figures) -> Iterator[Figure]:
     yield Figure(
         say("alarms_figure_per_hour", limit=HOURLY_LIMIT),
-        _rate(figures.per_hour),
+        rate_text(figures.per_hour),
         say("alarms_figure_most", count=number(f"{figures.worst_hour:,d}")),
         figures.per_hour > HOURLY_LIMIT,
     )
     yield Figure(
         say("alarms_figure_per_10_min", limit=SLOT_LIMIT),
-        _rate(figures.per_10_min),
+        rate_text(figures.per_10_min),
         say("alarms_figure_most", count=number(f"{figures.worst_10_min:,d}")),
         figures.worst_10_min > SLOT_LIMIT,
     )
     yield Figure(word("figure_standing"), number(f"{figures.standing:,d}"), word("figure_standing_now"))
-    median = figures.acknowledge_s
-    yield Figure(
-        word("figure_acknowledge"),
-        "–" if median is None else duration_text(median),
-        "" if median is None else word("figure_median"),
-    )
+    yield Figure(word("figure_acknowledge"), median_text(figures), word("figure_median"))
 
 
-def _rate(rate: float) -> TextLike:
+def median_text(figures: Figures) -> TextLike:
+    """The median of the times until alarms were acknowledged; a dash without one."""
+    return "–" if figures.acknowledge_s is None else duration_text(figures.acknowledge_s)
+
+
+def rate_text(rate: float) -> TextLike:
+    """A number of alarms in a time."""
     return number(decimal_text(round(rate, 2 if rate < 1 else 1)))
 
 
 def _by_hours(figures: Figures) -> Iterator[tuple[TextLike, int]]:
     first, last = int(figures.since // HOUR_S), math.ceil(figures.until / HOUR_S)
     for hour in range(first, last):
-        yield _clock(hour * HOUR_S), figures.by_hour.get(hour, 0)
+        yield clock_text(hour * HOUR_S), figures.by_hour.get(hour, 0)
 
 
-def _clock(at: float) -> TextLike:
+def clock_text(at: float) -> TextLike:
     """The time of day without seconds."""
     return time_of_day(datetime.fromtimestamp(at).strftime("%H:%M"))
 

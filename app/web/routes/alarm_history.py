@@ -41,7 +41,7 @@ async def page(
 ) -> Response:
     read = partial(read_page, wanted=wanted.filter(now()), limit=ROWS_ON_PAGE + 1)
     shown = await state.fleet.alarms.history.read(read)
-    figures = await read_figures_of(state, wanted)
+    figures = await read_figures_of(state, *wanted.times(now()))
     context = history_context(state.fleet.panel, wanted, shown, figures)
     path = f"alarms/history?{wanted.address()}"
     frame, token = page_frame(request, state, word("history_title"), alarms_page=path)
@@ -52,13 +52,11 @@ async def page(
     return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
 
 
-async def read_figures_of(state: AppState, wanted: TimesQuery) -> Figures:
+async def read_figures_of(state: AppState, since: float, until: float) -> Figures:
     """The figures of a time; LogError, TooMany."""
-    at = now()
-    since, until = wanted.times(at)
     alarms = state.fleet.alarms
     delays = {alarm.definition.id: alarm.definition.delays for alarm in alarms.engine.alarms.values()}
-    read = partial(read_figures, since=since, until=until, now=at, delays=delays)
+    read = partial(read_figures, since=since, until=until, now=now(), delays=delays)
     return await alarms.history.read(read)
 
 
@@ -71,7 +69,8 @@ async def read_figures_of(state: AppState, wanted: TimesQuery) -> Figures:
 async def figures(
     request: Request, state: CurrentState, wanted: Annotated[TimesQuery, Query()]
 ) -> Response:
-    content = localized(figures_json(await read_figures_of(state, wanted)), language_of(request))
+    of_time = await read_figures_of(state, *wanted.times(now()))
+    content = localized(figures_json(of_time), language_of(request))
     return JSONResponse(content, headers={"cache-control": "no-store"})
 
 

@@ -1,0 +1,282 @@
+"""The shift report: a page of paper with alarms, presses and the states of the machine in a time."""
+
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from typing import Annotated, Final, Literal, NamedTuple, TypedDict
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.alarms.figures import Figures
+from app.alarms.history import HistoryRow
+from app.alarms.records import text_of
+from app.alarms.report import AlarmReport
+from app.alarms.shifts import Shift, shift_at
+from app.alarms.state_times import StatePeriod
+from app.audit import Row
+from app.clock import format_datetime, format_time
+from app.commands.alarm_acts import ALARM_ACTS
+from app.i18n import Text, TextLike, date_and_time, number, say, time_of_day
+from app.panel.model import Panel
+from app.panel.widgets.families import Command
+from app.printable import printable, printable_texts
+from app.view.time_values import duration_text
+from app.web.rendering.alarm_figures import clock_text, median_text, rate_text
+from app.web.rendering.alarms_page import word
+from app.web.rendering.log_words import outcome_of, who_of
+from app.web.rendering.log_words import word as log_word
+from app.web.typed_times import TypedTime, typed_ms
+
+PRESSES: Final = 8  # on the page; the others are counted
+COUNTED: Final = 500  # presses at most
+DAY_S: Final = 86_400.0
+SHIFTS: Final = ("this", "last", "previous")
+MARKS: Final = 4
+LEFT_OUT: Final = frozenset({"began", "resumed", "removed"})  # entries that no operator made
+
+
+class ReportQuery(BaseModel):
+    """The time of the report: a shift, or from `since` on and before `until` if one of these is there.
+    `robot` is the one whose states are shown, by default the first."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    shift: Literal["this", "last", "previous"] = "this"
+    since: TypedTime = ""
+    until: TypedTime = ""
+    robot: Annotated[str, Field(max_length=64)] = ""
+    act: Annotated[str, Field(max_length=400)] = ""
+
+    @property
+    def has_times(self) -> bool:
+        return bool(self.since or self.until)
+
+    def times(self, now: float, starts: Sequence[str]) -> Shift:
+        """From when to when; InputError for what is no time. Without a beginning the time is a day
+        long, and without an end it ends now."""
+        if not self.has_times:
+            return shift_at(now, starts, SHIFTS.index(self.shift))
+        since, until = typed_ms("since", self.since), typed_ms("until", self.until, fold=1)
+        end = now if until is None else until / 1000
+        return Shift(end - DAY_S if since is None else since / 1000, end)
+
+
+class ShownState(NamedTuple):
+    """A state of the machine with how long it was in it; `fill` is how the bar shows it."""
+
+    text: TextLike
+    fill: str
+    duration: TextLike
+
+
+class ShownPeriod(NamedTuple):
+    """A part of the bar of states, in percent of it."""
+
+    fill: str
+    x: float
+    width: float
+
+
+class ReportRow(NamedTuple):
+    """A row of a table: `cells` beside the first."""
+
+    first: TextLike
+    cells: tuple[TextLike, ...]
+    priority: int = 0
+    text: TextLike = ""
+
+
+class ReportContext(TypedDict):
+    """The variables of `alarm-report.html`, beside those of the frame."""
+
+    wanted: ReportQuery
+    typed: dict[str, str]
+    shifts: list[tuple[Text, TextLike, str, bool]]
+    robots: dict[str, TextLike]
+    span: Text
+    figures: list[tuple[TextLike, TextLike, TextLike]]
+    states: list[ShownState]
+    periods: list[ShownPeriod]
+    marks: list[TextLike]
+    frequent: list[ReportRow]
+    high: list[ReportRow]
+    high_more: TextLike
+    presses: list[ReportRow]
+    presses_more: TextLike
+    printed: Text
+
+
+class ReportParts(NamedTuple):
+    """What a report is made of: `rows` are entries of the operator's log, the newest first."""
+
+    figures: Figures
+    alarms: AlarmReport
+    states: Sequence[StatePeriod]
+    rows: Sequence[Row]
+
+
+def report_context(
+    panel: Panel, wanted: ReportQuery, shift: Shift, parts: ReportParts, now: float
+) -> ReportContext:
+    """The report of a time."""
+    end = min(shift.until, now)
+    fills = _fills(parts.states)
+    presses = [row for row in parts.rows if row.entry.kind not in LEFT_OUT]
+    alarms = parts.alarms
+    high_more = alarms.high_count - len(alarms.high)
+    return ReportContext(
+        wanted=wanted,
+        typed=printable_texts(wanted.model_dump()),
+        shifts=[
+            (word(f"report_{name}"), _span(shift_at(now, panel.alarm_rules.shifts, back)), name, chosen)
+            for back, name in enumerate(SHIFTS)
+            for chosen in [name == wanted.shift and not wanted.has_times]
+        ],
+        robots={str(robot.id): robot.name for robot in panel.robots},
+        span=_span(shift),
+        figures=list(_figures(parts.figures, len(presses))),
+        states=list(_durations(parts.states, fills)),
+        periods=[
+            ShownPeriod(fills[period.state], *_place(period, shift.since, end))
+            for period in parts.states
+        ],
+        marks=[clock_text(shift.since + n * (end - shift.since) / MARKS) for n in range(MARKS + 1)],
+        frequent=[
+            ReportRow(
+                "",
+                (
+                    number(f"{alarm.raises:,d}"),
+                    duration_text(alarm.active_s) if alarm.active_s else "–",
+                    duration_text(alarm.longest_s) if alarm.longest_s else "–",
+                ),
+                alarm.row.priority,
+                _text(alarm.row),
+            )
+            for alarm in alarms.frequent
+        ],
+        high=[
+            ReportRow(
+                format_time(row.at),
+                (_lasted(returned), _acknowledged(acknowledged)),
+                row.priority,
+                _text(row),
+            )
+            for row, acknowledged, returned in alarms.high
+        ],
+        high_more=say("alarms_report_more", count=number(f"{high_more:,d}")) if high_more else "",
+        presses=[_press(panel, row) for row in reversed(presses[:PRESSES])],
+        presses_more=_more(len(presses) - PRESSES, len(parts.rows)),
+        printed=say("alarms_report_printed", time=format_datetime(now)),
+    )
+
+
+def _span(shift: Shift) -> Text:
+    since, until = (datetime.fromtimestamp(at) for at in shift)
+    end = (
+        time_of_day(until.strftime("%H:%M"))
+        if since.date() == until.date()
+        else date_and_time(until.strftime("%Y-%m-%d %H:%M"))
+    )
+    begin = date_and_time(since.strftime("%Y-%m-%d %H:%M"))
+    return say("alarms_report_span", since=begin, until=end)
+
+
+def _figures(figures: Figures, presses: int) -> Iterator[tuple[TextLike, TextLike, TextLike]]:
+    yield (
+        word("title"),
+        number(f"{figures.raised:,d}"),
+        say("alarms_report_per_hour", rate=rate_text(figures.per_hour)),
+    )
+    yield (
+        word("report_worst"),
+        number(f"{figures.worst_10_min:,d}"),
+        word("report_in_10_min"),
+    )
+    yield word("figure_acknowledge"), median_text(figures), word("figure_median")
+    yield word("report_presses"), _count(presses), ""
+
+
+def _count(presses: int) -> TextLike:
+    if presses >= COUNTED:
+        return say("alarms_report_at_least", count=number(f"{presses:,d}"))
+    return number(f"{presses:,d}")
+
+
+def _more(more: int, read: int) -> TextLike:
+    """How many presses are only in the log."""
+    if more <= 0:
+        return ""
+    code = "alarms_report_presses_at_least" if read >= COUNTED else "alarms_report_presses_more"
+    return say(code, count=number(f"{more:,d}"))
+
+
+def _fills(periods: Iterable[StatePeriod]) -> dict[str, str]:
+    """How each state is shown on paper: what is abnormal is hatched, the others differ in grey."""
+    fills: dict[str, str] = {}
+    greys = 0
+    for state in dict.fromkeys(period.state for period in periods):
+        shown = json.loads(state)
+        if shown["colour"] in ("red", "yellow"):
+            fills[state] = "hatched"
+        elif shown["colour"] == "none":
+            fills[state] = "white"
+        else:
+            fills[state] = f"grey{greys % 4}"
+            greys += 1
+    return fills
+
+
+def _durations(periods: Sequence[StatePeriod], fills: Mapping[str, str]) -> Iterator[ShownState]:
+    """The states with the longest first."""
+    seconds: dict[str, float] = {}
+    for since, until, state in periods:
+        seconds[state] = seconds.get(state, 0.0) + until - since
+    for state, lasted in sorted(seconds.items(), key=lambda item: -item[1]):
+        if lasted >= 1.0:
+            text = text_of(json.loads(state)["text"])
+            yield ShownState(text, fills[state], duration_text(float(round(lasted))))
+
+
+def _place(period: StatePeriod, since: float, until: float) -> tuple[float, float]:
+    whole = max(1.0, until - since)
+    return (
+        round(100 * (period.since - since) / whole, 3),
+        round(100 * (period.until - period.since) / whole, 3),
+    )
+
+
+def _text(row: HistoryRow) -> TextLike:
+    return text_of(json.loads(row.record).get("about", {}).get("text", row.id))
+
+
+def _lasted(row: HistoryRow | None) -> TextLike:
+    return "–" if row is None or row.lasted_s is None else duration_text(row.lasted_s)
+
+
+def _acknowledged(row: HistoryRow | None) -> TextLike:
+    if row is None or row.lasted_s is None:
+        return word("report_not_acknowledged")
+    who = who_of(printable(row.actor))
+    return say("alarms_report_who_after", who=who, duration=duration_text(row.lasted_s))
+
+
+def _press(panel: Panel, row: Row) -> ReportRow:
+    entry = row.entry
+    if entry.kind in ("control", "alarm"):
+        acts = {f"alarm_{act}" for act in ALARM_ACTS}
+        is_known = entry.action in acts or entry.kind == "control"
+        label: TextLike = log_word(entry.action) if is_known else entry.action
+    else:
+        labels = {w.id: w.label for w in panel.widgets() if isinstance(w, Command)}
+        label = labels.get(entry.widget, printable(entry.widget))
+    at = datetime.fromtimestamp((row.pressed_at or entry.at) / 1000)
+    return ReportRow(
+        time_of_day(at.strftime("%H:%M")),
+        (who_of(printable(entry.who)), label, outcome_of(entry.outcome or entry.kind)),
+    )
+
+
+def now() -> float:
+    """Seconds since the epoch."""
+    return time.time()
