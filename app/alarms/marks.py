@@ -1,24 +1,15 @@
 """Which values of the robots have an active alarm, from the rows that pages show."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Final
 
 from app.alarms.rows import AlarmRow
-from app.panel.alarm import Alarm
 from app.panel.model import Panel
 from app.robot.alarmed import AlarmedState, AlarmedValues
 
 Value = tuple[str, str]  # topic and field
 BEHIND_ID: Final = re.compile("[@:]")  # the robot, or the name of what it published
-
-
-def marked_values(alarm: Alarm) -> Iterator[Value]:
-    """The values that an alarm is about: that of its limits, or of its condition."""
-    if alarm.source == "limits" and alarm.topic is not None:
-        yield alarm.topic, alarm.field
-    if alarm.when is not None:
-        yield alarm.when.topic, alarm.when.field
 
 
 class AlarmMarks:
@@ -28,7 +19,7 @@ class AlarmMarks:
         self._alarms = {
             alarm.id: alarm
             for alarm in panel.alarms
-            if alarm.state is not None or any(marked_values(alarm))
+            if alarm.state is not None or any(alarm.marked_values)
         }
         self._state_topic = panel.state.topic if panel.state else None
         self._active: dict[str, dict[str, AlarmRow]] = {}  # robot → id → row
@@ -47,7 +38,7 @@ class AlarmMarks:
         elif not was_active:
             return
         changed = self._changed.setdefault(row["robot"], set())
-        changed.update(topic for topic, _ in marked_values(alarm))
+        changed.update(topic for topic, _ in alarm.marked_values)
         if alarm.state is not None and self._state_topic is not None:
             changed.add(self._state_topic)
 
@@ -58,12 +49,13 @@ class AlarmMarks:
 
     def of_robot(self, robot: str) -> AlarmedValues:
         """The marks of a robot as they are now."""
-        priorities: dict[Value, int] = {}
+        marked = (alarm for alarm in self._alarms.values() if alarm.is_for(robot or None))
+        priorities: dict[Value, int] = {value: 0 for alarm in marked for value in alarm.marked_values}
         state: AlarmedState | None = None
         for row in sorted(self._active.get(robot, {}).values(), key=lambda row: row["order"]):
             alarm = self._alarms[_alarm_id(row)]
-            for value in marked_values(alarm):
-                priorities[value] = min(row["priority"], priorities.get(value, row["priority"]))
+            for value in alarm.marked_values:
+                priorities[value] = min(row["priority"], priorities[value] or row["priority"])
             if state is None and alarm.state is not None:
                 state = AlarmedState(alarm.state, -row["order"][-1])
         return AlarmedValues(state, priorities)

@@ -192,6 +192,15 @@ class Alarm(Description):
         return self.action is not None or catalogue is not None
 
     @property
+    def marked_values(self) -> Iterator[tuple[str, str]]:
+        """The topics and fields of the values that it is about: those of its limits and its
+        condition."""
+        if self.source == "limits" and self.topic is not None:
+            yield self.topic, self.field
+        if self.when is not None:
+            yield self.when.topic, self.when.field
+
+    @property
     def evaluated_topics(self) -> tuple[str, ...]:
         """The topics after whose messages it is evaluated."""
         own = (self.topic,) if self.topic is not None else ()

@@ -14,7 +14,8 @@ class AlarmedState(NamedTuple):
 
 class AlarmedValues(NamedTuple):
     """`state` is that of the most urgent alarm that has one. `priorities` has the highest priority of
-    the active alarms of a value, by its topic and field."""
+    the active alarms of a value, by its topic and field: 0 if none is active, nothing for a value that
+    no alarm is about."""
 
     state: AlarmedState | None = None
     priorities: Mapping[tuple[str, str], int] = {}

@@ -88,10 +88,10 @@ class Alarms:
         self._own: OwnAlarms | None = None
 
     def add_robot(self, robot_id: str, robot: RobotState) -> RobotAlarms:
-        """Adds a robot."""
         self.engine.add_robot(robot_id, robot)
         robot_alarms = RobotAlarms(self.engine, robot_id, robot, self.evaluate)
         self._robots.append(robot_alarms)
+        robot.alarmed = self._shown.marks.of_robot(robot_id)
         return robot_alarms
 
     async def start(self, folder: Path, operators_log: Log) -> None:

@@ -70,8 +70,14 @@ def attributes_of(
     widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED
 ) -> AttributesUntil:
     """The attributes of a widget at `now` (monotonic seconds), and when time alone changes them;
-    `verdict` is that of a command, whose own deadline is not counted here."""
-    return find_row(ATTRIBUTES, widget)(widget, robot, verdict, now)
+    `verdict` is that of a command, whose own deadline is not counted here. A value that alarms are
+    about has `alarmed`, the priority of the most urgent active one, "" for none."""
+    attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, verdict, now)
+    if isinstance(widget, Display):
+        priority = robot.alarmed.priorities.get((widget.topic, widget.field))
+        if priority is not None:
+            attributes = {**attributes, "alarmed": str(priority or "")}
+    return attributes, until
 
 
 def enabled(verdict: Verdict) -> Enabled:

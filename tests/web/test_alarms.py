@@ -349,3 +349,11 @@ def test_an_alarm_that_follows_another_of_its_group_says_so(tmp_path: Path) -> N
         page = server.http.get("/alarms", headers={"accept": "text/html"}).text
         assert f'data-alarm="{first["id"]}"' in page
         assert page.count('data-first="true"') == 1
+
+
+def test_a_value_has_the_sign_of_its_most_urgent_active_alarm(tmp_path: Path) -> None:
+    with server_with(tmp_path, "values = [4.5, 6.0], period_s = 6.0") as server:
+        until(lambda: server.widget("air")["alarmed"] == "1", "the alarm of high priority is active")
+        until(lambda: server.widget("air")["alarmed"] == "", "none is active")
+        assert listed(server)["air_latched"]["state"] == "latched"
+        assert 'data-alarmed=""' in server.http.get("/").text
