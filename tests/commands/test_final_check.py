@@ -107,6 +107,17 @@ def test_permission_withdrawn_during_encoding_stops_the_press(widget: str) -> No
 
 
 @pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
+def test_nothing_is_sent_while_the_server_ends(widget: str) -> None:
+    robot, way = robot_permits(), Way()
+    presses = presses_of(PANEL, robot, way)
+    presses.close()
+    receipt = asyncio.run(press_widget(presses, widget, {"message": "x"}, "p1"))
+    assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
+    assert "the panel server is shutting down" in str(receipt.reason)
+    assert way.sent == []
+
+
+@pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
 def test_permission_given_again_before_sending_permits_the_press(widget: str) -> None:
     robot, way = robot_permits(), Way()
     pressed(widget, way, Late(robot, True, True), robot)
