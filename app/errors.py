@@ -26,7 +26,7 @@
 
 import errno
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -99,6 +99,10 @@ class Fault(Remark):
     cause: str = field(default="", compare=False)
 
     __str__ = Remark.__str__
+
+    def at(self, place: str) -> "Fault":
+        """The fault at another place."""
+        return replace(self, place=place)
 
 
 class Note(Remark):

@@ -14,8 +14,10 @@ from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_condition
 from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
+from app.panel.faults.wording import closest_name
 from app.panel.machine_state import StateRules
 from app.panel.model import Panel
+from app.panel.source import NAME, duplicate_faults, expanded
 from app.panel.widgets.families import BaseWidget
 
 
@@ -56,8 +58,14 @@ def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
 
 
 def _load(file: TomlFile) -> Panel:
-    tables = {key: value for key, value in file.tables.items() if key != "revision"}
-    faults = [] if tables == file.tables else [Fault("revision", "unknown key")]
+    written = {key: value for key, value in file.tables.items() if key != "revision"}
+    if faults := _source_faults(written, file):
+        raise PanelError(str(file.path), _sorted_faults(faults, file))
+    with_sources = expanded(written)
+    if with_sources.faults:
+        raise PanelError(str(file.path), _sorted_faults(with_sources.faults, file))
+    tables = with_sources.tables
+    faults = [] if written == file.tables else [Fault("revision", "unknown key")]
     try:
         panel = Panel.model_validate(tables | {"revision": file.revision}, context=_context(file))
     except ValidationError as error:
@@ -65,8 +73,27 @@ def _load(file: TomlFile) -> Panel:
     else:
         faults += _type_faults(panel)
     if faults:
-        raise PanelError(str(file.path), _sorted_faults(faults, file))
+        moved = {with_sources.at_origin(fault): None for fault in faults}
+        raise PanelError(str(file.path), _sorted_faults(moved, file))
     return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
+
+
+def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
+    """The faults of the tables of sources, which come first: other tables have their keys."""
+    if NAME not in tables:
+        misspelt = (
+            key for key in tables if closest_name(key, (NAME,)) and isinstance(tables[key], list)
+        )
+        return [Fault(key, f'unknown key; did you mean "{NAME}"?') for key in misspelt]
+    try:
+        sources = Panel.model_validate(
+            {"title": "?", "page": [], NAME: tables[NAME]}, context=_context(file)
+        ).sources
+    except ValidationError as error:
+        from app.panel.faults.shape import find_shape_faults
+
+        return find_shape_faults(error, tables).faults
+    return [*duplicate_faults([source.id for source in sources])]
 
 
 def _context(file: TomlFile) -> FileContext:

@@ -32,6 +32,7 @@ from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, T
 from app.panel.machine_state import StateRules
 from app.panel.rules import BrandRules, ControlRules, DiagnosticRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
+from app.panel.source import Source
 from app.panel.stories import StoryName
 from app.panel.texts import panel_texts
 from app.panel.widgets.families import (
@@ -105,6 +106,7 @@ class Panel(Description):
     demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
     alarm_rules: AlarmRules = Field(AlarmRules(), alias="alarms")
     alarms: Annotated[tuple[Alarm, ...], Field(strict=False)] = Field((), alias="alarm")
+    sources: Annotated[tuple[Source, ...], Field(strict=False)] = Field((), alias="source")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     own_conditions: Annotated[tuple[NamedCondition, ...], Field(strict=False)] = Field(
         (), alias="condition"

@@ -46,7 +46,10 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))
     own: dict[str, Any] = WORDS["examples"]
     grow = {f"{name}.grow": True for name, table in tables.items() if "grow" in table["properties"]}
-    return grow | examples | own
+    source = {
+        f"{name}.source": "oven" for name, table in tables.items() if "source" in table["properties"]
+    }
+    return grow | source | examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:

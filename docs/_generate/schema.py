@@ -11,6 +11,8 @@ from typing import Any, Final
 
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
 from app.panel import Panel
+from app.panel.widgets.families import PublishCommand
+from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.trend import DURATION
 
 Schema = dict[str, Any]
@@ -22,6 +24,8 @@ WORDS: Final[Mapping[str, Any]] = tomllib.loads(
 ROOT: Final = "panel"
 WIDGET: Final = "widget"
 REF: Final = "#/definitions/"
+SOURCE: Final = "source"
+PUBLISHED: Final = [kind for kind, row in KINDS.items() if issubclass(row.model, PublishCommand)]
 
 # What a text is, by "table.key" or "key" alone, and its pattern where the name alone decides.
 FORMATS: Final[Mapping[str, tuple[str, str]]] = {
@@ -70,6 +74,7 @@ def panel_schema() -> Schema:
     definitions = root.pop("$defs")
     tables = named_tables(root, definitions)
     for name, table in tables.items():
+        _with_source(name, table)
         _finish(name, table)
     by_name = {name: table for name, table in tables.items() if name != ROOT}
     models = {id(table): name for name, table in by_name.items()}
@@ -125,6 +130,18 @@ def _refs(node: Any) -> Iterator[str]:
     elif isinstance(node, list):
         for value in node:
             yield from _refs(value)
+
+
+def _with_source(name: str, table: Schema) -> None:
+    """A table that reads a topic may name a source in place of the topic and its type."""
+    properties = table["properties"]
+    if name in (SOURCE, *PUBLISHED) or not {"topic", "type"} <= {*properties}:
+        return
+    properties[SOURCE] = {"type": "string", "title": "id of a source"}
+    needed = [key for key in table.get("required", ()) if key in ("topic", "type")]
+    if needed:
+        table["required"] = [key for key in table["required"] if key not in needed]
+        table["anyOf"] = [{"required": [SOURCE]}, {"required": needed}]
 
 
 def _finish(name: str, table: Schema) -> None:

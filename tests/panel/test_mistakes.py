@@ -18,6 +18,7 @@ from app.panel.condition import COMPARISONS
 from app.panel.faults.table_keys import inner_model, known_keys
 from app.panel.layout import Page
 from app.panel.model import Panel
+from app.panel.source import NAME as SOURCE
 from app.panel.widgets.kinds import KINDS
 from tests.support.form import LONG, several
 from tests.support.parts import TESTS
@@ -97,6 +98,8 @@ def id_at(number: int) -> str:
 def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[str]:
     """Keys of a description that a table lacks; of a list all of its tables together."""
     for key in known_keys(model):
+        if key == SOURCE and model is not Panel:
+            continue  # stands in place of the topic
         if key not in table:
             yield f"{where}{key}"
         elif (within := inner_model(model, key)) and key not in ("page", "widget"):
@@ -111,10 +114,10 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     conditions = [f"{table}.{key}" for table in ("interlock", "condition") for key in comparisons]
     left_out = ["type", *comparisons[1:]]
     of_alarms = [f"{table}.{key}" for table in ("when", "while") for key in left_out]
-    # There are robots, which have their own namespaces.
+    of_one_robot = ["namespace", "dialect", "domain"]  # there are robots, which have their own
     # The catalogue is a file beside the panel file; no type of ROS 2 has a list with a bool `active`.
     files = ["list.active", "list.catalogue"]
-    assert list(lacking(TABLES, Panel)) == ["namespace", *of_alarms, *files, *conditions]
+    assert list(lacking(TABLES, Panel)) == [*of_one_robot, *of_alarms, *files, *conditions]
     pages, groups = (
         TABLES["page"],
         [group for page in TABLES["page"] for group in page.get("group", ())],
@@ -149,6 +152,9 @@ HEADERS: Final = ALL_HEADERS if LONG else [*{LINES[n - 1]: n for n in ALL_HEADER
 ALONE: Final = {
     *(number for number, line in enumerate(LINES, 1) if line.startswith(("distro", "interfaces"))),
     *range(LINES.index('[demo."/battery"]'), len(LINES) + 1),
+    # Faults of sources come first.
+    *range(LINES.index("[[source]]") + 1, LINES.index("[alarms]") + 1),
+    *(number for number, line in enumerate(LINES, 1) if line.startswith("source = ")),
 }
 
 
@@ -225,6 +231,7 @@ SHOWS_AT: Final[Mapping[str, str]] = {
     'interfaces = ["msgs"]': 'type = "cell_msgs/msg/Jog"',
     'pictures = "msgs"': 'src = "plan.svg"',
     'action = "Switch on the fan"': 'alarms = ["oven"]',
+    'dialect = "rmw_zenoh"': "domain = 7",
     'role = "reset"': 'colour = "blue"',
     'durability = "volatile"': 'qos = { durability = "volatile" }',
 }
@@ -233,6 +240,8 @@ SHOWS_AT: Final[Mapping[str, str]] = {
 def shows_at(number: int) -> set[int]:
     """Where it may be said that a line is missing."""
     header = header_of(number)
+    if LINES[number - 1].startswith("states = [{"):  # of a source: a lamp lacks them
+        return {header, header_of(LINES.index('id = "level_lamp"') + 1)}
     elsewhere = SHOWS_AT.get(LINES[number - 1])
     if LINES[number - 1].startswith("durability"):  # a topic has one QoS: another place has another
         tables = {n for n, line in enumerate(LINES, 1) if line == "[page.widget.qos]"}

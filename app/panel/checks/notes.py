@@ -23,6 +23,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from _unbounded_trust_notes(panel)
     yield from _embedded_controls_notes(panel)
     yield from _unused_interlock_notes(panel)
+    yield from _unused_source_notes(panel)
     yield from _unusable_type_notes(panel, interfaces)
     yield from _trend_notes(panel)
     yield from unit_notes(panel, interfaces)
@@ -75,6 +76,14 @@ def _unused_interlock_notes(panel: Panel) -> Iterator[Note]:
         if interlock.id not in used:
             message = f'locks nothing: no control has interlock = "{interlock.id}"'
             yield Note(f"interlock[{i}]", message)
+
+
+def _unused_source_notes(panel: Panel) -> Iterator[Note]:
+    """Sources whose topic nothing listens to."""
+    listened = panel.listened()
+    for number, source in enumerate(panel.sources):
+        if source.topic not in listened:
+            yield Note(f"source[{number}]", f'nothing has source = "{source.id}"')
 
 
 def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:

@@ -10,9 +10,9 @@ from app.panel.faults.toml_lines import Path, lines_of
 
 MAX_ID: Final = 64
 _OWNER: Final = re.compile(
-    r"(?:^|\.)(page|group|frame|widget|interlock|alarm|robot)(?:\[([0-9]+)\])?(?=\.|$)"
+    r"(?:^|\.)(page|group|frame|widget|interlock|alarm|robot|source)(?:\[([0-9]+)\])?(?=\.|$)"
 )
-_WITH_ID: Final = ("page", "widget", "interlock", "alarm", "robot")
+_WITH_ID: Final = ("page", "widget", "interlock", "alarm", "robot", "source")
 _QUOTED: Final = re.compile(r"[/\[]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 

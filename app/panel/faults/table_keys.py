@@ -12,6 +12,8 @@ from app.panel.faults.places import place_of
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
+from app.panel.source import NAME as SOURCE
+from app.panel.source import Source, reads_source
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 
@@ -60,7 +62,9 @@ def _types(annotation: Any) -> Iterator[type]:
 
 
 def known_keys(model: Model) -> list[str]:
-    return [about.alias or name for name, about in model.model_fields.items() if name != "revision"]
+    """The keys of a description, and `source` where a source may stand in place of a topic."""
+    keys = [about.alias or name for name, about in model.model_fields.items() if name != "revision"]
+    return [*keys, SOURCE] if reads_source(model) else keys
 
 
 def _required_keys(model: Model) -> set[str]:
@@ -111,6 +115,8 @@ def _misspelt_keys(table: TableKeys, follow: Consequences) -> Iterator[Fault]:
         if not meant:
             continue
         table.unknown.remove(key)
+        if meant == SOURCE and reads_source(table.model):
+            table.missing[:] = [name for name in table.missing if name not in known_keys(Source)]
         if meant in table.missing:
             table.missing.remove(meant)
         fault = table.fault(key, f'unknown key; did you mean "{meant}"?')

@@ -16,8 +16,9 @@ NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
 HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
 FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
-    "log", "control", "diagnostics", "record", "demo", "robot", "interlock", "alarm", "alarms", "page",
-    "group", "frame", "brand", "state", "detail", "widget", "qos", "confirm", "options", "states",
+    "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms",
+    "diagnostics", "page", "group", "frame", "brand", "state", "detail", "widget", "qos", "confirm",
+    "options", "states",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8
