@@ -51,14 +51,13 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     ids, inputs = list(_id_faults(panel)), list(_input_faults(panel, interfaces))
     yield from (*ids, *inputs)
     reported = [fault.place for fault in (*ids, *inputs)]
-    faulty = {
-        *faulty,
-        *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, reported)),
-    }
+    faulty = {*faulty, *_ids_at(panel, reported)}
+    of_widgets = list(_widget_faults(panel, interfaces, faulty))
+    with_faults = {*faulty, *_ids_at(panel, [fault.place for fault in of_widgets])}
     faults = [
         *condition_faults_of(panel, interfaces),
-        *_widget_faults(panel, interfaces, faulty),
-        *alarm_faults(panel, interfaces, faulty),
+        *of_widgets,
+        *alarm_faults(panel, interfaces, with_faults),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
     missed |= {"input", "control"} if missed - {"interlock", "condition", "alarm"} else set()
@@ -97,6 +96,11 @@ def _scan_faults(panel: Panel) -> Iterator[Fault]:
         for place, _ in asking[1:]:
             message = f'"{asking[0][1].id}" has it already: a bar code goes to one input of a page'
             yield Fault(f"page[{p}].{place}.scan", message)
+
+
+def _ids_at(panel: Panel, places: Sequence[str]) -> Iterator[str]:
+    """The ids of the widgets in which these places are."""
+    yield from (w.id for place, w in _widgets_with_places(panel) if _contains_any(place, places))
 
 
 def _contains_any(place: str, places: Iterable[str]) -> bool:
