@@ -14,9 +14,10 @@ from typing import Any, Final
 from app.cli.arguments import add_settings, environment, port, seconds
 from app.cli.parser import Parser
 from app.diagnose.doctor import Diagnosis, Options, diagnose
-from app.diagnose.findings import SEVERITIES, Finding, Report
+from app.diagnose.findings import MOST_TEXT, SEVERITIES, Finding, Report
 from app.diagnose.robot import LISTEN_S
 from app.errors import KioskError
+from app.printable import one_line
 from app.settings import Settings
 from app.version import installed_version
 
@@ -87,7 +88,8 @@ def as_text(report: Report, verbose: bool = False) -> str:
 
 def _line(finding: Finding) -> str:
     robot = f" of robot {finding.robot}" if finding.robot else ""
-    return f"{finding.severity:8} {finding.code}{robot}: {finding.sentence}"
+    about = "" if finding.is_named else f" ({one_line(finding.about, MOST_TEXT)})"
+    return f"{finding.severity:8} {finding.code}{robot}: {finding.sentence}{about}"
 
 
 def make_parser(prog: str) -> Parser:

@@ -64,6 +64,11 @@ class Finding:
     def do(self) -> str:
         return self._filled(KINDS[self.code].do)
 
+    @property
+    def is_named(self) -> bool:
+        """Whether the sentence has the name that it is about."""
+        return not self.about or "{about}" in KINDS[self.code].sentence
+
     def _filled(self, sentence: str) -> str:
         """The sentence with its details. Texts of robots and other programs are made printable."""
         details = {name: one_line(str(text), MOST_TEXT) for name, text in self.details.items()}

@@ -1,12 +1,16 @@
 """The sentences of the findings, by code: what is wrong, and what to do. `{about}` is the name that a
 finding is about, `{hint}` a further sentence, or "". They are for the one who sets a panel up, not for
-its operators, and in English as the other commands are.
+its operators, and in English as the other commands are. Those about a link of the page are the page's.
 """
 
 from collections.abc import Mapping
 from typing import Final
 
+from app.i18n import ENGLISH, sentences
+
 Rows = Mapping[str, tuple[str, str]]
+
+_LINKS: Final = sentences(ENGLISH)
 
 _UNREACHABLE: Final = (
     "Check the cable, and that the bridge's machine is on. Then check that it listens there: "
@@ -28,8 +32,7 @@ ERRORS: Final[Rows] = {
     "type_unknown": (
         "{about}: {detail}.",
         "Copy the package with the definition to this machine, and name its folder in `interfaces` "
-        "of the "
-        "panel file. For a type of ROS 2 itself, correct its name or `distro`.",
+        "of the panel file. For a type of ROS 2 itself, correct its name or `distro`.",
     ),
     # This machine
     "port_in_use": (
@@ -48,8 +51,7 @@ ERRORS: Final[Rows] = {
     "data_full": (
         "The disk of {about} has {free_mb} MB left; the panel's files take up to {needed_mb} MB.",
         "Free space, or lower size_mb in [log] and max_mb in [record] of the panel file. When the "
-        "disk is "
-        "full every control locks.",
+        "disk is full every control locks.",
     ),
     "screen_small_targets": (
         "On the screen {about} a button of 20 mm is {real_mm} mm wide: it has {screen} mm for a pixel, "
@@ -76,31 +78,30 @@ ERRORS: Final[Rows] = {
     "not_zenoh": (
         "Something listens at {about}, but it does not respond as Zenoh does.",
         "Correct the port: the bridge's is 7447 unless its file says otherwise. If it is the right "
-        "one, "
-        "the bridge hangs: restart it. tls/ on one side needs tls/ on the other.",
+        "one, the bridge hangs: restart it. tls/ on one side needs tls/ on the other.",
     ),
     "link_no_bridge": (
-        "A Zenoh router answers at {about}, but no ROS 2 bridge is connected to it.",
+        _LINKS["link_no_bridge"],
         "Start zenoh-bridge-ros2dds on the robot. It must listen there or connect to this router.",
     ),
     "link_bridge_silent": (
-        "The bridge {about} is known, but does not respond.",
+        _LINKS["link_bridge_silent"],
         "Restart the bridge. If it happens again, look at its log.",
     ),
     "link_no_peer": (
-        "Zenoh answers at {about}, but no ROS 2 bridge is connected to it.",
+        _LINKS["link_no_peer"],
         "Start zenoh-bridge-ros2dds on the robot: it must listen there or connect to this router. If "
         "the robot's nodes run on rmw_zenoh, say so by `dialect` in the panel file: the doctor reads "
         "them then.",
     ),
     "link_no_ros_node": (
-        "Zenoh answers at {about}, but no ROS 2 node on rmw_zenoh is there.",
+        _LINKS["link_no_ros_node"],
         "Start the robot's nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp at this router, and set "
         "`domain` in the panel file to their ROS_DOMAIN_ID.",
     ),
     "link_router_silent": (
-        "The nodes of the Zenoh session {about} are known, but do not respond.",
-        "Restart the node. If it happens again, look at its log.",
+        _LINKS["link_router_silent"],
+        "Restart the router, then the nodes. If it happens again, look at their logs.",
     ),
     "bridge_namespace": (
         'The bridge has the namespace "{theirs}", the panel "{ours}".',

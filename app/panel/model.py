@@ -55,8 +55,7 @@ Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST)]
 
 
 class RobotEntry(Description):
-    """One of several robots of a panel; `connect` are its Zenoh endpoints, by default those of the
-    Zenoh configuration."""
+    """One of several robots; `connect` are its endpoints, by default the Zenoh configuration's."""
 
     id: Id
     name: Label

@@ -4,15 +4,18 @@ touches nothing of the panel's."""
 import json
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
 import zenoh
 
+from app.i18n import render, say
 from app.runtime.live_look import LINGER_S
 from tests.bridge.test_cameras_on_bridge import is_read
-from tests.support.parts import Bridge, RosNode, Server, until
-from tests.support.servers import live_server
+from tests.support.parts import Bridge, RosNode, Server, free_port, live, until
+from tests.support.servers import live_server, panel_file
 
 FLOAT, INT, STRING = "std_msgs/msg/Float64", "std_msgs/msg/Int32", "std_msgs/msg/String"
 PANEL: Final = """
@@ -172,3 +175,38 @@ def test_a_look_into_a_topic_of_the_panel_changes_nothing_of_its_own(
     assert topic(cell, "/test_air")["robot_qos"] == qos
     count = topic(cell, "/test_air")["count"]
     until(lambda: topic(cell, "/test_air")["count"] > count, "the panel still reads it")
+
+
+def test_a_finding_about_a_link_is_the_links_own_sentence(tmp_path: Path) -> None:
+    with (
+        zenoh_router() as endpoint,
+        live(endpoint, tmp_path, KIOSK_PANEL=panel_path(tmp_path)) as server,
+    ):
+        until(server.answers, "it serves")
+        until(lambda: diagnostics(server)["links"][1]["reason"], "the link is judged")
+        assert server.http.post("/diagnostics/check").status_code == 200
+        until(lambda: diagnostics(server)["doctor"]["at"], "the doctor has checked", within_s=120)
+        (finding,) = [
+            f for f in diagnostics(server)["doctor"]["findings"] if f["code"].startswith("link")
+        ]
+        assert finding["code"] == "link_no_peer"
+        assert finding["what"] == diagnostics(server)["links"][1]["reason"]
+        japanese = {"accept": "text/html", "accept-language": "ja"}
+        page = server.http.get("/diagnostics?view=links", headers=japanese).text
+        assert page.count(render(say("link_no_peer"), "ja")) >= 2
+
+
+@contextmanager
+def zenoh_router() -> Iterator[str]:
+    """The endpoint of a router that no bridge is connected to."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = zenoh.Config()
+    config.insert_json5("mode", '"router"')
+    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config):
+        yield endpoint
+
+
+def panel_path(folder: Path) -> str:
+    return str(panel_file(folder, PANEL))

@@ -21,8 +21,9 @@ from tests.support.servers import ready
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 VIEWS: Final = ("links", "topics", "servers", "graph", "nodes")
 AIR: Final = '[data-row="subscribed air_pressure"]'
-FITS: Final = """() => [...document.querySelectorAll("main, .list-tabs, .acts, main .bar")].every(
-    (e) => e.scrollWidth <= e.clientWidth + 1)
+FITS: Final = """() => [
+    ...document.querySelectorAll("main, .list-tabs, .list-tabs a, .acts, main .bar")
+].every((e) => e.scrollWidth <= e.clientWidth + 1)
     && document.documentElement.scrollHeight <= innerHeight"""
 
 

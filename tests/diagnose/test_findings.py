@@ -7,9 +7,10 @@ from typing import Final
 import pytest
 
 from app.cli.doctor import as_text
-from app.diagnose.findings import KINDS, MOST_ALIKE, MOST_TEXT, Report
+from app.diagnose.findings import KINDS, MOST_ALIKE, MOST_TEXT, Finding, Report
 from app.diagnose.received import copies
 from app.dialect.peer_traits import EVERY_SENTENCES
+from app.i18n import ENGLISH, render, say, sentences
 from app.robot.sample import Sample
 from app.settings import PACKAGE
 from tests.support.parts import TESTS
@@ -38,6 +39,25 @@ def test_each_finding_is_a_full_sentence_with_a_remedy(code: str) -> None:
     assert re.search(r"[.?)}]$", kind.sentence)
     assert kind.do.endswith((".", "?"))
     assert kind.sentence[0] in "{ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+OF_LINKS: Final = [
+    "link_no_bridge",
+    "link_bridge_silent",
+    "link_no_peer",
+    "link_no_ros_node",
+    "link_router_silent",
+]
+
+
+@pytest.mark.parametrize("code", OF_LINKS)
+def test_findings_about_links_are_the_sentences_of_the_page(code: str) -> None:
+    assert code in {code for own in EVERY_SENTENCES for code in (own.absent, own.silent)}
+    assert KINDS[code].sentence == sentences(ENGLISH)[code]
+    assert Finding(code, "tcp/robot:7447").sentence == render(say(code))
+    report = Report()
+    report.find(code, "tcp/robot:7447")
+    assert f"{render(say(code))} (tcp/robot:7447)\n" in as_text(report)
 
 
 def test_a_code_that_is_none_is_refused() -> None:

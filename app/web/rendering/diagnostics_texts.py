@@ -3,10 +3,15 @@
 from typing import Any, Final
 
 from app.clock import format_age, format_time
+from app.dialect.peer_traits import EVERY_SENTENCES
 from app.i18n import Param, Text, TextLike, number, say
+from app.runtime.doctor_process import FoundFault
 from app.view.diagnostic_rows import TopicRow
 
 NOTHING: Final = "–"
+LINK_FINDINGS: Final = frozenset(
+    code for sentences in EVERY_SENTENCES for code in (sentences.absent, sentences.silent)
+)
 
 
 def word(name: str, **about: Param) -> Text:
@@ -52,6 +57,12 @@ def qos_words(row: TopicRow) -> TextLike:
     return word("qos_sides", own=own or word("as_published"), theirs=theirs)
 
 
+def finding_text(finding: FoundFault) -> TextLike:
+    """What is wrong, in the reader's language where it is about a link: as the page says it. Other
+    findings are in English."""
+    return say(finding.code) if finding.code in LINK_FINDINGS else finding.sentence
+
+
 def _short(qos: str) -> str:
     return qos.replace(", volatile", "")
 
@@ -76,6 +87,7 @@ TEXTS: Final[dict[str, Any]] = {
     "size_text": size_text,
     "age_text": age_text,
     "qos_words": qos_words,
+    "finding_text": finding_text,
     "undecodable_text": undecodable_text,
     "time_text": lambda wall: format_time(wall) if wall else NOTHING,
 }
