@@ -1,8 +1,7 @@
 // The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press. The
 // frame around the page stays live behind it: a stop button is never covered, and never waits for an answer.
 import { coverPage, placeBeside, uncoverPage } from "./beside.js";
-import { entries, isCheckbox } from "./entries.js";
-import { entryText } from "./number-inputs.js";
+import { entries, isCheckbox, isNumber, numbers } from "./entries.js";
 import { TAP_AGAIN_MS } from "./press.js";
 import { closest, find, setText } from "./show.js";
 
@@ -59,5 +58,6 @@ function shownText(name) {
   const input = entries.find((entry) => entry.name === name);
   if (!input || input.value === "") return "";
   if (isCheckbox(input)) return input.parentElement?.querySelector(input.checked ? ".on" : ".off")?.textContent;
-  return input instanceof HTMLSelectElement ? input.selectedOptions[0].textContent : entryText(input);
+  if (input instanceof HTMLSelectElement) return input.selectedOptions[0].textContent;
+  return isNumber(input) ? numbers?.entryText(input) : input.value;
 }

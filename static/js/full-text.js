@@ -3,7 +3,6 @@
 // its key. A touch on the bar of control shows its text in full.
 import { placeBeside, uncoverPage } from "./beside.js";
 import { sayOnce } from "./group-locks.js";
-import { lockHelp } from "./lock-help.js";
 import { closest, copyOf, find, setText } from "./show.js";
 
 const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
@@ -78,6 +77,7 @@ async function open(key, byKeyboard) {
 async function refresh(key) {
   clearTimeout(timer);
   const look = ++looks;
+  const { lockHelp } = await import("./lock-help.js");
   const help = await lockHelp(closest(key, "[data-widget]")?.dataset.widget);
   if (look !== looks || key !== shown || !isLocked(key)) return;
   if (help) show(help.dataset.title, [], help);

@@ -1,9 +1,10 @@
 // Connects the event stream to the page: each event updates its section of the markup.
 import { followEntries, loadTouchEntry } from "./entries.js";
 import { Presser } from "./press.js";
-import { addHooks, find, lockWidget, setText, showAttributes, showFailed } from "./show.js";
+import { addHooks, attempt, find, lockWidget, setText, showAttributes } from "./show.js";
 import { Source } from "./source.js";
 
+const AT_REST_MS = 4000;
 /** @type {(data?: Data) => void} */
 const noop = () => {};
 
@@ -65,14 +66,10 @@ class Screen {
     if (document.querySelector("[data-step]")) source.load(import("./inputs.js"), noop);
     if (document.querySelector("[data-poll]")) import("./diagnostics.js").catch(pageGuard.fail);
     for (const kind of this.#data.kinds) {
-      /** @type {Promise<Hooks>} */
-      const script = import(`./kinds/${kind}.js`);
-      source.load(script, (hooks) => {
-        addHooks(kind, hooks);
-        for (const root of document.querySelectorAll(`[data-kind="${kind}"]`)) {
-          attempt(root, () => hooks.equip?.(root, source));
-        }
-      });
+      // The server has drawn it, and nothing in it is pressed: its script waits for all that is.
+      const waits = kind === "trend" && !document.querySelector(".trend-keys");
+      if (waits) setTimeout(() => this.#equip(kind), AT_REST_MS);
+      else this.#equip(kind);
     }
     if (document.querySelector(".alarm-line"))
       source.load(import("./alarm-line.js"), ({ AlarmLine }) => (this.#alarms = new AlarmLine(source)));
@@ -82,6 +79,17 @@ class Screen {
     if (document.querySelector("[data-scan]")) import("./entry/scan.js").catch(pageGuard.fail);
     if (this.#data.sounds) import("./sound.js").catch(pageGuard.fail);
     import("./floor/floor.js").catch(pageGuard.fail);
+  }
+
+  /** @param {string} kind */
+  #equip(kind) {
+    /** @type {Promise<Hooks>} */
+    const script = import(`./kinds/${kind}.js`);
+    this.#source.load(script, (hooks) => {
+      addHooks(kind, hooks);
+      for (const root of document.querySelectorAll(`[data-kind="${kind}"]`))
+        attempt(root, () => hooks.equip?.(root, this.#source));
+    });
   }
 
   /** @param {Data} all @param {Handlers} sections */
@@ -140,19 +148,6 @@ class Screen {
 export function start() {
   followEntries();
   return new Screen().start();
-}
-
-// What fails in one widget shows there, and leaves the others as they are.
-/** @param {HTMLElement} root @param {() => void} work */
-function attempt(root, work) {
-  if ("failed" in root.dataset) return;
-  try {
-    work();
-  } catch (error) {
-    root.dataset.failed = "";
-    showFailed(root, pageGuard.page.sentences.broken);
-    console.error(`widget "${root.dataset.widget}" can not be shown`, error);
-  }
 }
 
 /** @param {Record<string, Lamp>} lamps */

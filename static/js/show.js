@@ -139,9 +139,22 @@ function showInPlace(root, name, value) {
   if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
 }
 
+// What fails in one widget shows there, and leaves the others as they are.
+/** @param {HTMLElement} root @param {() => void} work */
+export function attempt(root, work) {
+  if ("failed" in root.dataset) return;
+  try {
+    work();
+  } catch (error) {
+    root.dataset.failed = "";
+    showFailed(root, pageGuard.page.sentences.broken);
+    console.error(`widget "${root.dataset.widget}" can not be shown`, error);
+  }
+}
+
 // Locks a widget that can't be shown, for good: what it shows is no longer updated.
 /** @param {HTMLElement} root @param {string} text */
-export function showFailed(root, text) {
+function showFailed(root, text) {
   for (const button of root.querySelectorAll("button")) button.disabled = true;
   if (root.dataset.state) root.dataset.state = "unreadable";
   for (const name of ["reason", "note"]) setText(root.querySelector(`[data-text="${name}"]`), text);

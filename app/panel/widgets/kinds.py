@@ -61,7 +61,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
     "hold": WidgetKind(Hold, tiles.KEY, styles=(), script=True),
     "step": WidgetKind(Step, tiles.STEP, styles=("own",), script=True),
-    "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries", "own"), script=True),
+    "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries",), script=True),
     "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script=True),
     "call": WidgetKind(Call, tiles.KEY, styles=(), script=False),
     "action": WidgetKind(Action, tiles.ACTION, styles=(), script=False),

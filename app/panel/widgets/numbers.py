@@ -127,17 +127,17 @@ class Numeric(SteppedWidget, Input):
     @property
     def limits_text(self) -> Text:
         """The limits as text: "0 to 1.5 m/s, in steps of 0.1"."""
-        if self.step is None:
-            return self.range_text
         low, high = number(number_text(self.min)), number(number_text(self.max))
         unit = after_space(self.unit)
+        if self.step is None:
+            return say("limits_both", low=low, high=high, unit=unit)
         return say("limits", low=low, high=high, unit=unit, step=number(number_text(self.step)))
 
     @property
     def range_text(self) -> Text:
-        """The limits without the step, for narrow places: "0 to 1.5 m/s"."""
+        """The limits beside a label that has the unit, for narrow places: "0 to 1.5"."""
         low, high = number(number_text(self.min)), number(number_text(self.max))
-        return say("limits_both", low=low, high=high, unit=after_space(self.unit))
+        return say("limits_both", low=low, high=high, unit="")
 
     @property
     def default_value(self) -> int | float | None:
