@@ -31,7 +31,7 @@ _NUMBERS: Final = """
     after_s before_s columns confirm_press days dead_zone depth dim_after_s disk display_hz duration_s
     enabled entries_read fit global high high_high hz keys kiosk lines local low low_low max max_age_s
     max_bytes max_hz max_length max_mb max_side_px min mm_per_px near normal offset one_shot own
-    period_s press_expires_s progress_max ramp_s range rate_hz require_publisher required rows
+    confirm_s period_s press_expires_s progress_max ramp_s range rate_hz require_publisher required rows
     rows_shown scale scan setpoint silent size_mb sounds span takeover_after_s timeout_s width within_s
 """
 _PANEL_TEXTS: Final = """
@@ -44,11 +44,11 @@ PANEL: Final = rules(
         "page widget group robot frame screen control diagnostics record qos confirm sort column pen",
         None,
     ),
-    ("joint states x_axis y_axis", None),
+    ("joint states x_axis y_axis current reported steps recovery", None),
     (_NUMBERS, NUMBER),
     ("step", NUMBER),
     ("keep window windows", DURATION),
-    ("id interlock page names", ID),
+    ("id interlock page names condition conditions fault", ID),
     ("topic topics service action node namespace", ROS_NAME),
     ("type", ROS_TYPE),
     ("field deadline_field counter_field progress success", FIELD),

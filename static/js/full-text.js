@@ -112,7 +112,7 @@ function follow(key) {
 
 /** @param {HTMLElement} text */
 function isCut(text) {
-  return text.scrollHeight > text.clientHeight + 1;
+  return text.scrollHeight > text.clientHeight + 1 || text.scrollWidth > text.clientWidth + 1;
 }
 
 // A locked key has it always: the button itself has no focus.
@@ -138,7 +138,10 @@ function mark(key) {
 
 // All are measured before the first is changed: the page is laid out once.
 function markAll() {
-  const keys = [...changed].map((key) => ({ key, cut: [...key.querySelectorAll(".face > p")].some(isCut) }));
+  const keys = [...changed].map((key) => ({
+    key,
+    cut: [...key.querySelectorAll(":is(.face, .told) > p")].some(isCut),
+  }));
   changed.clear();
   for (const { key, cut } of keys) showMore(key, cut);
   const roots = keys.map(({ key }) => key);

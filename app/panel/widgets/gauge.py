@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
 from app.errors import Fault
+from app.i18n import TextLike, number
 from app.interfaces import Interfaces
 from app.interfaces.validation import format_value
 from app.panel.base import Span
@@ -16,6 +17,8 @@ from app.panel.widgets.displays import FORMAT, Factor, format_fault
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.panel.widgets.numbers import Number, Unit
 from app.panel.widgets.topic_fields import OrNumber, number_field_faults, number_or_table
+
+APART: Final = 12.0  # percent of the scale between two figures
 
 
 class SetpointField(TopicField):
@@ -73,6 +76,16 @@ class Gauge(Display):
         """The limits that there are, from the lowest to the highest."""
         names = ("low_low", "low", "high", "high_high")
         return {name: at for name in names if (at := getattr(self, name)) is not None}
+
+    @property
+    def figures(self) -> list[tuple[float, TextLike]]:
+        """(place in percent of the scale, number) of its ends and limits; of two near each other the
+        first counts."""
+        shown: dict[float, float] = {}
+        for value in (self.min, self.max, *self.limits.values()):
+            if all(abs(self.percent(value) - at) >= APART for at in shown):
+                shown[self.percent(value)] = value
+        return [(at, number(number_text(value))) for at, value in shown.items()]
 
     def sources(self) -> Iterator[TopicSource]:
         yield from super().sources()

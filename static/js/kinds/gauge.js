@@ -1,8 +1,13 @@
-import { find } from "../show.js";
+import { find, setText } from "../show.js";
 
 // Moves what stands on the scale of a gauge.
 /** @type {Record<string, Show>} */
 export const show = {
+  text: (root, text) => {
+    setText(find(root, '[data-text="text"]'), text);
+    const now = root.querySelector(".pointer > .now");
+    if (now) now.textContent = text;
+  },
   pointer: (root, value) => place(root, ".pointer", value),
   setpoint: (root, value) => place(root, ".setpoint", value),
 };
