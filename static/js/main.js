@@ -4,7 +4,7 @@ import { Presser } from "./press.js";
 import { addHooks, attempt, find, lockWidget, setText, showAttributes } from "./show.js";
 import { Source } from "./source.js";
 
-const AT_REST_MS = 4000;
+const AT_REST_MS = 4000; // after the first snapshot
 /** @type {(data?: Data) => void} */
 const noop = () => {};
 
@@ -18,6 +18,8 @@ class Screen {
   #widgets = new Map(
     [...document.querySelectorAll("[data-widget]:not([data-failed])")].map((root) => [root.dataset.widget ?? "", root]),
   );
+  /** @type {string[]} */
+  #atRest = []; // the kinds whose script comes when the page shows all else
   #source;
   #presser;
   #control = { show: noop, lost: noop, beat: noop }; // a page without the bar does not require control
@@ -68,7 +70,7 @@ class Screen {
     for (const kind of this.#data.kinds) {
       // The server has drawn it, and nothing in it is pressed: its script waits for all that is.
       const waits = kind === "trend" && !document.querySelector(".trend-keys");
-      if (waits) setTimeout(() => this.#equip(kind), AT_REST_MS);
+      if (waits) this.#atRest.push(kind);
       else this.#equip(kind);
     }
     if (document.querySelector(".alarm-line"))
@@ -102,6 +104,7 @@ class Screen {
     this.#reconnected = "cut" in document.body.dataset;
     delete document.body.dataset.cut;
     for (const [name, show] of Object.entries(sections)) show(all[name]);
+    for (const kind of this.#atRest.splice(0)) setTimeout(() => this.#equip(kind), AT_REST_MS);
   }
 
   /** @param {Record<string, Attributes>} changes */

@@ -37,6 +37,7 @@ def press(page: Page, name: str) -> None:
 def switch(page: Page, name: str, position: str) -> None:
     """Touches a position of a switch, which moves when the robot reports it."""
     key = widget(page, name).locator(f"[data-position={position}]")
+    expect(widget(page, name).locator("[aria-busy]")).to_have_count(0)  # so soon it is the same press
     expect(key).to_be_enabled()
     key.tap()
     expect(widget(page, name)).to_have_attribute("data-at", position)

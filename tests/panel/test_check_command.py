@@ -33,8 +33,9 @@ def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert first == f'{SHIPPED}: good: "Robot cell 1", {counted}'
     assert note.startswith('  note: interlock[0] "operation", line 35: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
-    assert [line.partition("fits ")[2] for line in fits] == ["", screens, screens, screens]
-    assert "keeps 24h" in fits[0]
+    assert [line.partition("fits ")[2] for line in fits] == ["", "", screens, screens, screens]
+    assert "keeps 1h" in fits[0]
+    assert "keeps 24h" in fits[1]
     assert said.err == ""
 
 
