@@ -5,8 +5,9 @@ from bisect import bisect_left, insort
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from itertools import islice
-from typing import Final, TypedDict
+from typing import Final, NamedTuple, TypedDict
 
+from app.alarms.instance import AlarmInstance
 from app.alarms.marks import AlarmMarks
 from app.alarms.rows import AlarmRow
 from app.i18n import TextLike
@@ -58,6 +59,15 @@ NO_ALARMS: Final = AlarmsView(
     more=0,
     rows={},
 )
+
+
+class PendingRow(NamedTuple):
+    """A change that is not on the disk yet: `since` in monotonic seconds."""
+
+    seq: int
+    id: str
+    row: AlarmRow | None
+    since: float
 
 
 class ShownAlarms:
@@ -119,6 +129,20 @@ class ShownAlarms:
             more=len(self.rows) - len(rows),
             rows=rows,
         )
+
+
+def outdated(alarms: Mapping[str, AlarmInstance], rows: Mapping[str, AlarmRow], most: int) -> list[str]:
+    """The ids of rows of which the robot says something else now, without a change of state: such as
+    the values of a diagnostic status. At most so many."""
+    changed = (
+        alarm_id
+        for alarm_id, row in rows.items()
+        if (alarm := alarms.get(alarm_id)) is not None
+        and alarm.entry is not None
+        and alarm.entry.level
+        and (alarm.entry.details, alarm.text) != (row["details"], row["text"])
+    )
+    return list(islice(changed, most))
 
 
 def _key(row: AlarmRow) -> tuple[tuple[float, ...], str]:

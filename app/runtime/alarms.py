@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from app.alarms.counts import AlarmCounts
 from app.alarms.disk import NAME, AlarmDisk, Change, DiskEvents
@@ -21,7 +21,7 @@ from app.alarms.marks import AlarmMarks
 from app.alarms.own import is_kept
 from app.alarms.records import history_row, record_of
 from app.alarms.rows import AlarmRow, row_of
-from app.alarms.shown import MAX_ROWS, NO_ALARMS, AlarmsView, ShownAlarms
+from app.alarms.shown import MAX_ROWS, NO_ALARMS, AlarmsView, PendingRow, ShownAlarms, outdated
 from app.alarms.status import Moment
 from app.audit.press_record import Log
 from app.i18n import TextLike
@@ -33,21 +33,13 @@ from app.runtime.robot_alarms import RobotAlarms
 log = logging.getLogger("kiosk.alarms")
 
 AT_ONCE: Final = 25  # alarms that are evaluated in one turn: 2 ms if all are raised
+REFRESH_EVERY_S: Final = 1.0  # what robots say of alarms that stand
 SHOW_EVERY_S: Final = 0.05
 ROWS_AT_ONCE: Final = 100  # that have changed: 10 ms to render
 ROW_S: Final = 0.001  # the pause is so much longer for each: in a flood, presses go first
 # A change is shown when it is on the disk, or after this time: no slow disk hides an alarm.
 SHOWN_WITHIN_S: Final = 0.5
 LOAD_TIMEOUT_S: Final = 5.0  # the panel starts without earlier alarms if the disk takes longer
-
-
-class _Pending(NamedTuple):
-    """A change that is not on the disk yet: `since` in monotonic seconds."""
-
-    seq: int
-    id: str
-    row: AlarmRow | None
-    since: float
 
 
 def now() -> Moment:
@@ -66,7 +58,7 @@ class Alarms:
         self._loop = asyncio.get_running_loop()
         self._disk: AlarmDisk | None = None
         self._loaded: asyncio.Future[None] = self._loop.create_future()
-        self._pending: deque[_Pending] = deque()
+        self._pending: deque[PendingRow] = deque()
         self._shown_to = 0.0  # the last change that may be shown
         self._written_to = 0  # the number of the last change that is on the disk
         self._seq = 0
@@ -83,6 +75,7 @@ class Alarms:
         self._slow_timer: asyncio.TimerHandle | None = None
         self._due_timer: asyncio.TimerHandle | None = None
         self._due = math.inf
+        self._refreshed_at = -math.inf
         self._waiters: list[tuple[int, asyncio.Future[None]]] = []
         self._stopped = False
         self._own: OwnAlarms | None = None
@@ -161,6 +154,9 @@ class Alarms:
             self.engine.evaluate(AT_ONCE)
         except Exception:
             log.exception("alarms were not evaluated")
+        if (at := time.monotonic()) >= self._refreshed_at + REFRESH_EVERY_S:
+            self._refreshed_at = at
+            self._write_records(outdated(self.engine.alarms, self._shown.rows, AT_ONCE))
         self._plan()
         if self.engine.lock_changes != self._lock_changes:
             self._lock_changes = self.engine.lock_changes
@@ -204,7 +200,7 @@ class Alarms:
         assert self._disk is not None  # nothing changes before the start
         if not self._disk.put(Change(self._seq, alarm_id, row, record)):
             self._overrun[alarm_id] = None
-        self._pending.append(_Pending(self._seq, alarm_id, shown, time.monotonic()))
+        self._pending.append(PendingRow(self._seq, alarm_id, shown, time.monotonic()))
         if self._fault:
             self._show_until(math.inf)
         elif self._slow_timer is None:

@@ -28,12 +28,16 @@ export class AlarmLine {
   #busy = false;
   /** @type {(alarms: Data, isSnapshot: boolean) => void} */
   #showRows = () => {}; // of a page without the list
+  #lockActs = () => {};
 
   /** @param {import("./source.js").Source} source */
   constructor(source) {
     this.#source = source;
     if (document.querySelector("ol.alarms"))
-      source.load(import("./alarm-list.js"), ({ showRows }) => (this.#showRows = showRows));
+      source.load(import("./alarm-list.js"), ({ showRows, lockActs }) => {
+        this.#showRows = showRows;
+        this.#lockActs = lockActs;
+      });
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     this.#button.addEventListener("click", (event) => {
       event.preventDefault();
@@ -79,6 +83,7 @@ export class AlarmLine {
   #lock() {
     const { alarm, lock, cut } = this.#line.dataset;
     this.#button.disabled = !alarm || lock !== "" || cut !== undefined;
+    this.#lockActs();
   }
 
   /** @param {string} name */

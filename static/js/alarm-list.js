@@ -1,4 +1,5 @@
 // The list on the page of alarms: a row for each alarm, kept in the server's order.
+import { lockActs, showDetails } from "./alarm-details.js";
 import { copyOf, find, setText } from "./show.js";
 
 const TEXTS = [
@@ -11,6 +12,8 @@ const TEXTS = [
   "value_text",
   "limit_text",
 ];
+
+export { lockActs };
 
 /** @type {Map<string, Data>} */
 const rows = new Map();
@@ -35,9 +38,7 @@ export function showRows(alarms, isSnapshot) {
     if (item === next) next = item.nextElementSibling;
     else list.insertBefore(item, next);
   }
-  const details = document.querySelector("[data-alarm-details]");
-  const chosen = details && rows.get(details.dataset.alarmDetails ?? "");
-  if (details && chosen) showTexts(details, chosen);
+  showDetails(rows);
 }
 
 /** @param {Data} left @param {Data} right */

@@ -108,3 +108,48 @@ def test_what_is_shown_while_the_server_does_not_answer_can_be_read(
         assert violations(axe_page) == []
     finally:
         cell.process.send(signal.SIGCONT)
+
+
+def test_an_alarm_acknowledged_elsewhere_locks_its_button(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms?alarm=air_latched")
+    button = page.locator("[data-act=acknowledge] button")
+    expect(button).to_be_enabled()
+    expect(page.locator("[data-act=in_service]")).to_be_hidden()
+    act(cell, "air_latched", "acknowledge", occurrence=1)
+    expect(button).to_be_disabled()
+    expect(button).to_be_visible()
+    act(cell, "air_latched", "out_of_service", reason="Tests")
+    expect(page.locator("[data-act=in_service] button")).to_be_enabled()
+    expect(page.locator("[data-act=shelve] button").last).to_be_disabled()
+    assert page.locator(".all-shown button").is_enabled()
+    act(cell, "air_low", "acknowledge", occurrence=1)
+    expect(page.locator(".all-shown button")).to_be_disabled()
+
+
+def test_all_shown_are_those_at_the_touch(cell: Server, page: Page) -> None:
+    """One that came again under the finger is not acknowledged."""
+    act(cell, "air_low", "shelve", reason="Tests", for_s=60)
+    started(page, f"{cell.url}/alarms")
+    expect(page.locator("li.alarm[data-state=shelved]")).to_have_count(1)
+    page.wait_for_timeout(SECOND_TAP_MS)
+    page.locator(".all-shown button").hover()
+    page.mouse.down()
+    act(cell, "air_low", "unshelve")
+    expect(page.locator("li.alarm[data-state=active]")).to_have_count(2)
+    with page.expect_request("**/alarms/acknowledge") as sent:
+        page.mouse.up()
+    assert "occurrence.air_latched=1" in str(sent.value.post_data)
+    assert "air_low" not in str(sent.value.post_data)
+    until(lambda: listed(cell)["air_latched"]["acknowledged"], "it is acknowledged")
+    assert not listed(cell)["air_low"]["acknowledged"]
+
+
+def test_all_shown_have_the_occurrences_of_now_not_of_loading(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms")
+    act(cell, "air_low", "shelve", reason="Tests", for_s=60)
+    act(cell, "air_low", "unshelve")
+    until(lambda: listed(cell)["air_low"]["occurrence"] == 2, "it was raised again")
+    expect(page.locator("li.alarm[data-state=active]")).to_have_count(2)
+    page.wait_for_timeout(SECOND_TAP_MS)
+    page.locator(".all-shown button").click()
+    until(lambda: listed(cell)["air_low"]["acknowledged"], "its second occurrence is acknowledged")
