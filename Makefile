@@ -22,7 +22,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check format dev docs wheel release faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
+.PHONY: fonts run test check format dev docs wheel release faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
@@ -240,6 +240,16 @@ lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
 	$(MAKE) --no-print-directory .venv/test
 	.venv/bin/python -m app.interfaces.make_builtin
+
+# The panel's fonts from npm's @fontsource packages. The Japanese one keeps only what is needed.
+fonts:
+	mkdir -p build/fonts
+	cd build/fonts && for name in ibm-plex-sans noto-sans-jp; do npm pack --silent @fontsource/$$name@5.3.0 && tar xzf fontsource-$$name-5.3.0.tgz && cp package/LICENSE ../../static/fonts/$$name.LICENSE && mv package $$name || exit 1; done
+	$(PYTHON) deploy/font_characters.py > build/fonts/characters.txt
+	for weight in 400 700; do \
+		cp build/fonts/ibm-plex-sans/files/ibm-plex-sans-latin-$$weight-normal.woff2 static/fonts/ibm-plex-sans-$$weight.woff2 && \
+		uvx --from 'fonttools[woff]==4.68.0' pyftsubset build/fonts/noto-sans-jp/files/noto-sans-jp-japanese-$$weight-normal.woff2 --text-file=build/fonts/characters.txt --flavor=woff2 --layout-features=kern,palt,locl,ccmp --desubroutinize --no-hinting --output-file=static/fonts/noto-sans-jp-$$weight.woff2 || exit 1; \
+	done
 
 clean:
 	rm -rf .venv .venv-ros .venv-docs .venv-release dist build .mypy_cache .ruff_cache

@@ -160,9 +160,9 @@ def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> A
 
 
 def _switched(widget: Switch, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
-    pressed, _ = _pressed(widget, robot, verdict, now)
+    pressed, ages = _pressed(widget, robot, verdict, now)
     reported, until = switch(widget, robot, now)
-    return pressed | reported, until
+    return pressed | reported, min(ages, until)
 
 
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {

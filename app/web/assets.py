@@ -39,6 +39,7 @@ LEFT_OUT: Final = {
     ),
 }
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
+FONTS: Final = "fonts"
 PICTURES: Final = "pictures"
 NO_PICTURES: Final[Mapping[str, Path]] = {}
 PICTURE_TYPES: Final = {
@@ -131,6 +132,8 @@ def load_assets(
     for script in sorted(scripts.rglob("*.js")):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
     files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
+    fonts = sorted((static / FONTS).glob("*.woff2"))  # packed already
+    files |= {f"{FONTS}/{file.name}": Asset(file.read_bytes(), "font/woff2", b"") for file in fonts}
     digest = hashlib.sha256()
     for name, sent in sorted(files.items()):
         digest.update(name.encode() + b"\0" + sent.content + b"\0")

@@ -34,7 +34,7 @@ def content_security_policy(ancestors: str = "'none'", forms: str = "'self'") ->
     """The policy of a page; `ancestors` may show it in a frame."""
     return (
         f"default-src 'none'; script-src 'self' {PAGE_GUARD_HASH}; style-src 'self'; "
-        "img-src 'self' data:; "
+        "img-src 'self' data:; font-src 'self'; "
         f"connect-src 'self'; form-action {forms}; base-uri 'none'; frame-ancestors {ancestors}"
     )
 

@@ -121,7 +121,7 @@ function showMore(key, cut) {
   const more = find(key, ".more");
   const isComplete = !cut && !isLocked(key) && !key.querySelector('[data-text="more"]')?.textContent;
   more.toggleAttribute("hidden", isComplete && document.activeElement !== more);
-  more.toggleAttribute("data-cut", cut);
+  more.toggleAttribute("data-clipped", cut);
   const focused = document.activeElement;
   if (isLocked(key) && focused?.matches("button:disabled") && key.contains(focused)) more.focus();
   follow(key);

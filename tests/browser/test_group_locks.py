@@ -154,7 +154,7 @@ def test_a_stop_whose_reason_is_cut_shows_that_there_is_more_and_shows_it(
     sized(page, 1280, 800).goto(cell.url)
     stop = page.locator("[data-widget=stop]")
     assert stop.locator(".why").evaluate("(why) => why.scrollHeight > why.clientHeight + 1")
-    expect(stop.locator(".more[data-cut]")).to_be_visible()
+    expect(stop.locator(".more[data-clipped]")).to_be_visible()
     assert stop.locator(".more").evaluate("(more) => getComputedStyle(more).opacity") == "1"
     stop.click()
     sheet = page.locator("#whole")
