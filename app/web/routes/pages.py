@@ -34,7 +34,18 @@ GRACE_S = 5
 # Templates are compiled this long after the start, while the link settles; else the first page takes
 # that time. One at a time, so that the event loop runs in between.
 COMPILED_AFTER_S = 0.1
-OTHER_PAGES = ("ask.html", "error.html", "gallery.html", "log.html", "alarms.html")
+OTHER_PAGES = (
+    "ask.html",
+    "error.html",
+    "gallery.html",
+    "log.html",
+    "alarms.html",
+    "alarm-history.html",
+    "alarm-report.html",
+    "diagnostics.html",
+    "_diagnostics.html",
+    "_look.html",
+)
 
 
 @router.get(
