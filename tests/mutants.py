@@ -28,6 +28,7 @@ ROOMS: Final = {
     "app/permission/*.py": (
         "tests/permission/", "tests/robot/test_definitions.py",
         "tests/commands/test_control_acts.py", "tests/commands/test_steps.py",
+        "tests/commands/test_parameters.py",
     ),
     "app/commands/holds/*.py": ("tests/commands/test_holds.py", "tests/commands/test_joysticks.py"),
     "app/commands/press_*.py": (
@@ -36,7 +37,7 @@ ROOMS: Final = {
         "tests/commands/test_control_acts.py", "tests/commands/test_acts.py",
     ),
     "app/audit/verify.py": ("tests/audit/test_store.py", "tests/audit/test_files_removed.py"),
-    "app/robot/topics.py": ("tests/robot/test_topics.py", "tests/robot/test_state.py"),
+    "app/robot/topics.py": ("tests/robot/", "tests/permission/test_interlocks.py"),
 }  # fmt: skip
 # Fixtures with a process of their own, which reads the files.
 PROCESSES: Final = {"bridge", "demo", "kiosk", "server", "servers", "start"}
