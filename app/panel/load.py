@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import ValidationError
 
@@ -17,8 +17,11 @@ from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.faults.wording import closest_name
 from app.panel.machine_state import StateRules
 from app.panel.model import Panel
-from app.panel.source import NAME, duplicate_faults, expanded
+from app.panel.source import NAME
 from app.panel.widgets.families import BaseWidget
+
+if TYPE_CHECKING:
+    from app.panel.source_tables import Expanded
 
 
 def load_panel(path: Path) -> Panel:
@@ -61,10 +64,10 @@ def _load(file: TomlFile) -> Panel:
     written = {key: value for key, value in file.tables.items() if key != "revision"}
     if faults := _source_faults(written, file):
         raise PanelError(str(file.path), _sorted_faults(faults, file))
-    with_sources = expanded(written)
-    if with_sources.faults:
+    with_sources = _with_sources(written) if NAME in written else None
+    if with_sources and with_sources.faults:
         raise PanelError(str(file.path), _sorted_faults(with_sources.faults, file))
-    tables = with_sources.tables
+    tables = with_sources.tables if with_sources else written
     faults = [] if written == file.tables else [Fault("revision", "unknown key")]
     try:
         panel = Panel.model_validate(tables | {"revision": file.revision}, context=_context(file))
@@ -73,7 +76,7 @@ def _load(file: TomlFile) -> Panel:
     else:
         faults += _type_faults(panel)
     if faults:
-        moved = {with_sources.at_origin(fault): None for fault in faults}
+        moved = {with_sources.at_origin(f): None for f in faults} if with_sources else faults
         raise PanelError(str(file.path), _sorted_faults(moved, file))
     return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
 
@@ -93,7 +96,16 @@ def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
         from app.panel.faults.shape import find_shape_faults
 
         return find_shape_faults(error, tables).faults
+    from app.panel.source_tables import duplicate_faults
+
     return [*duplicate_faults([source.id for source in sources])]
+
+
+def _with_sources(tables: dict[str, Any]) -> "Expanded":
+    """Imported only where a panel has sources, for a faster start."""
+    from app.panel.source_tables import expanded
+
+    return expanded(tables)
 
 
 def _context(file: TomlFile) -> FileContext:

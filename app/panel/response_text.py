@@ -86,8 +86,8 @@ def parsed(written: str) -> ResponseField:
 def response_fields(template: TextLike) -> list[ResponseField]:
     """The fields of a response that a text about it names, in all its languages."""
     texts = each_language(template).values()
-    found = (piece for text in texts for piece in pieces(text))
-    return list(dict.fromkeys(piece for piece in found if isinstance(piece, ResponseField)))
+    parts = (part for text in texts for part in pieces(text))
+    return list(dict.fromkeys(part for part in parts if isinstance(part, ResponseField)))
 
 
 def response_paths(template: TextLike) -> list[str]:

@@ -1,25 +1,15 @@
-"""A topic that several tables of a panel file name by an id: `[[source]]`, and `source = "…"` in them.
+"""Topics that several tables of a panel file name by an id: `[[source]]`."""
 
-`expanded` writes the keys of a source into each table that names it, before the tables are checked.
-"""
-
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, Field
 
-from app.errors import Fault
-from app.interfaces.validation import format_value
 from app.panel.base import Description, FieldPath, Id, Seconds, TopicName, TopicQos, Type, non_empty
-from app.panel.faults.wording import list_names
 from app.panel.widgets.displays import FORMAT_OR_TIME, Factor, LampState
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.numbers import Unit
 
 NAME: Final = "source"
-OWN: Final = ("topic", "type", "qos")  # of the source alone
-OF_NUMBER: Final = ("scale", "offset")
 
 
 class Source(Description):
@@ -40,110 +30,8 @@ class Source(Description):
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Expanded:
-    """The tables with the keys of their sources; `origins` are the places of keys in the file, by the
-    places that they were written to."""
-
-    tables: dict[str, Any]
-    faults: list[Fault] = field(default_factory=list)
-    origins: dict[str, str] = field(default_factory=dict)
-
-    def at_origin(self, fault: Fault) -> Fault:
-        """The fault at the place in the file."""
-        for place, origin in self.origins.items():
-            if fault.place == place or fault.place.startswith((f"{place}.", f"{place}[")):
-                return fault.at(f"{origin}{fault.place[len(place) :]}")
-        return fault
-
-
-def expanded(tables: dict[str, Any]) -> Expanded:
-    """The tables of a panel file with the keys of the sources that they name."""
-    sources = tables.get(NAME)
-    if not isinstance(sources, list) or not sources:
-        return Expanded(tables)
-    known = {table["id"]: (f"{NAME}[{number}]", table) for number, table in enumerate(sources)}
-    made = Expanded({})
-    made.tables.update(_Walk(known, made).table(_panel_model(), tables, ""))
-    return made
-
-
-def duplicate_faults(ids: list[str]) -> Iterator[Fault]:
-    """Faults of sources with the id of another one."""
-    for number, name in enumerate(ids):
-        if name in ids[:number]:
-            message = f'"{name}" is already the id of {NAME}[{ids.index(name)}]'
-            yield Fault(f"{NAME}[{number}].id", message)
-
-
 def reads_source(model: type[BaseModel]) -> bool:
     """Whether a table of this description may name a source: it reads a topic."""
     keys = model.model_fields
     publishes = issubclass(model, PublishCommand)
     return "topic" in keys and "type" in keys and not publishes and model is not Source
-
-
-class _Walk:
-    def __init__(self, sources: Mapping[str, tuple[str, Mapping[str, Any]]], made: Expanded) -> None:
-        self._sources = sources
-        self._made = made
-
-    def table(self, model: type[BaseModel] | None, table: dict[str, Any], place: str) -> dict[str, Any]:
-        """A table and those in it, with the keys of their sources."""
-        from app.panel.faults.table_keys import inner_model, known_keys
-        from app.panel.widgets.kinds import KINDS
-
-        kind = table.get("kind")
-        model = KINDS[kind].model if isinstance(kind, str) and kind in KINDS else model
-        if model is None or model is Source:
-            return table
-        whole = {
-            key: self._value(inner_model(model, key), value, f"{place}.{key}".strip("."))
-            for key, value in table.items()
-        }
-        if NAME not in table or not reads_source(model):
-            return whole
-        return self._with_source(whole, known_keys(model), place)
-
-    def _value(self, model: type[BaseModel] | None, value: Any, place: str) -> Any:
-        if isinstance(value, dict):
-            return self.table(model, value, place)
-        if isinstance(value, list):
-            items = enumerate(value)
-            return [self._value(model, item, f"{place}[{number}]") for number, item in items]
-        return value
-
-    def _with_source(self, table: dict[str, Any], keys: list[str], place: str) -> dict[str, Any]:
-        name = table.pop(NAME)
-        if not isinstance(name, str) or name not in self._sources:
-            message = f"no source {format_value(name)}; there is {list_names(sorted(self._sources))}"
-            self._made.faults.append(Fault(f"{place}.{NAME}", message))
-            return table
-        at, source = self._sources[name]
-        for key in OWN:
-            if key in table:
-                message = f'stands beside source: "{name}" has it; write the one or the other'
-                self._made.faults.append(Fault(f"{place}.{key}", message))
-        for key in _shared(source, table, keys):
-            table[key] = source[key]
-            self._made.origins[f"{place}.{key}"] = f"{at}.{key}"
-        return table
-
-
-def _shared(source: Mapping[str, Any], table: Mapping[str, Any], keys: list[str]) -> Iterator[str]:
-    """The keys that a table has from its source: those that it knows and does not have itself."""
-    is_scaled = any(key in source for key in OF_NUMBER)
-    for key in source:
-        if key == "id" or key not in keys or key in table:
-            continue
-        if key == "unit" and is_scaled and not {*OF_NUMBER} <= {*keys}:
-            continue  # the unit is that of the scaled number
-        if key not in OWN and {"stale_s", "diagnostics", "list"} & table.keys():
-            continue  # of an alarm that is about the topic, not about a field
-        yield key
-
-
-def _panel_model() -> type[BaseModel]:
-    from app.panel.model import Panel
-
-    return Panel

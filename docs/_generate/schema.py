@@ -138,7 +138,7 @@ def _with_source(name: str, table: Schema) -> None:
     if name in (SOURCE, *PUBLISHED) or not {"topic", "type"} <= {*properties}:
         return
     properties[SOURCE] = {"type": "string", "title": "id of a source"}
-    needed = [key for key in table.get("required", ()) if key in ("topic", "type")]
+    needed = [key for key in table.get("required", ()) if key in ("topic", "type", "states")]
     if needed:
         table["required"] = [key for key in table["required"] if key not in needed]
         table["anyOf"] = [{"required": [SOURCE]}, {"required": needed}]

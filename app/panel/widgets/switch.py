@@ -132,9 +132,9 @@ class Switch(EntryWidget, PressCommand):
         """The new position; InputError for anything but true and false."""
         if isinstance(value, bool):
             return value
-        given = format_value(value)
+        shown = format_value(value)
         raise InputError(
-            say("input_not_a_boolean", label=self.label, on=self.on, off=self.off, given=given)
+            say("input_not_a_boolean", label=self.label, on=self.on, off=self.off, given=shown)
         )
 
     def with_constants(self, interfaces: Interfaces) -> Self:
