@@ -75,4 +75,4 @@ def _table(codes: Mapping[str, str], language: str = ENGLISH, columns: Sequence[
 
 def shown(sentence: str) -> str:
     """With the names of what is filled in, so that Markdown takes nothing of it for its own."""
-    return sentence.strip().replace("{", "*{").replace("}", "}*").replace("|", "\\|")
+    return sentence.strip().replace("\n", " ").replace("{", "*{").replace("}", "}*").replace("|", "\\|")
