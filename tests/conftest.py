@@ -25,6 +25,7 @@ from tests.support.parts import (
     CHROMIUM,
     ENOUGH_S,
     HEADLESS,
+    RMW_ROBOT,
     ROOT,
     ROS_PYTHON,
     Bridge,
@@ -86,7 +87,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """No test is skipped: if a real part is missing that a test needs, the run ends."""
     missing = [
         str(p)
-        for p in (BRIDGE, ROS_PYTHON, CHROMIUM, HEADLESS, *OTHER_BROWSERS)
+        for p in (BRIDGE, RMW_ROBOT, ROS_PYTHON, CHROMIUM, HEADLESS, *OTHER_BROWSERS)
         if not Path(p).exists()
     ]
     if missing and needs_parts(session) and not session.config.option.collectonly:

@@ -38,6 +38,8 @@ REFERENCE = TESTS / "reference.toml"
 BRIDGE = Path(
     os.environ.get("TEST_BRIDGE") or Path.home() / ".cache/operator-panel/bridge/release/test-bridge"
 )
+# A node on hiroz, beside the bridge: `tests/rmw_crate/`.
+RMW_ROBOT = BRIDGE.with_name("test-rmw-robot")
 ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM = "/usr/bin/chromium"
 # The same engine without windows: a page takes a quarter of the CPU time.
