@@ -187,7 +187,8 @@ def test_missing_router_is_reported_with_the_remedy(host: str, more: str) -> Non
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
         f"no Zenoh router or bridge answers at {endpoint} within 0.3 s: start zenoh-bridge-ros2dds on"
-        f" the robot, or name its place with --connect tcp/HOST:7447{more}\n"
+        " the robot, or name its place with --connect tcp/HOST:7447; if the robot's nodes run on"
+        f" rmw_zenoh, start its Zenoh router and its nodes{more}\n"
     )
 
 

@@ -16,11 +16,11 @@ SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280))
 PANELS: Final = (SHIPPED, ROOT / "docs/examples/palletizer.toml")
 # Texts beyond the box that cuts them, and tabs that are broken inside a word. Left out: what a touch
 # shows whole (reasons and receipts), a title beside a long state, limits of parameters, switches of
-# narrow inputs, words of gauges, cells of tables.
+# narrow inputs, words of gauges, cells of tables, all but the first line of an alarm's action.
 CUT: Final = """() => {
   const LEFT_OUT =
     "h1, .why, .reasons, .receipt, .result, [data-kind=parameter] .limits, .switch, .said, td, " +
-    "script, template";
+    ".alarm-line [data-text=action], script, template";
   const found = [];
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   const rects = (element) => {
@@ -36,6 +36,7 @@ CUT: Final = """() => {
   while (texts.nextNode()) {
     const element = texts.currentNode.parentElement;
     if (!texts.currentNode.data.trim() || !element.checkVisibility()) continue;
+    if (!element.getBoundingClientRect().width && element.closest("svg")) continue;
     if (element.closest(LEFT_OUT)) continue;
     let box = element;
     while (box !== document.body && !cuts(box) && !isHidden(box)) box = box.parentElement;

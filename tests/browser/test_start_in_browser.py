@@ -61,7 +61,7 @@ SCRIPTS: Final = {
     "number-text": "recipe",
     "kinds/hold": "cell",
     "kinds/pallet": "cell",
-    "kinds/conditions": "cell",
+    "kinds/conditions": "watch",
     "kinds/parameter": "recipe",
     "kinds/gauge": "robot",
     "kinds/joints": "robot",

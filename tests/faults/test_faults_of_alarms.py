@@ -157,6 +157,7 @@ def standing(server: Server) -> int:
     return int(server.snapshot()["alarms"]["standing"])
 
 
+@pytest.mark.real_time
 def test_presses_a_hold_and_the_list_go_on_in_a_flood(server: Server, flooding: Robot) -> None:
     until(lambda: standing(server) == 0, "nothing is raised", within_s=60)
     press_for(server, 0.5)

@@ -31,7 +31,7 @@ PATTERNS = (
 )
 RELOAD = ["--reload", *(f"--reload-dir={name}" for name in FOLDERS)]
 RELOAD += [f"--reload-include={pattern}" for pattern in PATTERNS]
-NO_SOURCES = {"", ".pyc", ".svg"}
+NO_SOURCES = {"", ".pyc", ".svg", ".woff2", ".LICENSE"}
 PANEL = "cell/panel.toml"
 FAULT = ('kind = "readout"', 'kind = "readuot" # <b>')
 SCREEN = "templates/screen.html"
