@@ -137,7 +137,6 @@ RMW_ZENOH_TRAITS: Final = PeerTraits(
 # Until the tokens that are there have shown the kind of peer.
 AUTO_TRAITS: Final = replace(
     BRIDGE_TRAITS,
-    title=BRIDGE_TRAITS.title,
     start_hint=f"{BRIDGE_TRAITS.start_hint}; if the robot's nodes run on rmw_zenoh, start its Zenoh"
     " router and its nodes",
     sentences=replace(

@@ -12,6 +12,7 @@ from app.interfaces import Interfaces, load_interfaces
 from app.panel.alarm import Alarm
 from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
+from app.panel.checks.robots import duplicate_ids
 from app.panel.constants import resolve_condition
 from app.panel.faults.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.faults.wording import closest_name
@@ -96,9 +97,7 @@ def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
         from app.panel.faults.shape import find_shape_faults
 
         return find_shape_faults(error, tables).faults
-    from app.panel.source_tables import duplicate_faults
-
-    return [*duplicate_faults([source.id for source in sources])]
+    return [*duplicate_ids(NAME, [source.id for source in sources])]
 
 
 def _with_sources(tables: dict[str, Any]) -> "Expanded":

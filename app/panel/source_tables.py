@@ -15,7 +15,7 @@ from app.panel.source import NAME, Source, reads_source
 from app.panel.widgets.kinds import KINDS
 
 OWN: Final = ("topic", "type", "qos")  # of the source alone
-OF_NUMBER: Final = ("scale", "offset")
+OF_NUMBER: Final = frozenset({"scale", "offset"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,22 +36,11 @@ class Expanded:
 
 
 def expanded(tables: dict[str, Any]) -> Expanded:
-    """The tables of a panel file with the keys of the sources that they name."""
-    sources = tables.get(NAME)
-    if not isinstance(sources, list) or not sources:
-        return Expanded(tables)
-    known = {table["id"]: (f"{NAME}[{number}]", table) for number, table in enumerate(sources)}
+    """The tables of a panel file, whose sources are good, with the keys of those that they name."""
+    known = {table["id"]: (f"{NAME}[{number}]", table) for number, table in enumerate(tables[NAME])}
     made = Expanded({})
     made.tables.update(_Walk(known, made).table(Panel, tables, ""))
     return made
-
-
-def duplicate_faults(ids: list[str]) -> Iterator[Fault]:
-    """Faults of sources with the id of another one."""
-    for number, name in enumerate(ids):
-        if name in ids[:number]:
-            message = f'"{name}" is already the id of {NAME}[{ids.index(name)}]'
-            yield Fault(f"{NAME}[{number}].id", message)
 
 
 class _Walk:
@@ -99,13 +88,17 @@ class _Walk:
 
 
 def _shared(source: Mapping[str, Any], table: Mapping[str, Any], keys: list[str]) -> Iterator[str]:
-    """The keys that a table has from its source: those that it knows and does not have itself."""
-    is_scaled = any(key in source for key in OF_NUMBER)
-    for key in source:
-        if key == "id" or key not in keys or key in table:
-            continue
-        if key == "unit" and is_scaled and not {*OF_NUMBER} <= {*keys}:
-            continue  # the unit is that of the scaled number
-        if key not in OWN and {"stale_s", "diagnostics", "list"} & table.keys():
-            continue  # of an alarm that is about the topic, not about a field
-        yield key
+    """The keys that a table has from its source: those that it knows and does not have itself.
+
+    What is about one field is not that of another field. A scale, an offset and the unit of the result
+    belong together: all of them, or none."""
+    shared = {*source} - {"id"}
+    is_about_topic = {"stale_s", "diagnostics", "list"} & table.keys()  # of an alarm
+    if is_about_topic:
+        shared &= {*OWN}
+    elif table.get("field", source.get("field")) != source.get("field"):
+        shared &= {*OWN, "max_age_s"}
+    scaling = OF_NUMBER & source.keys()
+    if scaling and (OF_NUMBER & table.keys() or not scaling <= {*keys}):
+        shared -= {*OF_NUMBER, "unit"}
+    return (key for key in source if key in shared and key in keys and key not in table)

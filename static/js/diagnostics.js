@@ -66,9 +66,9 @@ function update(old, fresh) {
   const kept = new Set();
   for (const wanted of telling(fresh)) {
     const key = keyOf(wanted);
-    const found = key ? rows.get(key) : places.shift();
-    const node = found && found.nodeName === wanted.nodeName ? found : document.importNode(wanted, true);
-    if (node === found) updateNode(node, wanted);
+    const present = key ? rows.get(key) : places.shift();
+    const node = present && present.nodeName === wanted.nodeName ? present : document.importNode(wanted, true);
+    if (node === present) updateNode(node, wanted);
     if (node !== place) old.insertBefore(node, place);
     kept.add(node);
     place = tellingFrom(node.nextSibling);

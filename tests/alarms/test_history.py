@@ -6,6 +6,7 @@ import io
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,13 +25,13 @@ MANY = 100_000
 RULES = AlarmRules()
 
 
-def row(number: int, at: float = AT, **changed: object) -> HistoryRow:
+def row(number: int, at: float = AT, **changed: Any) -> HistoryRow:
     text = PanelText({"en": f"Pump {number}", "ja": f"ポンプ {number}"}, "en").as_json()
     record = json.dumps(
         {"about": {"text": text, "group": "Air", "unit": "bar"}, "value": number}, ensure_ascii=False
     )
     made = HistoryRow(at, f"pump{number}", "active", 1, "", "", record, "raised", 2, "left", "Air")
-    return made._replace(**changed)  # type: ignore[arg-type]
+    return made._replace(**changed)
 
 
 def store_with(folder: Path, rows: list[HistoryRow], days: float = 1000, size_mb: float = 64) -> Path:
@@ -40,8 +41,8 @@ def store_with(folder: Path, rows: list[HistoryRow], days: float = 1000, size_mb
     return folder / "alarms.sqlite3"
 
 
-def numbers(path: Path, **wanted: object) -> list[int]:
-    chosen = HistoryFilter()._replace(**wanted)  # type: ignore[arg-type]
+def numbers(path: Path, **wanted: Any) -> list[int]:
+    chosen = HistoryFilter()._replace(**wanted)
     return [hit.seq for hit in read_history(path, chosen)]
 
 

@@ -47,7 +47,6 @@ kind = "readout"
 label = "Voltage"
 source = "battery"
 field = "voltage"
-scale = 1.0
 unit = "V"
 max_age_s = 2.0
 
@@ -57,6 +56,7 @@ kind = "indicator"
 label = "Supply"
 source = "battery"
 field = "power_supply_status"
+states = [{ value = 2, text = "Discharging", shape = "square" }]
 
 [[page.widget]]
 id = "history"
@@ -86,7 +86,8 @@ def test_tables_have_what_their_source_says_where_they_do_not(tmp_path: Path) ->
     )  # fmt: skip
     assert (soc.scale, soc.unit, soc.format, soc.qos.reliability) == (100.0, "%", ".0f", "best_effort")
     assert (volt.field, volt.scale, volt.unit, volt.max_age_s) == ("voltage", 1.0, "V", 2.0)
-    assert [state.text for state in supply.states] == ["Charging"]
+    assert (volt.offset, volt.format) == (0.0, None)  # what is about one field is not that of another
+    assert [state.text for state in supply.states] == ["Discharging"]
     (interlock,) = panel.interlocks
     assert (interlock.topic, interlock.max_age_s) == ("/battery", 10.0)
     assert interlock.min == pytest.approx(0.15)
@@ -144,3 +145,26 @@ def test_two_sources_with_one_id_and_one_that_nothing_names(tmp_path: Path) -> N
 def test_without_sources_the_key_is_unknown(tmp_path: Path) -> None:
     with pytest.raises(PanelError, match="unknown key"):
         loaded(tmp_path, 'title = "Cell"\n' + PAGE)
+
+
+def test_scale_offset_and_unit_are_shared_together_or_not_at_all(tmp_path: Path) -> None:
+    celsius = SOURCE.replace("scale = 100", "scale = 2\noffset = -273.15").replace('"%"', '"°C"')
+    alarm = """
+[[alarm]]
+id = "warm"
+text = "Warm"
+source = "battery"
+high = 50.0
+"""
+    own_scale = PAGE.replace(
+        'source = "battery"\n\n[[page.widget]]\nid = "volt"',
+        'source = "battery"\nscale = 3\n\n[[page.widget]]\nid = "volt"',
+    )
+    panel = loaded(tmp_path, celsius + own_scale + alarm)
+    soc = panel.widget("soc", Readout)
+    assert (soc.scale, soc.offset, soc.unit) == (3.0, 0.0, "")
+    (warm,) = panel.alarms  # an alarm has no offset: its limit is of what the robot sends
+    assert (warm.scale, warm.unit) == (1.0, "")
+    panel = loaded(tmp_path, SOURCE + PAGE + alarm)
+    (warm,) = panel.alarms
+    assert (warm.scale, warm.unit) == (100.0, "%")
