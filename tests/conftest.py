@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
-from tests.support import checkout, domains, holds
+from tests.support import checkout, domains, failed_tests, holds
 from tests.support.browser.browsers import BROWSERS, FAILED, Browsers, ReusedPage
 from tests.support.browser.drivers import OTHER_BROWSERS
 from tests.support.operator_log import wait_for_the_disk
@@ -46,6 +46,14 @@ sentences(ENGLISH)  # read before any test measures time
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--real-time", choices=("only", "without"), help="tests that measure real time")
+    parser.addoption("--write-failed", type=Path, help="file for the ids of failed tests")
+    parser.addoption("--only-failed", type=Path, help="run the tests that such a file names")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    path = config.getoption("--write-failed")
+    if path and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(failed_tests.FailedTests(path))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -64,6 +72,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     browser, which share it and begin with its tests, then those with the most tests on real parts. So
     no slow file starts last; files without real parts fill the rest."""
     wanted = config.getoption("--real-time")
+    if path := config.getoption("--only-failed"):
+        failed = failed_tests.read(path)
+        items[:] = [item for item in items if item.nodeid in failed]
     for item in items:
         assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
         if item.get_closest_marker("real_time"):

@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Frame, Page, expect
 
 from app.i18n import render, say
+from tests.support.browser.pages import press_button
 from tests.support.embedding import embedding_page
 from tests.support.holds import PANEL
 from tests.support.parts import Server, free_port, until
@@ -86,18 +87,18 @@ def test_an_allowed_site_shows_values_and_no_controls(own_page: Page, tmp_path: 
         frame = frame_of(page)
         frame.wait_for_url(f"{server.url}/pages/one?embed=1")  # by the browser's own word
         say_it = frame.locator('[data-widget="say"]')
-        expect(say_it.get_by_role("button").first).to_be_disabled()
+        expect(press_button(frame, "say")).to_be_disabled()
         expect(say_it.locator('[data-text="reason"]')).to_have_text(LOCKED)
-        expect(frame.locator('[data-widget="jog"]').get_by_role("button").first).to_be_disabled()
+        expect(press_button(frame, "jog")).to_be_disabled()
         expect(frame.locator(".menu-key")).to_be_hidden()
         until(lambda: server.widget("say")["enabled"], "the panel itself may press")
-        expect(say_it.get_by_role("button").first).to_be_disabled()  # still, with the events of that
+        expect(press_button(frame, "say")).to_be_disabled()  # still, with the events of that
         frame.get_by_role("link", name="Two").click()
         frame.wait_for_url(f"{server.url}/pages/two?embed=1")
         expect(frame.locator('[data-widget="value"] [data-text="text"]')).to_contain_text(
             re.compile("[0-9]")
         )
-        expect(frame.locator('[data-widget="again"]').get_by_role("button").first).to_be_disabled()
+        expect(press_button(frame, "again")).to_be_disabled()
         assert page.context.cookies(server.url) == []
 
 
@@ -132,7 +133,6 @@ def test_with_controls_a_frame_presses(own_page: Page, tmp_path: Path) -> None:
     with embedded(tmp_path, f"{ALLOWED}\ncontrols = true") as (_, around):
         page.goto(around)
         frame = frame_of(page)
-        say_it = frame.locator('[data-widget="say"]')
-        expect(say_it.get_by_role("button")).to_be_enabled()
-        say_it.get_by_role("button").click()
+        expect(press_button(frame, "say")).to_be_enabled()
+        press_button(frame, "say").click()
         expect(frame.locator("#receipt-say")).to_contain_text("/say")

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from tests.support.browser.pages import widget
+from tests.support.browser.pages import press_button, widget
 from tests.support.parts import Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 
@@ -89,8 +89,8 @@ def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory
 def go(page: Page, node: RosNode) -> None:
     """The button of the same page works."""
     count = len(node.heard("/test_go"))
-    expect(widget(page, "go").get_by_role("button")).to_be_enabled()
-    widget(page, "go").get_by_role("button").click()
+    expect(press_button(page, "go")).to_be_enabled()
+    press_button(page, "go").click()
     until(lambda: has_heard(node, "/test_go", count + 1), "the press arrives")
 
 
@@ -144,7 +144,7 @@ def test_a_widget_whose_script_throws_is_locked_in_its_tile(
     name = {"hold": "jog", "gauge": "pressure"}[kind]
     if kind == "hold":
         expect(widget(own_page, name)).to_have_attribute("data-failed", "")
-        expect(widget(own_page, name).get_by_role("button")).to_be_disabled()
+        expect(press_button(own_page, name)).to_be_disabled()
     else:
         node.publish("/test_pressure", {"data": 7.0})
         expect(widget(own_page, name)).to_have_attribute("data-state", "unreadable")

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, Page, Request, expect
 
-from tests.support.browser.pages import middle, widget
+from tests.support.browser.pages import middle, press_button, widget
 from tests.support.holds import PANEL
 from tests.support.parts import free_port, until
 from tests.support.proxy import proxied
@@ -104,7 +104,7 @@ def test_pages_presses_events_holds_and_pictures_work_below_a_path(
     page: Page, url: str, asked: list[Request]
 ) -> None:
     page.goto(f"{url}/")
-    say = widget(page, "say").get_by_role("button")
+    say = press_button(page, "say")
     expect(say).to_be_enabled()  # by the events
     page.locator("#input-text").fill("below a path")
     say.click()
@@ -113,9 +113,9 @@ def test_pages_presses_events_holds_and_pictures_work_below_a_path(
     jog = widget(page, "jog")
     page.mouse.move(*middle(jog))
     page.mouse.down()
-    expect(jog.get_by_role("button")).to_have_attribute("aria-pressed", "true")
+    expect(press_button(page, "jog")).to_have_attribute("aria-pressed", "true")
     page.mouse.up()
-    expect(jog.get_by_role("button")).to_have_attribute("aria-pressed", "false")
+    expect(press_button(page, "jog")).to_have_attribute("aria-pressed", "false")
     assert below(asked)
     kinds = {request.resource_type for request in asked}
     assert {"document", "stylesheet", "script", "eventsource"} <= kinds

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from playwright.sync_api import FloatRect, Locator, Page
+from playwright.sync_api import FloatRect, Frame, Locator, Page
 
 from tests.support.parts import until
 
@@ -27,9 +27,14 @@ ROWS: Final = """(number) => {
 }"""
 
 
-def widget(page: Page, name: str) -> Locator:
+def widget(page: Page | Frame, name: str) -> Locator:
     """The element of a widget, by its id."""
     return page.locator(f'[data-widget="{name}"]')
+
+
+def press_button(page: Page | Frame, name: str) -> Locator:
+    """The button that presses a widget. A locked widget has a second one, "…"."""
+    return widget(page, name).locator("button:not(.more)")
 
 
 def asked(button: Locator) -> Locator:
