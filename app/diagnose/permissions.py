@@ -99,5 +99,5 @@ def _last_value(samples: Sequence[Sample], interlock: Interlock, interfaces: Int
     """The newest value; of a field with a key, that of the newest message which has it."""
     reader = interfaces.field_reader(interlock.type, [interlock.field])
     newest = samples[::-1] if has_key(interlock.field) else samples[-1:]
-    values = (reader.read(bytes(sample.payload)).get(interlock.field) for sample in newest)
+    values = (reader.read(bytes(sample.payload), sample.wall).get(interlock.field) for sample in newest)
     return next((value for value in values if value is not None), None)

@@ -8,7 +8,8 @@ from app.interfaces.cdr.fields import FieldReader, Fields, RowReader, Rows, Walk
 from app.interfaces.definitions import INTEGER_RANGES, PLACEHOLDER, STRING_TYPES, Field, Structure, Type
 from app.interfaces.derived_types import ActionTypes
 from app.interfaces.distributions import DISTROS
-from app.interfaces.field_path import field_name, has_key, parent_path
+from app.interfaces.field_functions import Absence
+from app.interfaces.field_path import field_call, field_name, has_key, parent_path
 from app.interfaces.json_values import plain_text, to_plain
 from app.interfaces.registry import Interfaces, load_interfaces
 
@@ -17,6 +18,7 @@ __all__ = [
     "INTEGER_RANGES",
     "PLACEHOLDER",
     "STRING_TYPES",
+    "Absence",
     "ActionTypes",
     "Field",
     "FieldReader",
@@ -27,6 +29,7 @@ __all__ = [
     "Structure",
     "Type",
     "Walk",
+    "field_call",
     "field_name",
     "has_key",
     "load_interfaces",

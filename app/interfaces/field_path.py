@@ -9,6 +9,9 @@
 
 In "list[key=value]" the key is a field of the list's elements. If they have no field of this name, it
 is a list beside it whose element at the same index has the value.
+
+A field may also be a function of fields: "yaw(pose.orientation)", "diff(position[0], position[1])". See
+`field_functions`.
 """
 
 import re
@@ -24,8 +27,12 @@ _STEP: Final = re.compile(
     re.VERBOSE,
 )
 EXPECTED: Final = (
-    "it must be like pose.x, position[2], position[name=joint_2] or status[name='a b'].level"
+    "it must be like pose.x, position[2], position[name=joint_2], status[name='a b'].level or"
+    " min(ranges)"
 )
+_CALL: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*\((?P<paths>.*)\)\s*", re.DOTALL)
+# Commas between fields: not those in the text of a key.
+_COMMA: Final = re.compile(r",(?=(?:[^'\"]|'[^']*'|\"[^\"]*\")*$)")
 
 
 class Key(NamedTuple):
@@ -37,6 +44,14 @@ class Key(NamedTuple):
 
 
 PathStep = str | int | Key
+
+
+class FieldCall(NamedTuple):
+    """A function of fields, as in "min(ranges)"; `text` is all of it."""
+
+    text: str
+    name: str
+    paths: tuple[str, ...]
 
 
 class _Parsed(NamedTuple):
@@ -70,6 +85,27 @@ def _unquote(text: str) -> str:
     return text[1:-1].replace(quote * 2, quote) if quote in "'\"" else text
 
 
+@lru_cache(4096)
+def field_call(path: str) -> FieldCall | None:
+    """The function of fields that a path is; None for the path of one field. InterfaceError if one of
+    its fields is malformed."""
+    match = _CALL.fullmatch(path)
+    if match is None:
+        return None
+    paths = tuple(part.strip() for part in _COMMA.split(match["paths"]))
+    for inner in paths:
+        if _CALL.fullmatch(inner):
+            raise InterfaceError(f'"{path}": a function is of fields, not of another function')
+        path_steps(inner)
+    return FieldCall(path, match["name"], paths)
+
+
+def field_paths(path: str) -> tuple[str, ...]:
+    """The path itself, or those of the fields that a function is of."""
+    call = field_call(path)
+    return (path,) if call is None else call.paths
+
+
 def path_steps(path: str) -> tuple[PathStep, ...]:
     """The steps of a path: names, indexes and keys; InterfaceError for a malformed path."""
     return _parse(path).steps
@@ -77,15 +113,21 @@ def path_steps(path: str) -> tuple[PathStep, ...]:
 
 def has_key(path: str) -> bool:
     """Whether the path selects an element by a key, whatever its index is in a message."""
+    return any(_has_key(inner) for inner in field_paths(path))
+
+
+def _has_key(path: str) -> bool:
     ordered = (step for step in path_steps(path) if not isinstance(step, str))
     return isinstance(next(ordered, None), Key)
 
 
 def parent_path(path: str) -> str:
-    """The path of the message that contains the field, or the list; "" for the whole message."""
-    return _parse(path).parent
+    """The path of the message that contains the field, or the list; "" for the whole message. Of a
+    function that of its first field."""
+    return _parse(field_paths(path)[0]).parent
 
 
 def field_name(path: str) -> str:
-    """The last name in a path: that of the field, or of the list."""
-    return next(step for step in reversed(path_steps(path)) if isinstance(step, str))
+    """The last name in a path: that of the field, or of the list. Of a function its first field's."""
+    steps = path_steps(field_paths(path)[0])
+    return next(step for step in reversed(steps) if isinstance(step, str))

@@ -15,7 +15,7 @@ from app.interfaces.cdr.selection import Resolver
 from app.interfaces.definitions import Definitions, Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
 from app.interfaces.distributions import read_distribution
-from app.interfaces.field_path import PathStep
+from app.interfaces.field_path import PathStep, field_call
 from app.interfaces.mcap_schema import definition_text
 from app.interfaces.package_folders import (
     file_stamps,
@@ -130,7 +130,8 @@ class Interfaces:
         key = type_name, tuple(dict.fromkeys(paths))
         if key not in self._field_readers:
             wanted = self._resolver.select(*key)
-            self._field_readers[key] = self._codec.field_reader(type_name, wanted)
+            calls = {path: call for path in key[1] if (call := field_call(path)) is not None}
+            self._field_readers[key] = self._codec.field_reader(type_name, wanted, calls)
         return self._field_readers[key]
 
     def row_reader(

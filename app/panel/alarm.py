@@ -11,7 +11,6 @@ from app.i18n import PanelText
 from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
-    FieldPath,
     File,
     Id,
     Seconds,
@@ -21,6 +20,7 @@ from app.panel.base import (
     panel_text,
 )
 from app.panel.condition import Condition
+from app.panel.field_paths import FieldPath, MessageField
 from app.panel.widgets.displays import Factor, StateValue
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
@@ -91,10 +91,10 @@ class AlarmList(Description):
     fields of each entry. Without `active` each entry is active. The `catalogue` has texts by `code`."""
 
     field: ListPath
-    code: FieldPath
-    text: FieldPath | None = None
-    level: FieldPath | None = None
-    active: FieldPath | None = None
+    code: MessageField
+    text: MessageField | None = None
+    level: MessageField | None = None
+    active: MessageField | None = None
     priorities: Annotated[Mapping[str, Priority], AfterValidator(_check_levels)] = Field(
         default_factory=dict
     )

@@ -19,10 +19,8 @@ from pydantic import (
     WrapValidator,
 )
 
-from app.errors import InterfaceError
 from app.i18n import ENGLISH, PanelText, TextLike, render, say
 from app.icons import icons
-from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import ACTION_TYPE, GLOBAL, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import format_value
 from app.panel.faults.wording import closest_name
@@ -151,20 +149,6 @@ def is_inside(file: Path, *folders: Path) -> bool:
     return any(file.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
-def _check_field_path(path: str) -> str:
-    try:
-        path_steps(path)
-    except InterfaceError as error:
-        raise ValueError(str(error)) from None
-    return path
-
-
-def _check_written_field(path: str) -> str:
-    if any(isinstance(step, Key) for step in path_steps(_check_field_path(path))):
-        raise ValueError(f'"{path}" is filled in: an element is given by its number, as in data[2]')
-    return path
-
-
 def _parse_interlocks(value: Any) -> tuple[str, ...]:
     """The ids, from one id or a list of them."""
     named = [value] if isinstance(value, str) else value
@@ -241,8 +225,6 @@ TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_check_message_type)]
 ServiceType = Annotated[str, AfterValidator(_check_service_type)]
 ActionType = Annotated[str, AfterValidator(_check_action_type)]
-FieldPath = Annotated[str, AfterValidator(_check_field_path)]
-WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
 PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]

@@ -8,7 +8,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from app.i18n import PanelText, TextLike
 from app.interfaces.validation import format_value
-from app.panel.base import Description, FieldPath, Id, Label, Seconds, TopicName, TopicQos, Type
+from app.panel.base import Description, Id, Label, Seconds, TopicName, TopicQos, Type
+from app.panel.field_paths import FieldPath
 from app.panel.widgets.numbers import Unit
 
 VALUE: Final = "{value}"  # in `own_sentence`: the value that does not meet the condition

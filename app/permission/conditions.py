@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from app.i18n import PanelText, Text, TextLike, joined, number, render, say
 from app.i18n.values import after_space, each_language, filled_in, together, with_unit
-from app.interfaces import has_key
+from app.interfaces import Absence, has_key
 from app.panel.condition import VALUE, Condition
 from app.panel.number_range import decimal_text, shortest_float
 from app.panel.values import same_value
@@ -30,6 +30,13 @@ READING_LOCKS: Final[Mapping[str, str]] = {
     "cut": "interlock_connection_lost",
     "unreadable": "interlock_unreadable",
     "reading": "interlock_reading",
+}
+# Why a function of fields has no value.
+ABSENCES: Final[Mapping[Absence, Text]] = {
+    "empty": say("absence_empty"),
+    "no_rotation": say("absence_no_rotation"),
+    "no_time": say("absence_no_time"),
+    "other_clock": say("absence_other_clock"),
 }
 
 HOLDS: Final[Mapping[str, Callable[[Any, Any], bool]]] = {
@@ -85,6 +92,8 @@ def value_verdict(
         return Verdict(False, "interlock_new_publisher", joined([reason, which]))
     value = reading.value(condition.field)
     if not permits(condition, value):
+        if value is None and (absence := reading.absence(condition.field)) is not None:
+            return no_value(topic, condition.field, absence)
         return refusal(condition, value, is_ambiguous=reading.is_ambiguous(condition.field))
     if condition.max_age_s is None:
         return PERMITTED
@@ -99,6 +108,11 @@ def value_verdict(
 def unread(reading: Reading, topic: str, type_name: str) -> Verdict:
     """The lock for a topic of which no message can be used now."""
     return locked(READING_LOCKS[reading.status], topic=topic, wanted=type_name)
+
+
+def no_value(topic: str, field: str, absence: Absence) -> Verdict:
+    """The lock for a function of fields that has no value."""
+    return locked("interlock_field_no_value", field=field, topic=topic, reason=ABSENCES[absence])
 
 
 def refusal(condition: Condition, value: Any, *, is_ambiguous: bool = False) -> Verdict:

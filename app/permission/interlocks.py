@@ -27,6 +27,7 @@ from app.panel.widgets.switch import Switch
 from app.permission.conditions import (
     ConditionState,
     condition_state,
+    no_value,
     not_finite,
     stale,
     unread,
@@ -53,6 +54,7 @@ BY_VALUE: Final = frozenset(
         "interlock_condition_unmet",
         "interlock_field_missing",
         "interlock_field_ambiguous",
+        "interlock_field_no_value",
     }
 )
 
@@ -178,6 +180,8 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
     if reading.status != "message":
         return None, unread(reading, source.topic, source.type)
     value = reading.value(source.field)
+    if value is None and (absence := reading.absence(source.field)) is not None:
+        return None, no_value(source.topic, source.field, absence)
     if value is None:
         return None, locked("interlock_field_missing", field=source.field, topic=source.topic)
     if not math.isfinite(value):

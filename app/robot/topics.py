@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
-from app.interfaces import FieldReader, Fields, Walk
+from app.interfaces import Absence, FieldReader, Fields, Walk
 from app.robot.keyed_values import NO_VALUES, KeyedValues, updated, without_source
 from app.robot.sample import Sample
 from app.robot.slices import SMALL_BYTES, Slices
@@ -56,6 +56,10 @@ class Reading:
         if (known := self.keyed.get(path)) is not None:
             return known.value
         return None if self.fields is None else self.fields.get(path)
+
+    def absence(self, path: str) -> Absence | None:
+        """Why a function of fields has no value, if one has none."""
+        return None if self.fields is None else self.fields.absence(path)
 
     def is_ambiguous(self, path: str) -> bool:
         """Whether the value is unknown because several elements have the path's key."""
@@ -177,7 +181,7 @@ class Topic:
         if len(newest.payload) > SMALL_BYTES:
             return
         try:
-            fields = self._reader.read(bytes(newest.payload))
+            fields = self._reader.read(bytes(newest.payload), newest.wall)
         except DecodeError:
             return
         if all(fields.get(path) is not None for path in self._keyed):
@@ -189,7 +193,7 @@ class Topic:
         if self._walk is None and self._unread:
             sample = self._unread.take()
             data = bytes(sample.payload)
-            self._walk = _PendingRead(sample, self._reader.walk(data), len(data))
+            self._walk = _PendingRead(sample, self._reader.walk(data, sample.wall), len(data))
         return self._walk
 
     def _read_one(self, walked: "_PendingRead", read: Callable[[], Fields | None]) -> Reading | None:

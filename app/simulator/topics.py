@@ -5,14 +5,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from app.interfaces import Interfaces
-from app.interfaces.field_path import Key, path_steps
+from app.interfaces.field_path import Key, field_call, field_paths, path_steps
 from app.panel.demo import NO_ENTRY
 from app.panel.model import Panel
 from app.simulator.kinds import Shown
 from app.simulator.values.fields import FieldSignal, PanelFields
+from app.simulator.values.functions import put_result
 from app.simulator.values.known_types import Moment
 from app.simulator.values.messages import Message, plausible
-from app.simulator.values.paths import merged, put
+from app.simulator.values.paths import Fields, merged, put
 
 MOVING_HZ: Final = 5.0  # of numbers
 OTHERS_HZ: Final = 1.0
@@ -77,14 +78,20 @@ class SimulatedTopic:
 
     def _encoded(self, moment: Moment) -> bytes:
         fields = self._message(moment)
-        structures = self._interfaces.structures
         for field in self._fields:
-            put(fields, self.type, field.path, self._value(field, moment), structures)
+            self._put(fields, field.path, self._value(field, moment), moment)
         own = {field.path for field in self._fields}
         for path, (value, _) in self._effects.items():
             if path not in own:
-                put(fields, self.type, path, value, structures)
+                self._put(fields, path, value, moment)
         return self._interfaces.encode(self.type, fields)
+
+    def _put(self, fields: Fields, path: str, value: Any, moment: Moment) -> None:
+        structures, call = self._interfaces.structures, field_call(path)
+        if call is None:
+            put(fields, self.type, path, value, structures)
+        else:
+            put_result(fields, self.type, call, value, structures, moment)
 
 
 def simulated_topics(
@@ -117,7 +124,8 @@ def _topic(fields: PanelFields, topic: str, type_name: str, shown: Sequence[Show
 
 def _message(fields: PanelFields, topic: str, type_name: str) -> Message:
     """Messages with the names that the panel looks for, and what `[demo]` fixes."""
-    keys = [step for path in fields.paths.get(topic, ()) for step in path_steps(path)]
+    paths = [path for named in fields.paths.get(topic, ()) for path in field_paths(named)]
+    keys = [step for path in paths for step in path_steps(path)]
     wanted = [str(step.value) for step in keys if isinstance(step, Key) and step.path == "name"]
     base = plausible(type_name, fields.interfaces, dict.fromkeys(wanted))
     over = fields.entry(topic).message

@@ -31,6 +31,7 @@ class Pending(NamedTuple):
 
     key: str
     at: float
+    wall: float
     data: bytes
     whole: bool
 
@@ -71,7 +72,7 @@ class TrendRecorder:
             current = [(o, n) for o, n in self._origins.items() if o[0] != key or n == cuts]
             self._origins = dict(current)
             self._origins[key, sample.source] = cuts
-        pending = Pending(key, sample.at, bytes(sample.payload), whole)
+        pending = Pending(key, sample.at, sample.wall, bytes(sample.payload), whole)
         for lost in self._pending.add(pending, len(pending.data)):
             self._interrupt(lost.key)
         if self._timer is None:
@@ -114,7 +115,7 @@ class TrendRecorder:
         if not pending.whole:
             self._interrupt(pending.key)
         try:
-            values = self._readers[pending.key].read(pending.data)
+            values = self._readers[pending.key].read(pending.data, pending.wall)
         except DecodeError:  # the topic's state counts and logs it
             self._interrupt(pending.key)
             return

@@ -13,6 +13,7 @@ from app.panel.base import HasTopic, TopicQos
 from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, LampState, Readout, WrittenNumber
 from app.panel.widgets.families import Display
+from app.permission.conditions import ABSENCES
 from app.permission.mismatches import topic_mismatch
 from app.printable import readable
 from app.robot.keyed_values import kept_s
@@ -79,13 +80,20 @@ def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState
     reading = reading.of_field(widget.field, kept_s(widget.max_age_s))
     value = reading.value(widget.field)
     if value is None:
-        code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
-        time = format_time(reading.wall)
-        return FieldState("missing", say(code, field=widget.field, time=time))
+        return FieldState("missing", _missing(reading, widget.field))
     dated = _dated(reading, value, widget.max_age_s, now)
     if is_nan(value) and dated.state == "live":
         return replace(dated, note=say("gauge_no_number"))
     return dated
+
+
+def _missing(reading: Reading, field: str) -> Text:
+    """Why a message has no value of a field."""
+    time = format_time(reading.wall)
+    if (absence := reading.absence(field)) is not None:
+        return say("readout_no_value", field=field, time=time, reason=ABSENCES[absence])
+    code = "readout_several" if reading.is_ambiguous(field) else "readout_missing"
+    return say(code, field=field, time=time)
 
 
 def _reading(widget: ShownTopic, robot: RobotState) -> Reading | FieldState:

@@ -38,6 +38,7 @@ NODE: Final = GONE.union(sentences.uncallable for sentences in EVERY_SENTENCES) 
     "interlock_field_missing",
     "interlock_not_a_number",
     "interlock_field_ambiguous",
+    "interlock_field_no_value",
     "topic_wrong_type",
     "topic_definition_differs",
     "qos_robot_best_effort",

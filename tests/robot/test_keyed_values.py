@@ -166,9 +166,9 @@ def test_where_the_newest_message_has_all_the_others_are_not_decoded(
     decoded: list[int] = []
     walk = FieldReader.walk
 
-    def counted(reader: FieldReader, data: bytes) -> Walk[Fields]:
+    def counted(reader: FieldReader, data: bytes, received: float) -> Walk[Fields]:
         decoded.append(len(data))
-        return walk(reader, data)
+        return walk(reader, data, received)
 
     monkeypatch.setattr(FieldReader, "walk", counted)
 

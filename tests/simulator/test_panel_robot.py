@@ -86,6 +86,27 @@ def test_every_field_that_a_panel_shows_has_a_value(loaded: Loaded, type_name: s
     assert robot.values("/x", field)[0] is not None
 
 
+@pytest.mark.parametrize(
+    ("type_name", "field", "least", "most"),
+    [
+        ("sensor_msgs/msg/LaserScan", "min(ranges)", 0.5, 0.9),
+        ("sensor_msgs/msg/LaserScan", "max(ranges)", 5.0, 6.0),
+        ("nav_msgs/msg/Odometry", "yaw(pose.pose.orientation)", -1.0, 1.0),
+        ("nav_msgs/msg/Odometry", "norm(twist.twist.linear)", 0.5, 2.0),
+        ("geometry_msgs/msg/PoseArray", "length(poses)", 2, 9),
+        ("std_msgs/msg/Float64MultiArray", "diff(data[0], data[3])", 0.0, 0.5),
+    ],
+)
+def test_functions_of_interlocks_permit_and_forbid(
+    loaded: Loaded, type_name: str, field: str, least: float, most: float
+) -> None:
+    table = f'topic = "/x"\ntype = "{type_name}"\nfield = "{field}"\nmin = {least}\nmax = {most}\n'
+    panel = loaded(f'[[interlock]]\nid = "near"\n{table}')
+    robot = Stepped(panel).run(ROUND_S)
+    met = {permits(panel.interlocks[0], value) for value in robot.values("/x", field)}
+    assert met == {True, False}
+
+
 def test_constants_and_lamps_show_all_their_values(loaded: Loaded) -> None:
     lamp = (
         '[[page.widget]]\nid = "lamp"\nkind = "indicator"\nlabel = "Lamp"\ntopic = "/lamp"\n'

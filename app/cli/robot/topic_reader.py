@@ -1,6 +1,7 @@
 """One topic of a robot, found by its name: its type, how to decode it, its messages as they arrive."""
 
 import sys
+import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any, Final
@@ -11,7 +12,7 @@ from app.dialect.endpoint import OwnEndpoint
 from app.errors import InterfaceError, LinkError
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import attribute_name
-from app.interfaces.field_path import Key, path_steps
+from app.interfaces.field_path import Key, field_call, path_steps
 from app.interfaces.names import Qos
 from app.robot.sample import Sample
 from app.survey.forwarding import topic_forwarding
@@ -109,6 +110,8 @@ class TopicReader:
 def value_in(data: bytes, interfaces: Interfaces, type_name: str, path: str) -> Any:
     """The value at a path in a message, from its bytes; the whole message for "". None where a list has
     no such element. DecodeError if the bytes are no such message."""
+    if path and field_call(path) is not None:
+        return interfaces.field_reader(type_name, [path]).read(data, time.time()).get(path)
     steps = path_steps(path) if path else ()
     if any(isinstance(step, Key) for step in steps):
         return interfaces.field_reader(type_name, [path]).read(data).get(path)

@@ -12,6 +12,7 @@ from app.interfaces.cdr.selection import Selection
 from app.interfaces.cdr.steps import ReadPlans
 from app.interfaces.cdr.writer import Write, message_writer
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
+from app.interfaces.field_path import FieldCall
 
 SMALL_MESSAGE_BYTES: Final = 20_000  # has few elements
 MAX_ELEMENTS: Final = 2_000  # of a message that is decoded at once
@@ -55,10 +56,12 @@ class Codec:
                 return
         raise ValueError(f"it has more than {MAX_ELEMENTS} elements, which are not read at once")
 
-    def field_reader(self, name: str, wanted: Selection) -> FieldReader:
-        """A reader of the selected fields of a type."""
+    def field_reader(
+        self, name: str, wanted: Selection, calls: Mapping[str, FieldCall] | None = None
+    ) -> FieldReader:
+        """A reader of the selected fields of a type, and of functions of them."""
         ops = self._plans.make_program(name, wanted)
-        return FieldReader(name, ops, self._fields_and_class)
+        return FieldReader(name, ops, self._fields_and_class, calls)
 
     def row_reader(
         self, name: str, wanted: Selection, fields: Sequence[str | None], most: int

@@ -1,6 +1,7 @@
 """Reads fields of a message by their paths, without decoding the rest."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from app.errors import DecodeError
@@ -11,6 +12,8 @@ from app.interfaces.cdr.scanner import Scan
 from app.interfaces.cdr.steps import Mark, Op
 from app.interfaces.cdr.truncated_reader import StructureFactory, TruncatedReader
 from app.interfaces.definitions import Type
+from app.interfaces.field_functions import Absence, NoValue, computed
+from app.interfaces.field_path import FieldCall
 
 
 class Fields:
@@ -24,8 +27,15 @@ class Fields:
         self._ambiguous = several
 
     def get(self, path: str) -> Any:
-        """The value; None if no element matches the path, or several have its key."""
-        return self._values.get(path)
+        """The value; None if no element matches the path, several have its key, or a function has
+        none."""
+        value = self._values.get(path)
+        return None if isinstance(value, NoValue) else value
+
+    def absence(self, path: str) -> Absence | None:
+        """Why a function has no value; None if it has one, or a field of it is missing."""
+        value = self._values.get(path)
+        return value.absence if isinstance(value, NoValue) else None
 
     def is_ambiguous(self, path: str) -> bool:
         """Whether several elements have the path's key."""
@@ -72,29 +82,67 @@ class _MessageWalk:
             return reader(mark.type)(self._body, at)[0]
         return TruncatedReader(reader, self._reader.make, self._body).read(mark.type, at)
 
+    def count_at(self, mark: Mark, at: int) -> int:
+        """How many elements the list has that begins at an offset."""
+        if mark.type.container == "array":
+            return mark.type.size
+        count: int = self._reader.readers[self._order](Type("uint32"))(self._body, at)[0]
+        return count
+
     def failed(self, error: Exception) -> DecodeError:
         size = len(self._data)
         return DecodeError(f"{size} bytes are not a {self._reader.type_name}: {error}")
 
 
 class _FieldWalk(_MessageWalk):
-    __slots__ = ()
+    __slots__ = ("_calls", "_fields", "_received", "_values")
+
+    def __init__(self, reader: "FieldReader", data: bytes, received: float) -> None:
+        super().__init__(reader, data)
+        self._calls = reader.calls
+        self._received = received
+        self._values: dict[str, Any] = {}
+        self._fields: Iterator[Fields | None] | None = None
 
     def advance(self) -> Fields | None:
         try:
-            scan = self.scanned()
-            return None if scan is None else self._fields(scan)
+            if self._fields is None:
+                scan = self.scanned()
+                if scan is None:
+                    return None
+                self._read(scan)
+                if not self._calls:
+                    return Fields(self._values, scan.ambiguous)
+                self._fields = self._compute(scan.ambiguous)
+            return next(self._fields)
         except Exception as error:  # no received bytes may stop the panel
             raise self.failed(error) from error
 
-    def _fields(self, scan: Scan) -> Fields:
-        values = {}
+    def _read(self, scan: Scan) -> None:
+        """The value at each mark; of a list whose length is wanted, its length."""
         for mark, at in scan.marks.items():
-            if mark.paths:
+            counted = [path for path in mark.paths if path in self._calls]
+            if counted:
+                self._values |= dict.fromkeys(counted, self.count_at(mark, at))
+            if len(counted) < len(mark.paths):
                 value = self.value_at(mark, at)
                 for path in mark.paths:
-                    values[path] = value
-        return Fields(values, scan.ambiguous)
+                    self._values.setdefault(path, value)
+
+    def _compute(self, ambiguous: Collection[str]) -> Iterator[Fields | None]:
+        """The fields with what the functions are, after as many slices as they need."""
+        several = {*ambiguous}
+        for call in self._calls.values():
+            if not several.isdisjoint(call.paths):
+                several.add(call.text)
+            names = [call.text] if call.text in self._values else call.paths
+            arguments = [self._values.get(name) for name in names]
+            result: Any = None
+            for result in computed(call.name, arguments, self._received):
+                if result is None:
+                    yield None
+            self._values[call.text] = result
+        yield Fields(self._values, several)
 
 
 class _Program:
@@ -111,15 +159,26 @@ class _Program:
 
 
 class FieldReader(_Program):
-    """Reads the same paths of each message of a type."""
+    """Reads the same paths of each message of a type. `calls` are the functions among them, by their
+    text."""
 
-    def walk(self, data: bytes) -> Walk[Fields]:
-        """Starts to decode a message."""
-        return _FieldWalk(self, data)
+    def __init__(
+        self,
+        type_name: str,
+        ops: Sequence[Op],
+        make: StructureFactory,
+        calls: Mapping[str, FieldCall] | None = None,
+    ) -> None:
+        super().__init__(type_name, ops, make)
+        self.calls = calls or {}
 
-    def read(self, data: bytes) -> Fields:
+    def walk(self, data: bytes, received: float = math.nan) -> Walk[Fields]:
+        """Starts to decode a message that the server received at a time, in seconds since the epoch."""
+        return _FieldWalk(self, data, received)
+
+    def read(self, data: bytes, received: float = math.nan) -> Fields:
         """Decodes a whole message; DecodeError if the bytes are no such message."""
-        walk = self.walk(data)
+        walk = self.walk(data, received)
         while (fields := walk.advance()) is None:
             pass
         return fields

@@ -8,7 +8,8 @@ from typing import Any
 from app.errors import FieldError, InterfaceError
 from app.interfaces.cdr.formats import LENGTH_BYTES
 from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Structure, Type
-from app.interfaces.field_path import Key, PathStep, path_steps
+from app.interfaces.field_functions import function, result_type
+from app.interfaces.field_path import FieldCall, Key, PathStep, field_call, path_steps
 from app.interfaces.parsing import BOOLS
 from app.interfaces.validation import scalar_check
 
@@ -68,7 +69,11 @@ class Resolver:
         """The tree of these paths; InterfaceError if the type has no such field."""
         root = Selection()
         for path in paths:
-            self._add_path(root, Type(type_name), path)
+            call = field_call(path)
+            if call is None:
+                self._add_path(root, Type(type_name), path)
+            else:
+                self._add_call(root, Type(type_name), call)
         return root
 
     def select_rows(self, type_name: str, path: str, fields: Iterable[str | None]) -> Selection:
@@ -86,14 +91,25 @@ class Resolver:
         return root
 
     def type_at(self, type_name: str, path: str) -> Type:
-        """The type of the field at a path."""
+        """The type of the field at a path, or of the result of a function of fields."""
+        call = field_call(path)
+        if call is not None:
+            return self._add_call(Selection(), Type(type_name), call)
         return self._add_path(Selection(), Type(type_name), path)
 
     def typed_steps(self, type_name: str, path: str) -> tuple[PathStep, ...]:
         """The steps of a path, whose keys have the values that a message has: 5, not "5"."""
         return tuple(step for step, _, _ in self._steps(Type(type_name), path))
 
-    def _add_path(self, root: Selection, whole: Type, path: str) -> Type:
+    def _add_call(self, root: Selection, whole: Type, call: FieldCall) -> Type:
+        """Adds the fields of a function; of a list whose length is wanted, the list by the function."""
+        function(call)
+        counted = call.text if call.name == "length" else None
+        kinds = [self._add_path(root, whole, path, counted) for path in call.paths]
+        return result_type(call, kinds, whole, self._structures)
+
+    def _add_path(self, root: Selection, whole: Type, path: str, name: str | None = None) -> Type:
+        """`name` is what the value is known by, if not by its path."""
         node, at = root, whole
         for step, beside, after in self._steps(whole, path):
             match step:
@@ -105,7 +121,7 @@ class Resolver:
                 case _:
                     node = node.by_index.setdefault(step, Selection())
             at = after
-        node.paths.append(path)
+        node.paths.append(name or path)
         return at
 
     def _steps(self, whole: Type, path: str) -> Iterator[tuple[PathStep, bool, Type]]:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError
 from app.i18n.values import each_language
-from app.interfaces import INTEGER_RANGES, Interfaces, Type
+from app.interfaces import INTEGER_RANGES, Interfaces, Type, field_call
 from app.interfaces.validation import format_value, scalar_check, unknown_constant
 from app.panel.checks.types import field_faults
 from app.panel.condition import VALUE, Condition
@@ -23,6 +23,10 @@ from app.panel.values import same_value
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
     "give the age in seconds after which it locks"
+)
+AGE_STANDS: Final = (
+    "is missing: age() is how old the time was when its message arrived, and stays while no other "
+    "arrives; give the age in seconds after which it locks"
 )
 EXCLUSIVE: Final = ("equals", "one_of")  # exclude all other comparisons
 NEEDS: Final = "needs a bool, or conditions: equals, not_equals, min and max, or one_of"
@@ -54,6 +58,9 @@ def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -
     yield from faults
     if faults:
         return
+    call = field_call(condition.field)
+    if call is not None and call.name == "age" and condition.max_age_s is None:
+        yield Fault(f"{place}.max_age_s", AGE_STANDS)
     kind = interfaces.type_at(condition.type, condition.field)
     if re.search(r"[/\]]", str(kind)):
         reason = f'"{condition.field}" is {kind}: {condition.noun} judges one value of it'

@@ -18,7 +18,6 @@ from app.interfaces.names import ROSOUT_TOPIC
 from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
-    FieldPath,
     Icon,
     Id,
     Interlocks,
@@ -32,6 +31,7 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults
 from app.panel.faults.wording import list_names
+from app.panel.field_paths import FieldPath
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
 from app.panel.widgets.sent_message import SentMessage
 

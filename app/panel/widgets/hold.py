@@ -9,9 +9,10 @@ from pydantic import Field
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
-from app.panel.base import Interlocks, Span, WrittenField
+from app.panel.base import Interlocks, Span
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
+from app.panel.field_paths import WrittenField
 from app.panel.template import set_field
 from app.panel.values import number_text
 from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand

@@ -10,9 +10,10 @@ from pydantic import AfterValidator, Field
 from app.errors import Fault
 from app.i18n import TextLike, number
 from app.interfaces import STRING_TYPES, Interfaces
-from app.panel.base import Description, FieldPath, Label, Seconds, Span, TopicName, Type, non_empty
+from app.panel.base import Description, Label, Seconds, Span, TopicName, Type, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
+from app.panel.field_paths import MessageField
 from app.panel.values import number_text
 from app.panel.widgets.displays import FORMAT
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
@@ -100,7 +101,7 @@ class Joints(TopicWidget, DisplayWidget):
     kind: Literal["joints"]
     topic: TopicName = "/joint_states"
     type: Type = "sensor_msgs/msg/JointState"
-    field: FieldPath = "position"
+    field: MessageField = "position"
     names: ListName = "name"
     joints: Annotated[
         tuple[Joint, ...],

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
-from app.panel.base import Description, FieldPath, Seconds, Span, TopicName, Type
+from app.panel.base import Description, Seconds, Span, TopicName, Type
 from app.panel.checks.templates import NOW_RULE, example_values, unknown_input_faults
 from app.panel.checks.types import field_faults
 from app.panel.constants import mismatch_at
+from app.panel.field_paths import FieldPath
 from app.panel.template import NOW, fill, placeholders
 from app.panel.widgets.families import CheckContext, PublishCommand
 from app.panel.widgets.templated import TemplateCommand

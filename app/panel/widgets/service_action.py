@@ -11,7 +11,8 @@ from app.dialect.endpoint import Role, ServerRole
 from app.errors import Fault, FieldError, InterfaceError
 from app.i18n import TextLike
 from app.interfaces import Interfaces
-from app.panel.base import ActionType, AnyText, FieldPath, Seconds, ServiceType, Span, TopicName
+from app.panel.base import ActionType, AnyText, Seconds, ServiceType, Span, TopicName
+from app.panel.field_paths import MessageField
 from app.panel.response_text import response_fields
 from app.panel.widgets.families import CheckContext
 from app.panel.widgets.templated import TemplateCommand
@@ -46,8 +47,8 @@ class Call(ServerCommand):
     service: TopicName
     type: ServiceType
     request: dict[str, Any] = Field(default_factory=dict)
-    success: FieldPath | None = None
-    message: FieldPath | None = None
+    success: MessageField | None = None
+    message: MessageField | None = None
     answer: AnyText = ""
     span: Span = 4
 
@@ -85,7 +86,7 @@ class Action(ServerCommand):
     action: TopicName
     type: ActionType
     goal: dict[str, Any] = Field(default_factory=dict)
-    progress: FieldPath | None = None
+    progress: MessageField | None = None
     progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
     feedback: AnyText = ""
     result: AnyText = ""

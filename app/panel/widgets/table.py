@@ -8,9 +8,10 @@ from pydantic import AfterValidator, Field
 from app.errors import Fault
 from app.i18n import PanelText
 from app.interfaces import Interfaces
-from app.panel.base import Description, FieldPath, Label, Seconds, Span, non_empty
+from app.panel.base import Description, Label, Seconds, Span, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS, parent_type
+from app.panel.field_paths import MessageField
 from app.panel.times import DEFAULT_FORMATS, time_faults
 from app.panel.widgets.displays import (
     CONSTANTS,
@@ -36,7 +37,7 @@ class Column(Description):
     """One column: a field of each entry, or the entry itself where that is a single value."""
 
     label: Label
-    field: FieldPath | None = None
+    field: MessageField | None = None
     format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
     unit: Unit = ""
     constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
@@ -48,7 +49,7 @@ class Sort(Description):
     """Which entries come first: by a field of theirs, or those that were received last."""
 
     first: Literal["largest", "smallest", "newest"]
-    by: FieldPath | None = None
+    by: MessageField | None = None
 
 
 class ColumnField(NamedTuple):
@@ -78,7 +79,7 @@ class Table(TopicWidget, DisplayWidget):
     rows_shown: Annotated[int, Field(ge=1, le=MAX_ROWS)] = 5
     entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = READ_BY_DEFAULT
     sort: Sort | None = None
-    key: FieldPath | None = None
+    key: MessageField | None = None
     max_age_s: Seconds | None = None
     span: Span = 12
 

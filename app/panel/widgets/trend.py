@@ -12,7 +12,6 @@ from app.errors import Fault
 from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
-    FieldPath,
     Label,
     Seconds,
     Span,
@@ -23,6 +22,7 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
+from app.panel.field_paths import FieldPath
 from app.panel.widgets.displays import FORMAT, Factor, Readout
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
 from app.panel.widgets.numbers import Unit

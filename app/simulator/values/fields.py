@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from app.interfaces import INTEGER_RANGES, Interfaces, parent_path
 from app.interfaces.definitions import FLOAT_TYPES
-from app.interfaces.field_path import field_name
+from app.interfaces.field_path import field_call, field_name, field_paths
 from app.panel.condition import Condition
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.model import Panel
@@ -63,7 +63,10 @@ class PanelFields:
         paths = (
             path
             for path in self.paths.get(topic, ())
-            if get(fixed_by_table, self.interfaces.typed_steps(type_name, path)) is None
+            if all(
+                get(fixed_by_table, self.interfaces.typed_steps(type_name, inner)) is None
+                for inner in field_paths(path)
+            )
         )
         made = (_Field(self, topic, type_name, path, shown, message).made() for path in paths)
         return [signal for signal in made if signal is not None]
@@ -105,6 +108,8 @@ class _Field:
             return FieldSignal(self._path, self._permitting(interlocks), prompt=True)
         if self._entry.values:
             return self._with(cycle(self._entry.values, self._round_s))
+        if not self._limits and field_call(self._path) is not None:
+            return None  # of what the message has
         fields = self._by_values() if self._values and not self._limits else self._by_type()
         return fields if fields is None or self._limits else self._still(fields)
 
@@ -201,7 +206,8 @@ class _Field:
     @cached_property
     def _own(self) -> list[Any]:
         """The values that it has as a field of a type whose fields belong together; none elsewhere."""
-        if self._parent not in KNOWN and self._type not in KNOWN:
+        is_call = field_call(self._path) is not None
+        if is_call or (self._parent not in KNOWN and self._type not in KNOWN):
             return []
         steps = self._panel_fields.interfaces.typed_steps(self._type, self._path)
         values = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
