@@ -11,8 +11,8 @@ from app.alarms.figures import Figures, read_figures
 from app.alarms.history import read_page
 from app.i18n import localized
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import set_client_cookie
 from app.web.exported import Exported
+from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
 from app.web.rendering.alarm_figures import FiguresAnswer, figures_json
@@ -25,7 +25,6 @@ from app.web.rendering.alarm_history_page import (
 )
 from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import word as log_word
-from app.web.routes.audit_log import page_frame
 
 router = APIRouter()
 
@@ -44,12 +43,8 @@ async def page(
     figures = await read_figures_of(state, *wanted.times(now()))
     context = history_context(state.fleet.panel, wanted, shown, figures)
     path = f"alarms/history?{wanted.address()}"
-    frame, token = page_frame(request, state, word("history_title"), alarms_page=path)
-    html = state.templates.render(
-        "alarm-history.html", language_of(request), **frame, **context, word=word, log_word=log_word
-    )
-    headers = {"cache-control": "no-store"}
-    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+    framed = FramedPage("alarm-history.html", word("history_title"), alarms_page=path)
+    return framed_page(request, state, framed, {**context, "word": word, "log_word": log_word})
 
 
 async def read_figures_of(state: AppState, since: float, until: float) -> Figures:

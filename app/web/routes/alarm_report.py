@@ -13,14 +13,12 @@ from app.alarms.shifts import Shift
 from app.alarms.state_times import StatePeriod, read_states
 from app.audit import Filter, OperatorLog, Row
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import set_client_cookie
-from app.web.language import language_of
+from app.web.framed_page import FramedPage, framed_page
 from app.web.openapi_parts import errors
 from app.web.rendering.alarm_report_page import COUNTED, ReportParts, ReportQuery, now, report_context
 from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import word as log_word
 from app.web.routes.alarm_history import read_figures_of
-from app.web.routes.audit_log import page_frame
 
 router = APIRouter()
 
@@ -47,12 +45,8 @@ async def report(
     context = report_context(panel, wanted, shift, parts, at)
     query = urlencode(wanted.model_dump(exclude={"act"}, exclude_defaults=True))
     path = f"alarms/report?{query}"
-    frame, token = page_frame(request, state, word("report_title"), alarms_page=path)
-    html = state.templates.render(
-        "alarm-report.html", language_of(request), **frame, **context, word=word, log_word=log_word
-    )
-    headers = {"cache-control": "no-store"}
-    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+    page = FramedPage("alarm-report.html", word("report_title"), alarms_page=path)
+    return framed_page(request, state, page, {**context, "word": word, "log_word": log_word})
 
 
 async def _states(state: AppState, robot: str, since: float, until: float) -> list[StatePeriod]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 from urllib.parse import quote, urlencode, urlsplit
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
 from app import clock
@@ -35,11 +35,11 @@ from app.web.alarm_answers import (
 from app.web.alarm_runs import AlarmRun, AlarmRuns
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import FORM, JSON, PAGE, Described, described_body, errors, fields
 from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.audit_log import page_frame
 from app.web.routes.press_forms import TAP_AGAIN_S
 from app.web.routes.presses import STATUS
 
@@ -112,14 +112,11 @@ async def alarms(
 
 def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     """The page of alarms, for a browser."""
-    language = language_of(request)
     shown = {"show": query.show, "alarm": query.alarm}
     again = urlencode({name: value for name, value in shown.items() if value})
-    frame, token = page_frame(request, state, word("title"), alarms_page=f"alarms?{again}")
-    context = alarms_context(state, query.show, query.alarm, language)
-    html = state.templates.render("alarms.html", language, **frame, **context, word=word)
-    headers = {"cache-control": "no-store", "vary": "accept"}
-    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+    page = FramedPage("alarms.html", word("title"), alarms_page=f"alarms?{again}", vary="accept")
+    context = alarms_context(state, query.show, query.alarm, language_of(request))
+    return framed_page(request, state, page, {**context, "word": word})
 
 
 @router.post(

@@ -16,13 +16,12 @@ from app.commands.control_acts import CONTROL_ACTS
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.errors import NotFound
 from app.i18n import Text, TextLike, number, say
-from app.panel.layout import FRAME_ONLY, Page
 from app.panel.widgets.families import Command, EntryWidget
 from app.permission.verdict import WITHOUT_CONTROL
 from app.printable import printable, printable_texts
-from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
+from app.web.app_state import CurrentState
 from app.web.exported import Exported
+from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import TEXT, errors
 from app.web.rendering.log_words import (
@@ -35,13 +34,11 @@ from app.web.rendering.log_words import (
     who_of,
     word,
 )
-from app.web.rendering.page_context import PageContext, page_context
 from app.web.typed_times import TypedTime, typed_ms
 
 router = APIRouter()
 
 ROWS_ON_PAGE: Final = 50
-REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not been loaded for so long
 # Entries of the kind "control": acts, and changes that no act made.
 CONTROL_ACTIONS: Final = (
     *(f"control_{act}" for act in CONTROL_ACTS),
@@ -137,51 +134,17 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
-    frame, token = page_frame(request, state, say("log_page_title"), wanted.robot)
-    html = state.templates.render(
-        "log.html",
-        language,
-        **frame,
-        **context,
-        time_of=partial(time_of, language=language),
-        iso_of=iso_of,
-        values_of=partial(values_of, language=language),
-        outcome_of=outcome_of,
-        who_of=who_of,
-        word=word,
-        without_control=WITHOUT_CONTROL.code,
-    )
-    headers = {"cache-control": "no-store"}
-    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
-
-
-def page_frame(
-    request: Request,
-    state: AppState,
-    title: Text,
-    robot: str = "",
-    alarms_page: str | None = None,
-    diagnostics_query: str | None = None,
-) -> tuple[PageContext, str]:
-    """The frame around the log, or a page of the alarms with this path and query, or the diagnostics
-    with this query, of a robot or else the first; and the token of a new client."""
-    session = state.fleet.of_robot(robot)
-    who, token = principal_with_new_token(request, state, embedded=False)
-    if session.control.rules.required:
-        session.control.loaded(who, REFRESH_S, opened_by_person(request))
-        session.show()
-    shown = Page.model_construct(None, id=FRAME_ONLY, title=title, own=(), groups=())
-    context = page_context(
-        request,
-        state,
-        session,
-        shown,
-        who,
-        REFRESH_S,
-        alarms_page=alarms_page,
-        diagnostics_query=diagnostics_query,
-    )
-    return context, token
+    functions = {
+        "time_of": partial(time_of, language=language),
+        "iso_of": iso_of,
+        "values_of": partial(values_of, language=language),
+        "outcome_of": outcome_of,
+        "who_of": who_of,
+        "word": word,
+        "without_control": WITHOUT_CONTROL.code,
+    }
+    framed = FramedPage("log.html", say("log_page_title"), wanted.robot)
+    return framed_page(request, state, framed, {**context, **functions})
 
 
 @router.get(

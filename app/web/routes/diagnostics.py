@@ -33,13 +33,13 @@ from app.web.diagnostics_answer import (
     LookAnswer,
     LookQuery,
 )
+from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import FORM, JSON, PAGE, described_body, errors, fields
 from app.web.rendering.diagnostics_json import diagnostics_json, look_json
 from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.audit_log import page_frame
 from app.web.routes.presses import STATUS
 
 router = APIRouter()
@@ -151,11 +151,10 @@ async def _page(
     survey = await session.survey.read()
     context = diagnostics_context(session, survey, state.doctor, query, looked, refused, language)
     again = urlencode({"robot": query.robot}) if query.robot else ""
-    frame, token = page_frame(request, state, word("title"), query.robot, diagnostics_query=again)
     name = "_diagnostics.html" if query.part else "diagnostics.html"
+    page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
     refusal = _refusal(session, query.act)
-    html = state.templates.render(name, language, **frame, **context, **TEXTS, act_refused=refusal)
-    return set_client_cookie(HTMLResponse(html, headers=HEADERS), request, token)
+    return framed_page(request, state, page, {**context, **TEXTS, "act_refused": refusal})
 
 
 async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
