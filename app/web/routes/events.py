@@ -10,6 +10,7 @@ from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.panel.rules import ControlRules
+from app.permission.control_authority_view import Role
 from app.permission.principal import Principal
 from app.view.audience import EVERYONE, Audience, audience, audience_of
 from app.view.heartbeat import beat
@@ -49,9 +50,9 @@ async def events(
     frame."""
     publisher, rules = session.publisher, session.control.rules
     embedded, language = embed or from_frame(request.scope), language_of(request)
-    first, token, current = b"", "", partial(audience, "", language)
+    first, token, current = b"", "", _always("", language)
     if only_shows(state.fleet.panel.embed, embedded):
-        current = partial(audience, "embedded", language)
+        current = _always("embedded", language)
     elif rules.required:
         who, token = principal_with_new_token(request, state, embedded)
         first = client_id_event(who.client.id)
@@ -74,6 +75,12 @@ def _audience_now(
 
 def _everyone() -> Audience:
     return EVERYONE
+
+
+def _always(role: Role, language: str) -> Callable[[], Audience]:
+    """The audience of a client whose role never changes."""
+    of_client = audience(role, language)
+    return lambda: of_client
 
 
 class EventStream(Response):
