@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.errors import Fault, PanelError
+from app.panel.faults.toml_hints import hint
 
 AT_LINE: Final = re.compile(r"(.*) \(at (?:line ([0-9]+), column [0-9]+|end of document)\)", re.DOTALL)
 NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
@@ -56,7 +57,7 @@ def parse_toml(path: Path, data: bytes) -> TomlFile:
     except (ValueError, RecursionError) as error:
         fault = _read_fault(error)
         if isinstance(error, tomllib.TOMLDecodeError):
-            fault = _misspelt_header(text) or fault
+            fault = _misspelt_header(text) or _hint(text, error) or fault
         raise PanelError(str(path), (fault,), unreadable=True) from error
     return TomlFile(path, text, tables, hashlib.sha256(data).hexdigest()[:12])
 
@@ -74,6 +75,15 @@ def _misspelt_header(text: str) -> Fault | None:
                 message = f'there is no table "{part}"; did you mean "{meant[0]}"?'
                 return Fault("", message, line=number)
     return None
+
+
+def _hint(text: str, error: tomllib.TOMLDecodeError) -> Fault | None:
+    match = AT_LINE.fullmatch(str(error))
+    if match is None:
+        return None
+    last = len(text.splitlines())
+    known = hint(text, int(match[2] or last), match[1])
+    return Fault("", known[1], line=known[0]) if known else None
 
 
 def _read_fault(error: Exception) -> Fault:
