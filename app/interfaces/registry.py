@@ -32,6 +32,7 @@ MAX_SUGGESTIONS: Final = 3
 FILE_PARTS: Final = 3  # of a definition's file that are shown: package, folder, name
 NO_DEFINITIONS: Final = Definitions()
 PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
+MISSPELT_PACKAGE: Final = 0.8  # so similar is a name only by mistake
 
 
 class Interfaces:
@@ -228,11 +229,13 @@ class Interfaces:
             return InterfaceError(f'"{name}" is not there: {unread_hint(file)}')
         why = f'"{name}" is not {noun} of ROS 2 {self._distro}'
         every, package = [*known, *self.unusable], name.partition("/")[0]
-        if near := _suggestions(name, every):
+        near, packages = _suggestions(name, every), {known.partition("/")[0] for known in every}
+        if near and (package in packages or get_close_matches(package, packages, 1, MISSPELT_PACKAGE)):
             return InterfaceError(f"{why}; did you mean {' or '.join(near)}?")
-        if "/" not in name or any(type_name.startswith(f"{package}/") for type_name in every):
+        if "/" not in name or package in packages:
             return InterfaceError(why)
         hint = f"there is no package {package}: its folder must be among the panel's `interfaces`"
+        hint += f", or did you mean {' or '.join(near)}?" if near else ""
         return InterfaceError(f"{why}; {hint}", package=package)
 
 

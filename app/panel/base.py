@@ -133,6 +133,16 @@ def _resolve_file(value: Any, info: ValidationInfo) -> Path:
     return file
 
 
+def _picture_folder(value: Any, info: ValidationInfo) -> Path:
+    """The path of the folder of pictures, relative to the panel file's folder."""
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"must be the path of a folder, not {format_value(value)}")
+    folder = _context(info).folder / value
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is not a folder: put the pictures into one beside the panel file")
+    return folder
+
+
 def _check_pictures(folder: Path, info: ValidationInfo) -> Path:
     """Links out of it are not followed: the server sends pictures to everyone."""
     for file in picture_files(folder).values():
@@ -227,7 +237,7 @@ ServiceType = Annotated[str, AfterValidator(_check_service_type)]
 ActionType = Annotated[str, AfterValidator(_check_action_type)]
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
-PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]
+PictureFolder = Annotated[Path, BeforeValidator(_picture_folder), AfterValidator(_check_pictures)]
 File = Annotated[Path, BeforeValidator(_resolve_file)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 

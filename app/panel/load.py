@@ -166,15 +166,15 @@ def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
 
 def _shape_faults(error: ValidationError, tables: dict[str, Any], context: FileContext) -> list[Fault]:
     """Faults of keys and values, and all others that can still be found."""
-    from app.panel.faults.shape import find_shape_faults
+    from app.panel.faults.shape import find_demo_faults, find_shape_faults
     from app.panel.faults.stand_ins import make_stand_ins
 
     shape, rest = find_shape_faults(error, tables), make_stand_ins(tables, error)
     panel = rest and rest.validate(context)
-    if not rest or not panel:
-        return shape.faults
-    others = filter(rest.is_real, _type_faults(panel, rest.faulty))
-    return shape.faults + [fault for fault in others if not shape.covers(fault)]
+    others = filter(rest.is_real, _type_faults(panel, rest.faulty)) if rest and panel else ()
+    faults = shape.faults + [fault for fault in others if not shape.covers(fault)]
+    places = {fault.place for fault in faults}
+    return faults + [fault for fault in find_demo_faults(tables) if fault.place not in places]
 
 
 def _sorted_faults(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:

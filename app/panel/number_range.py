@@ -21,6 +21,14 @@ NEAR: Final = Fraction(1, 1_000_000_000)
 MIN_WITH_EXPONENT: Final = 1e16  # larger doubles are written with an exponent
 
 
+def step_fault(step: float, low: float, high: float) -> str:
+    """Why no whole number of steps leads from `low` to `high`."""
+    numbers = number_text(step), number_text(low), number_text(high)
+    if step > high - low:
+        return "a step of {} is more than the whole range, from {} to {}".format(*numbers)
+    return "no whole number of steps of {} leads from {} to {}".format(*numbers)
+
+
 @dataclass(frozen=True, slots=True)
 class Range:
     """From `low` to `high` in steps of `step`; None: no limit."""

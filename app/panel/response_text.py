@@ -66,6 +66,8 @@ def _rounded(value: float) -> str:
 def pieces(text: str) -> Iterator[str | ResponseField]:
     """The text's parts: literal texts, and the fields between them. FieldError as of `parsed`."""
     for number, piece in enumerate(_PLACEHOLDER.split(text)):  # text, field, text, …
+        if number % 2 == 0 and "{" in piece:
+            raise FieldError("", f'"{text}": a brace has no partner; {RIGHT}')
         yield parsed(piece) if number % 2 else piece
 
 

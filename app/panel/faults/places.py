@@ -1,7 +1,7 @@
 """Adds line numbers and ids to places of a panel file."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeVar
 
@@ -15,6 +15,9 @@ _OWNER: Final = re.compile(
 _WITH_ID: Final = ("page", "widget", "interlock", "alarm", "robot", "source")
 _QUOTED: Final = re.compile(r"[/\[]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
+
+# Ends a message about a second table with an id or a name; (1) is the place of the first.
+_FIRST: Final = re.compile(r"is already the (?:id|name) of ([a-z_.]+(?:\[[0-9]+\][a-z_.]*)*)$")
 
 AnyRemark = TypeVar("AnyRemark", bound=Remark)
 
@@ -39,7 +42,14 @@ def add_locations(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Itera
     for remark in remarks:
         place = remark.place
         known = remark.line or _nearest_line(place, lines)
-        yield replace(remark, id=remark.id or id_at(place, tables), line=known)
+        message = _FIRST.sub(lambda first: _with_line(first, lines), remark.message)
+        yield replace(remark, message=message, id=remark.id or id_at(place, tables), line=known)
+
+
+def _with_line(first: re.Match[str], lines: Mapping[str, int]) -> str:
+    """The place of the first of two tables, with its line."""
+    line = _nearest_line(first[1], lines)
+    return f"{first[0]}, line {line}" if line else first[0]
 
 
 def id_at(place: str, tables: Any) -> str:
@@ -65,7 +75,7 @@ def _lines(text: str) -> dict[Path, int]:
         return {}
 
 
-def _nearest_line(place: str, lines: dict[str, int]) -> int:
+def _nearest_line(place: str, lines: Mapping[str, int]) -> int:
     """The line of a place, or of the nearest place around it; 0 without one."""
     while place and place not in lines:
         shorter = _LAST.sub("", place)

@@ -1,19 +1,48 @@
 """Faults of a panel file's shape: keys and values that do not match the descriptions."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
 from app.errors import Fault
 from app.interfaces.validation import format_value
 from app.panel.faults.places import place_of
-from app.panel.faults.table_keys import Model, TableKeys, inner_model, key_faults
+from app.panel.faults.table_keys import Model, TableKeys, inner_model, key_faults, known_keys
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name, describe_error
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
+
+_PRESS: Final = (
+    'a button is "publish" for a topic, "call" for a service, "action" for a goal, "hold" while held'
+)
+# What other programs call a kind → the kind here.
+OTHER_NAMES: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("button", "pushbutton", "key", "command", "momentary"), _PRESS),
+    **dict.fromkeys(
+        ("estop", "stop", "emergencystop", "emergency"),
+        'a stop is "publish" or "call" with role = "stop"; it does not replace the emergency stop',
+    ),
+    **dict.fromkeys(("lamp", "led", "light", "status", "state"), 'a lamp is an "indicator"'),
+    **dict.fromkeys(("chart", "plot", "graph", "timeseries", "history"), 'a curve is a "trend"'),
+    **dict.fromkeys(("bar", "progress", "progressbar", "meter", "dial"), 'a scale is a "gauge"'),
+    **dict.fromkeys(("dropdown", "combo", "combobox", "radio", "choice"), 'a choice is a "select"'),
+    **dict.fromkeys(
+        ("checkbox", "bool", "boolean"), 'a choice of on or off is a "toggle" or a "switch"'
+    ),
+    **dict.fromkeys(("value", "display", "numeric", "topic"), 'a value is a "readout"'),
+    **dict.fromkeys(("input", "entry", "textfield"), 'an entry is a "text" or a "number"'),
+    **dict.fromkeys(("service", "trigger"), 'a service is called by a "call"'),
+    **dict.fromkeys(("goal",), 'a goal is sent by an "action"'),
+    **dict.fromkeys(("jog", "deadman"), 'a button that moves while it is held is a "hold"'),
+    **dict.fromkeys(("video", "stream"), 'a picture that moves is a "camera"'),
+    **dict.fromkeys(("picture", "icon", "logo"), 'a picture of the panel is an "image"'),
+    **dict.fromkeys(("heading", "title", "note", "markdown"), 'a text of the panel is a "label"'),
+    **dict.fromkeys(("list", "grid"), 'rows of a message are a "table"'),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +75,11 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
                 without_header.append(path)
             case _:
                 key = next(step for step in reversed(path) if isinstance(step, str))
-                faults.append(Fault(place_of(path), describe_error(detail, key)))
+                header = ".".join(step for step in path if isinstance(step, str))
+                message = describe_error(detail, key, header)
+                if detail["type"] == "model_type" and not isinstance(detail["input"], Mapping):
+                    message += _its_keys(path, _resolve_location(detail["loc"])[0], header)
+                faults.append(Fault(place_of(path), message))
     of_keys, follow = key_faults(keys)
     faults += of_keys
     for path in without_header:
@@ -92,14 +125,45 @@ def _last_widget(tables: Any, page: Path) -> Path:
     return (*page, "widget", len(widgets) - 1) if widgets else page
 
 
+def find_demo_faults(tables: Mapping[str, Any]) -> list[Fault]:
+    """Faults of names in `[demo]` that nearly are names of the panel, whatever else is wrong in it."""
+    demo = tables.get("demo")
+    used = {text for key, table in tables.items() if key != "demo" for text in _texts(table)}
+    names = [name for name in (demo if isinstance(demo, Mapping) else ()) if name not in used]
+    near = {name: closest_name(name, [text for text in used if "/" in text]) for name in names}
+    return [
+        Fault(place_of(("demo", name)), f"the panel does not use {name}; did you mean {meant}?")
+        for name, meant in near.items()
+        if meant
+    ]
+
+
+def _texts(table: Any) -> Iterator[str]:
+    if isinstance(table, str):
+        yield table
+    elif isinstance(table, Mapping | list):
+        for inner in table.values() if isinstance(table, Mapping) else table:
+            yield from _texts(inner)
+
+
+def _its_keys(path: Path, model: Model, header: str) -> str:
+    """How a table is written, with its keys."""
+    keys = ", ".join(known_keys(model))
+    if isinstance(path[-1], int):
+        return f"; its keys are {keys}: write [[{header}]]"
+    return f"; its keys are {keys}: write [{header}] above them"
+
+
 def _kind_fault(path: Path, table: Any) -> Fault:
     if not isinstance(table, Mapping):
         return Fault(place_of(path), f"must be a table, not {format_value(table)}")
     kinds = ", ".join(KINDS)
+    written = str(table.get("kind", "")).lower()
     if "kind" not in table:
         if meant := closest_name("kind", table):
             return Fault(place_of((*path, meant)), 'unknown key; did you mean "kind"?')
         return Fault(place_of(path), f'"kind" is missing; one of {kinds}')
-    meant = closest_name(str(table["kind"]).lower(), KINDS)
+    meant = closest_name(written, KINDS)
     hint = f'did you mean "{meant}"?' if meant else f"one of {kinds}"
+    hint = OTHER_NAMES.get(re.sub("[^a-z]", "", written), hint)
     return Fault(place_of((*path, "kind")), f"unknown kind {format_value(table['kind'])}; {hint}")

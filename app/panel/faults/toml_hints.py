@@ -151,17 +151,17 @@ def _backslash(_: str, __: str, message: str) -> str:
 
 def _words(bare: str, whole: str, _: str) -> str:
     pair = _PAIR.fullmatch(bare.split("#")[0])
-    for found in _WORD.finditer(pair[2]) if pair else ():
+    if pair is None:
+        return ""
+    for found in _WORD.finditer(pair[2]):
         word = found[1]
         if word in _WORDS:
             return f"{word} is not a value of TOML: write {_WORDS[word]}"
         if word in _NOTHING:
-            return f'{word} is not a value of TOML: leave out "{pair[1] if pair else ""}"'
+            return f'{word} is not a value of TOML: leave out "{pair[1]}"'
         if word not in ("true", "false", "inf", "nan") and "=" not in pair[2].split(word, 1)[1][:2]:
             return f'a text stands in quotes: write "{word}"'
-    if pair and not pair[2]:
-        return f'"{pair[1]}" has no value: write one after =, or leave the line out'
-    return ""
+    return "" if pair[2] else f'"{pair[1]}" has no value: write one after =, or leave the line out'
 
 
 def _number(bare: str, _: str, __: str) -> str:

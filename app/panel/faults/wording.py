@@ -47,8 +47,9 @@ LIMITS: Final[Mapping[str, str]] = {
 }
 
 
-def describe_error(error: Mapping[str, Any], key: str) -> str:
-    """The message about an error of pydantic; never pydantic's own text."""
+def describe_error(error: Mapping[str, Any], key: str, header: str = "") -> str:
+    """The message about an error of pydantic; never pydantic's own text. `header` is that of the
+    table's list in the file, like "frame.widget"."""
     kind, value, about = error["type"], format_value(error["input"]), error.get("ctx", {})
     match kind:
         case "value_error":
@@ -58,18 +59,30 @@ def describe_error(error: Mapping[str, Any], key: str) -> str:
         case "literal_error":
             return one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
         case "tuple_type":
-            return f"must be a list of {LIST_WORDS.get(key, 'values')}, not {value}"
+            words = LIST_WORDS.get(key, "values")
+            listed = f"tables: write [[{header}]]" if words.startswith("tables: write [[") else words
+            return f"must be a list of {listed}, not {value}"
         case "dict_type":
             return f'must be a table, like {{ field = "value" }}, not {value}'
         case "string_too_short" | "too_short":
             return "must not be empty"
-        case "string_too_long" | "too_long":
+        case "string_too_long":
             length = len(error["input"])
             return f"must be {about['max_length']} characters at most; it has {length}"
+        case "too_long":
+            length = len(error["input"])
+            return f"must have {about['max_length']} {_elements(key)} at most; it has {length}"
     for name, words in LIMITS.items():
         if name in about:
             return f"must be {words.format(number_text(float(about[name])))}, not {value}"
     return f"{_must_be(kind)}, not {value}"
+
+
+def _elements(key: str) -> str:
+    """The plural of what a list's key names."""
+    if key not in LIST_WORDS:
+        return "values"
+    return key if key.endswith("s") else f"{key}s"
 
 
 def closest_name(name: str, known: Iterable[str]) -> str:

@@ -29,7 +29,7 @@ from app.panel.base import (
     TopicQos,
     Type,
 )
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import field_faults, whole_field
 from app.panel.faults.wording import list_names
 from app.panel.field_paths import FieldPath
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
@@ -204,8 +204,7 @@ class Display(TopicWidget, DisplayWidget):
         field_type = interfaces.type_at(self.type, self.field)
         is_several = field_type.is_nested and str(field_type) not in self.whole_types
         if is_several or field_type.container != "one":
-            who = f"an {self.kind}" if self.kind[0] in "aeiou" else f"a {self.kind}"
-            message = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
+            message = whole_field(self.field, field_type, self.kind, interfaces)
             yield Fault(f"{place}.field", message)
         else:
             yield from self.value_faults(place, str(field_type), interfaces)

@@ -12,7 +12,7 @@ from app.i18n.typed_numbers import read_number
 from app.i18n.values import after_space, number_like
 from app.interfaces.validation import format_value
 from app.panel.base import Span, panel_text
-from app.panel.number_range import is_on_step
+from app.panel.number_range import is_on_step, step_fault
 from app.panel.units import Conversion, conversion, units_like
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
@@ -179,8 +179,7 @@ class Numeric(SteppedWidget, Input):
         if self.max <= self.min:
             yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
         elif not self.is_on_step(self.max):
-            message = f"no whole number of steps of {step} leads from {low} to {high}"
-            yield Fault(f"{place}.step", message)
+            yield Fault(f"{place}.step", step_fault(self.step or 0, self.min, self.max))
         elif self.default is not None and not self.min <= self.default <= self.max:
             yield Fault(f"{place}.default", f"{default} is not from {low} to {high}")
         elif self.default is not None and not self.is_on_step(self.default):

@@ -15,7 +15,7 @@ from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import PARAMETER_EVENTS
 from app.interfaces.validation import format_value
 from app.panel.base import SaidLabel, Seconds, Span, catalogue_default, is_absolute_name
-from app.panel.number_range import Range, decimal_text
+from app.panel.number_range import Range, decimal_text, step_fault
 from app.panel.values import join_list, number_text, quote_element, same_value
 from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand
 from app.panel.widgets.inputs import BOOL_TEXTS, Option, option_faults
@@ -242,8 +242,8 @@ def _limit_faults(place: str, parameter: Parameter, limits: Mapping[str, float])
     elif parameter.step is not None and not Range(parameter.min, None, parameter.step).is_on_step(
         parameter.max
     ):
-        step = number_text(parameter.step)
-        yield Fault(f"{place}.step", f"no whole number of steps of {step} leads from {low} to {high}")
+        message = step_fault(parameter.step, parameter.min, parameter.max)
+        yield Fault(f"{place}.step", message)
 
 
 def type_faults(parameters: Iterable[tuple[str, Parameter]]) -> Iterator[Fault]:

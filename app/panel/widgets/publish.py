@@ -70,7 +70,7 @@ class SinglePublish(PublishPress):
 
     def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.confirm is not None:
-            yield from confirm_faults(f"{place}.confirm", self.confirm, checking)
+            yield from confirm_faults(f"{place}.confirm", self.confirm, checking, self.topic)
         elif self.one_shot:
             message = "needs `confirm`: without it the panel does not know when the command is done"
             yield Fault(f"{place}.one_shot", message)
@@ -80,11 +80,15 @@ class Publish(SinglePublish):
     kind: Literal["publish"]
 
 
-def confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Iterator[Fault]:
-    """Faults of the table at `place` that says what confirms a command."""
+def confirm_faults(
+    place: str, confirm: Confirm, checking: CheckContext, own_topic: str = ""
+) -> Iterator[Fault]:
+    """Faults of the table at `place` that says what confirms a command on `own_topic`."""
     known = confirm.type or checking.types.get(confirm.topic)
     if known is None:
         message = f"is missing: nothing else in the panel says what {confirm.topic} is"
+        if confirm.topic == own_topic:
+            message = f"is missing; on {own_topic} this button publishes: name where the robot answers"
         yield Fault(f"{place}.type", message, cause=f"listens {confirm.topic}")
         return
     faults = list(field_faults(place, known, confirm.field, checking.interfaces))

@@ -12,6 +12,7 @@ from app.i18n import ENGLISH, Text
 from app.i18n.typed_numbers import read_number
 from app.panel.base import Seconds, Span
 from app.panel.number_range import to_float32
+from app.panel.template import placeholder_ids
 from app.panel.values import number_text
 from app.panel.widgets.displays import FORMAT
 from app.panel.widgets.families import CheckContext, EntryWidget, TopicField, TopicSource
@@ -108,7 +109,9 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
         if self.template == self.message and not any(
             fault.place.startswith(message) for fault in faults
         ):
-            yield Fault(message, 'has no "{value}": every press would publish the same')
+            named = ", ".join(f"{{{name}}}" for name in placeholder_ids([self.message]))
+            instead = f'; write "{{value}}" in place of {named}' if named else ""
+            yield Fault(message, f'has no "{{value}}": every press would publish the same{instead}')
         yield from number_field_faults(f"{place}.value", self.value, "a value", checking.interfaces)
 
     def _as_number(self) -> NumberInput:
