@@ -108,12 +108,14 @@ def _check_endpoint(endpoint: str) -> str:
 
 
 def _resolve_folder(value: Any, info: ValidationInfo) -> Path:
-    """The folder's path, relative to the panel file's folder."""
+    """The folder's path, relative to the panel file's folder: of interfaces, or `pictures`."""
     if not isinstance(value, str) or not value:
         raise ValueError(f"must be the path of a folder, not {format_value(value)}")
     folder = _context(info).folder / value
     if not folder.is_dir():
-        raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
+        right = "it must be a ROS package or have some in it"
+        right = "put pictures into one here" if info.field_name == "pictures" else right
+        raise ValueError(f"{folder} is not a folder: {right}")
     return folder
 
 
@@ -131,16 +133,6 @@ def _resolve_file(value: Any, info: ValidationInfo) -> Path:
             f' file itself there, and name it like "pages/{file.name}"'
         )
     return file
-
-
-def _picture_folder(value: Any, info: ValidationInfo) -> Path:
-    """The path of the folder of pictures, relative to the panel file's folder."""
-    if not isinstance(value, str) or not value:
-        raise ValueError(f"must be the path of a folder, not {format_value(value)}")
-    folder = _context(info).folder / value
-    if not folder.is_dir():
-        raise ValueError(f"{folder} is not a folder: put the pictures into one beside the panel file")
-    return folder
 
 
 def _check_pictures(folder: Path, info: ValidationInfo) -> Path:
@@ -237,7 +229,7 @@ ServiceType = Annotated[str, AfterValidator(_check_service_type)]
 ActionType = Annotated[str, AfterValidator(_check_action_type)]
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
-PictureFolder = Annotated[Path, BeforeValidator(_picture_folder), AfterValidator(_check_pictures)]
+PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]
 File = Annotated[Path, BeforeValidator(_resolve_file)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from app.cli.interfaces import main as add_interfaces
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.interfaces import Interfaces, load_interfaces
@@ -188,7 +189,7 @@ def described(definitions: Definitions, name: str) -> list[dict[str, Any]]:
 
 
 def test_a_node_describes_a_type_that_no_other_knows(
-    robot: CycloneRobot, cyclone_bridge: Bridge
+    robot: CycloneRobot, cyclone_bridge: Bridge, tmp_path: Path
 ) -> None:
     text = {"Gripper": "float64 width\nJaw[] jaws", "Jaw": "string name\nfloat32 force"}
     whole = Definitions()
@@ -218,6 +219,9 @@ def test_a_node_describes_a_type_that_no_other_knows(
     interfaces = Interfaces(described=definitions)
     assert interfaces.type_hash(GRIPPER) == hash_
     assert interfaces.field_type(GRIPPER, "jaws[0].force") == "float32"
+    where = ["--connect", cyclone_bridge.endpoint, "--to", str(tmp_path)]
+    assert add_interfaces(["add", "gripper_msgs", "--from", "robot", *where]) == 0
+    assert load_interfaces("jazzy", [tmp_path]).type_hash(GRIPPER) == hash_
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_invalid_toml_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[
     path = tmp_path / "cell.toml"
     path.write_text("title =")
     assert main([str(path)]) == 2
-    assert "Invalid value" in capsys.readouterr().err
+    assert "has no value: write one after =" in capsys.readouterr().err
 
 
 def test_without_a_name_the_panel_of_the_environment_is_checked(

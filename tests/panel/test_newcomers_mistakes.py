@@ -1,4 +1,4 @@
-"""Mistakes of people who write their first panel: each fault names its place, and what would be right."""
+"""Mistakes of people who write their first panel: each fault says what would be right."""
 
 from pathlib import Path
 from typing import Final
@@ -92,7 +92,7 @@ def test_the_panel_without_a_mistake_is_good(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('mode = "live"', 'mode = "live"\npictures = "img"', "put the pictures into one beside the"),
+        ('mode = "live"', 'mode = "live"\npictures = "img"', "put pictures into one here"),
         (
             'mode = "live"',
             'mode = "live"\ncontrol = true',

@@ -550,7 +550,7 @@ def test_input_of_another_page_is_unknown_here(load: Load) -> None:
 def test_a_widget_id_is_unique_over_all_pages(load: Load) -> None:
     pages = [{"id": name, "title": name, "widget": [HEARD]} for name in ("one", "two")]
     assert faults(load, tables(page=pages)) == {
-        "page[1].widget[0].id": '"heard" is already the id of page[0].widget[0]'
+        "page[1].widget[0].id": '"heard" is already the id of page[0].widget[0], line 3'
     }
 
 
@@ -613,10 +613,13 @@ def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> 
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"title = ", "Invalid value, at the end of the file"),
-        (b"[[page]\n", "line 1: Expected ']]'"),
-        (b"title = 'a'\ntitle = 'b'\n", "line 2: this key or table is above already"),
-        (b"[log]\na = 1\n[log]\n", "line 3: Cannot declare log twice"),
+        (b"title = ", 'line 1: "title" has no value'),
+        (
+            b"[[page]\n",
+            r"the brackets of a header are the same on both sides: write \[\[page\]\]",
+        ),
+        (b"title = 'a'\ntitle = 'b'\n", 'line 2: "title" is above already, in line 1'),
+        (b"[log]\na = 1\n[log]\n", r"line 3: \[log\] is above already, in line 1"),
         (
             b"[[page]]\nwidget = []\n[[page.widget]]\n",
             "line 3: nothing can be added to .*: page.widget",

@@ -68,7 +68,7 @@ def test_what_is_no_field_is_named(wrong: str) -> None:
         ("{sequence:.1f}", "a format and a factor are for numbers"),
         ("{sequence[0]*2:d}", "a scaled number"),
         ("{sequence!r}", "is not a field"),
-        ("{sequence[0]:.1f", ""),
+        ("{sequence[0]:.1f", "a brace has no partner; write {field}"),
         ("{sequence[0]:1}", "write {field}"),
     ],
 )

@@ -136,7 +136,8 @@ message = {}
 def test_two_sources_with_one_id_and_one_that_nothing_names(tmp_path: Path) -> None:
     twice = SOURCE + SOURCE.removeprefix('title = "Cell"\n') + PAGE
     (fault,) = faults(tmp_path, twice)
-    assert (fault.place, fault.message) == ("source[1].id", '"battery" is already the id of source[0]')
+    assert fault.place == "source[1].id"
+    assert fault.message == '"battery" is already the id of source[0], line 2'
     spare = SOURCE + SOURCE.removeprefix('title = "Cell"\n').replace("battery", "spare") + PAGE
     notes = [str(note.message) for note in find_notes(loaded(tmp_path, spare), INTERFACES)]
     assert 'nothing has source = "spare"' in notes

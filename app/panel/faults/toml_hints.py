@@ -32,11 +32,11 @@ def hint(text: str, line: int, message: str) -> Hint | None:
         return 1, 'this looks like JSON; a panel file is TOML, like title = "Cell"'
     if not 0 < line <= len(lines):
         return None
-    if found := _open_hint(lines[:line], message):
-        return found
+    if match := _open_hint(lines[:line], message):
+        return match
     whole = lines[line - 1]
-    if found := _header_hint(lines, line, message):
-        return found
+    if match := _header_hint(lines, line, message):
+        return match
     for rule in _RULES:
         if words := rule(_outside_strings(whole), whole, message):
             return line, words
@@ -77,9 +77,9 @@ def _header_hint(lines: Sequence[str], line: int, message: str) -> Hint | None:
         brackets = several + name + several.replace("[", "]")
         return line, f"the brackets of a header are the same on both sides: write {brackets}"
     earlier = [
-        (number, found[1])
+        (number, match[1])
         for number, text in enumerate(lines[: line - 1], 1)
-        if (found := _HEADER.fullmatch(text)) and found[2] == name
+        if (match := _HEADER.fullmatch(text)) and match[2] == name
     ]
     if not earlier or not re.search("twice|overwrite|immutable", message):
         return None
@@ -123,18 +123,18 @@ def _dash(bare: str, _: str, __: str) -> str:
 
 
 def _colon(bare: str, whole: str, _: str) -> str:
-    found = _COLON.fullmatch(bare)
-    if not found:
+    match = _COLON.fullmatch(bare)
+    if not match:
         return ""
-    key, value = found[1], whole.split(":", 1)[1].strip()
+    key, value = match[1], whole.split(":", 1)[1].strip()
     if not value:
         return f"a key and its value stand on one line with =: {key} = …"
     return f"a key has = after it, no colon: write {key} = {_as_value(value)}"
 
 
 def _key_with_space(bare: str, _: str, __: str) -> str:
-    found = re.match(r"\s*([A-Za-z]\w*(?: +\w+)+)\s*=", bare)
-    return f"a key has no spaces: write {'_'.join(found[1].split())}" if found else ""
+    match = re.match(r"\s*([A-Za-z]\w*(?: +\w+)+)\s*=", bare)
+    return f"a key has no spaces: write {'_'.join(match[1].split())}" if match else ""
 
 
 def _open_text(bare: str, whole: str, message: str) -> str:
@@ -153,8 +153,8 @@ def _words(bare: str, whole: str, _: str) -> str:
     pair = _PAIR.fullmatch(bare.split("#")[0])
     if pair is None:
         return ""
-    for found in _WORD.finditer(pair[2]):
-        word = found[1]
+    for match in _WORD.finditer(pair[2]):
+        word = match[1]
         if word in _WORDS:
             return f"{word} is not a value of TOML: write {_WORDS[word]}"
         if word in _NOTHING:
@@ -180,8 +180,8 @@ def _number(bare: str, _: str, __: str) -> str:
 
 
 def _after_value(bare: str, _: str, __: str) -> str:
-    found = re.search(r"([;,])\s*(?:#.*)?$", bare)
-    return f"nothing stands after a value: remove {found[1]}" if found and "=" in bare else ""
+    match = re.search(r"([;,])\s*(?:#.*)?$", bare)
+    return f"nothing stands after a value: remove {match[1]}" if match and "=" in bare else ""
 
 
 def _inline_table(bare: str, _: str, __: str) -> str:

@@ -66,12 +66,11 @@ def describe_error(error: Mapping[str, Any], key: str, header: str = "") -> str:
             return f'must be a table, like {{ field = "value" }}, not {value}'
         case "string_too_short" | "too_short":
             return "must not be empty"
-        case "string_too_long":
-            length = len(error["input"])
-            return f"must be {about['max_length']} characters at most; it has {length}"
-        case "too_long":
-            length = len(error["input"])
-            return f"must have {about['max_length']} {_elements(key)} at most; it has {length}"
+        case "string_too_long" | "too_long":
+            length, most = len(error["input"]), about["max_length"]
+            if isinstance(error["input"], str):
+                return f"must be {most} characters at most; it has {length}"
+            return f"must have {most} {_elements(key)} at most; it has {length}"
     for name, words in LIMITS.items():
         if name in about:
             return f"must be {words.format(number_text(float(about[name])))}, not {value}"
