@@ -89,6 +89,7 @@ OF_A_KIND: dict[tuple[str, ...], set[str]] = {
         "app.simulator.zenoh_wire",
     },
     ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
+        "app.cli.router_config",
         "app.dialect.auto_dialect",
         "app.runtime.robot_access",
         "app.simulator.zenoh_wire",

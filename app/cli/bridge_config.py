@@ -1,31 +1,26 @@
 """`operator-panel bridge-config [PANEL]`: a configuration of zenoh-bridge-ros2dds that fits a panel.
 
-Exit status: 0 written, 1 it can't be written, 2 a mistake on the command line or a panel with faults.
+Exit status: see `peer_config`.
 """
 
-import os
 import sys
 from argparse import ArgumentTypeError
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from app.cli.arguments import PANEL_HELP
-from app.cli.output import OutputError, add_force, draft_of
 from app.cli.parser import Parser
-from app.dialect.dialect import DOMAIN_MOST, WITHOUT_BRIDGE
+from app.cli.peer_config import add_domain, add_options, listen_of, own_domain, robot_entry, write
+from app.dialect.dialect import WITHOUT_BRIDGE
 from app.errors import KioskError
 from app.interfaces.names import TOPIC
-from app.panel import Panel, load_panel
-from app.panel.base import ENDPOINT
-from app.panel.model import RobotEntry
+from app.panel import load_panel
 from app.settings import Settings
 from app.transport.bridge_config import LISTEN, BridgeOptions, bridge_config
 
 PROG: Final = "python -m app.cli bridge-config"
 NO_BRIDGE: Final = (
     "this robot needs no bridge: by the panel file its nodes run on rmw_zenoh, at the Zenoh router that"
-    " zenoh.json5 or `connect` names"
+    " zenoh.json5 or `connect` names; `operator-panel router-config` writes a file for the router"
 )
 
 
@@ -37,57 +32,16 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
-    entry = _robot(parser, panel, options.robot)
+    entry = robot_entry(parser, panel, options.robot)
     if (entry or panel).dialect in WITHOUT_BRIDGE:
         parser.error(NO_BRIDGE)
-    text = bridge_config(panel, entry, _options(options, entry))
-    if options.output is None:
-        print(text, end="")
-        return 0
-    try:
-        with draft_of(options.output, options.force) as draft:
-            draft.write_text(text, encoding="utf-8")
-    except OutputError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
-
-
-def _robot(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | None:
-    """The robot that the bridge is for: of several one has to be named."""
-    names = [entry.id for entry in panel.robots]
-    if name is None and len(names) <= 1:
-        return panel.robots[0] if panel.robots else None
-    for entry in panel.robots:
-        if entry.id == name:
-            return entry
-    listed = ", ".join(names) or "none: leave --robot out"
-    parser.error(f"--robot names one of the panel's robots: there is {listed}")
-
-
-def _options(options: Any, entry: RobotEntry | None) -> BridgeOptions:
-    listen = options.listen or (entry.connect if entry and entry.connect else LISTEN)
-    return BridgeOptions(
+    bridge = BridgeOptions(
         domain=options.domain,
-        listen=tuple(listen),
+        listen=listen_of(options, entry, LISTEN),
         nodename=options.nodename,
         prefixed=options.prefixed,
     )
-
-
-def _domain(text: str) -> int:
-    domain = int(text) if text.isascii() and text.isdigit() else -1
-    if not 0 <= domain <= DOMAIN_MOST:
-        raise ArgumentTypeError(f'"{text}" is not a ROS_DOMAIN_ID: 0 to {DOMAIN_MOST}')
-    return domain
-
-
-def _endpoint(text: str) -> str:
-    if not ENDPOINT.fullmatch(text):
-        raise ArgumentTypeError(
-            f'"{text}" is not a Zenoh endpoint: it must be like tcp/192.0.2.10:7447'
-        )
-    return text
+    return write(bridge_config(panel, entry, bridge), options)
 
 
 def _node(text: str) -> str:
@@ -102,26 +56,9 @@ def make_parser(prog: str) -> Parser:
         description="Writes a configuration of the bridge that lets through what a panel needs.",
         epilog="Start the bridge with it: ROS_DISTRO=jazzy zenoh-bridge-ros2dds -c bridge.json5",
     )
+    add_options(parser, listen=LISTEN[0])
+    add_domain(parser, own_domain(), "this machine's, else 0")
     add = parser.add_argument
-    add("panel", nargs="?", type=Path, metavar="PANEL", help=PANEL_HELP)
-    add("-o", "--output", type=Path, metavar="FILE", help="where to write it; default: standard output")
-    add_force(parser)
-    add(
-        "--domain",
-        type=_domain,
-        default=os.environ.get("ROS_DOMAIN_ID") or "0",
-        metavar="N",
-        help="ROS_DOMAIN_ID of the robot's nodes; default: this machine's, else 0",
-    )
-    add(
-        "--listen",
-        action="append",
-        type=_endpoint,
-        metavar="ENDPOINT",
-        help="where the panel connects, such as tcp/192.0.2.10:7447; may be given several times;"
-        " default: the robot's `connect` in the panel file, else tcp/127.0.0.1:7447",
-    )
-    add("--robot", metavar="ID", help="which robot, of a panel with several")
     add(
         "--prefixed",
         action="store_true",

@@ -51,6 +51,9 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "support": Command("collect what support needs to know in a zip file", "support"),
     "bridge-config": Command("write a configuration of the bridge that fits a panel", "bridge_config"),
     "interfaces": Command("copy the definitions of ROS packages beside a panel", "interfaces"),
+    "router-config": Command(
+        "write a configuration of the Zenoh router of a robot on rmw_zenoh", "router_config"
+    ),
     "completion": Command("print a shell's completion of these commands", "completion"),
     "install": Command("install the panel as services of this machine", "install"),
     "update": Command("run another version, and back if it does not come up", "update"),

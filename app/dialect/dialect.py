@@ -10,6 +10,7 @@ DEFAULT_DIALECT: Final[DialectName] = "auto"  # where the panel file does not sa
 # Those whose peers join a ROS domain by their own configuration.
 WITH_OWN_DOMAIN: Final[frozenset[DialectName]] = frozenset({"bridge"})
 WITHOUT_BRIDGE: Final[frozenset[DialectName]] = frozenset({"rmw_zenoh"})
+WITHOUT_ROUTER: Final[frozenset[DialectName]] = frozenset({"bridge"})  # the bridge listens itself
 DOMAIN_MOST: Final = 232  # the last ROS_DOMAIN_ID
 ANY_HASH: Final = "*"
 TypeHash = Callable[[str], str]  # the name of a type → its hash in key expressions

@@ -1,17 +1,37 @@
 """The panel's own node among a robot's nodes: /web_ui, with its publishers, subscribers and clients as
 ROS tools list them. Nodes on rmw_zenoh need none of these tokens to exchange messages."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 from app.dialect.auto_dialect import AutoDialect
 from app.dialect.endpoint import OwnEndpoint
 from app.dialect.rmw_zenoh_dialect import RmwZenohDialect
 from app.dialect.rmw_zenoh_tokens import PANEL_NODE, free_name, parse_token
 from app.interfaces.names import ROSOUT, ROSOUT_TOPIC, Qos
+from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.panel.widgets.service_action import Call
 from app.transport.peer import RobotContext
 from app.transport.rosout import LOG_TYPE
+
+
+def panel_endpoints(panel: Panel, key: Callable[[str], str]) -> Iterator[OwnEndpoint]:
+    """All that the node of a panel can have, with the QoS of the panel file. `key` makes the key of a
+    name."""
+    for topic, name in panel.publications().items():
+        yield OwnEndpoint("MP", key(topic), name, panel.qos(topic).wire_qos)
+    yield OwnEndpoint("MP", key(ROSOUT_TOPIC), LOG_TYPE, ROSOUT)
+    for topic, name in panel.listened().items():
+        yield OwnEndpoint("MS", key(topic), name, panel.qos(topic).wire_qos)
+    for action, name in panel.actions().items():
+        yield OwnEndpoint("AC", key(action), name)
+    for widget in panel.senders():
+        if isinstance(widget, Call):
+            yield OwnEndpoint("SC", key(widget.service), widget.type)
+    for node in {widget.node for widget in panel.parameters()}:
+        for service, name in (GET, DESCRIBE, SET):
+            yield OwnEndpoint("SC", key(f"{node}/{service}"), name)
 
 
 class PanelNode:
@@ -22,6 +42,10 @@ class PanelNode:
         self._robot = context.robot
         self._link = context.link
         self.name = PANEL_NODE
+        panel, key = context.panel, context.robot.key
+        listened = panel.listened()
+        self._any_durability = {key(topic) for topic in listened if panel.qos(topic).durability is None}
+        self._adaptive = {key(topic) for topic in panel.adaptive_topics}
 
     def choose_name(self, tokens: Iterable[str]) -> frozenset[str]:
         """Takes the first free name: another panel on this robot may have the usual one. Returns the
@@ -47,30 +71,20 @@ class PanelNode:
         return dialect.node_tokens(self._link.zid, self.name, own)
 
     def _endpoints(self) -> Iterator[OwnEndpoint]:
-        panel, key = self._panel, self._robot.key
-        for topic, name in panel.publications().items():
-            yield OwnEndpoint("MP", key(topic), name, panel.qos(topic).wire_qos)
-        yield OwnEndpoint("MP", key(ROSOUT_TOPIC), LOG_TYPE, ROSOUT)
-        for topic, name in panel.subscriptions().items():
-            yield OwnEndpoint("MS", key(topic), name, self._subscription_qos(topic))
-        for topic, name in panel.on_demand().items():
-            if key(topic) in self._robot.camera_topics:
-                yield OwnEndpoint("MS", key(topic), name, self._subscription_qos(topic))
-        for action, name in panel.actions().items():
-            yield OwnEndpoint("AC", key(action), name)
-        for widget in panel.widgets():
-            if isinstance(widget, Call):
-                yield OwnEndpoint("SC", key(widget.service), widget.type)
-        for node in {widget.node for widget in panel.parameters()}:
-            for service, name in (GET, DESCRIBE, SET):
-                yield OwnEndpoint("SC", key(f"{node}/{service}"), name)
+        panel = self._panel
+        shown = panel.on_demand().keys() - panel.subscriptions().keys()
+        on_demand = {self._robot.key(topic) for topic in shown}
+        for end in panel_endpoints(panel, self._robot.key):
+            if end.role != "MS":
+                yield end
+            elif end.key not in on_demand or end.key in self._robot.camera_topics:
+                yield replace(end, qos=self._subscription_qos(end))
 
-    def _subscription_qos(self, topic: str) -> Qos:
+    def _subscription_qos(self, end: OwnEndpoint) -> Qos:
         """The panel's, with what it takes from the publisher."""
-        panel, graph, key = self._panel, self._robot.graph, self._robot.key(topic)
-        qos = panel.qos(topic).wire_qos
-        if panel.qos(topic).durability is None:
+        graph, key, qos = self._robot.graph, end.key, end.qos
+        if key in self._any_durability:
             qos = qos._replace(transient_local=graph.is_transient_local(key) or False)
-        if topic in panel.adaptive_topics and graph.is_reliable(key) is False:
+        if key in self._adaptive and graph.is_reliable(key) is False:
             qos = qos._replace(reliable=False)
         return qos

@@ -192,4 +192,4 @@ def test_a_robot_on_rmw_zenoh_needs_no_bridge(panel: Path, capsys: pytest.Captur
     with pytest.raises(SystemExit) as ended:
         main(["bridge-config", str(panel)])
     assert ended.value.code == 2
-    assert "needs no bridge" in capsys.readouterr().err
+    assert "router-config" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from app.settings import APP
 from tests.diagnose.setups import panel_of
 from tests.support.parts import ROOT
 
-GUIDES = ("how-to/doctor.md", "how-to/bridge.md", "troubleshooting.md")
+GUIDES = ("how-to/doctor.md", "how-to/bridge.md", "how-to/rmw-zenoh.md", "troubleshooting.md")
 TEXTS = "".join((ROOT / "docs" / name).read_text() for name in GUIDES)
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", TEXTS, re.DOTALL | re.MULTILINE)
 COMMANDS = [line for block in BLOCKS for line in block.splitlines() if line.startswith(f"{APP} ")]
@@ -31,4 +31,5 @@ def test_a_command_of_a_guide(line: str, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_the_guides_show_each_command() -> None:
-    assert {line.split()[1] for line in COMMANDS} == {"doctor", "support", "bridge-config"}
+    shown = {line.split()[1] for line in COMMANDS}
+    assert shown == {"doctor", "support", "bridge-config", "router-config"}

@@ -19,7 +19,8 @@ class Router(Bridge):
 
     def start(self) -> None:
         module = "tests.support.processes.rmw_router"
-        self._process = Process([sys.executable, "-m", module, self.endpoint], {}, cwd=str(ROOT))
+        place = str(self._file or self.endpoint)
+        self._process = Process([sys.executable, "-m", module, place], {}, cwd=str(ROOT))
         process = self._process
         until(lambda: "running" in process.text or not process.running, "the router runs")
         assert process.running, process.text

@@ -1,5 +1,6 @@
-"""A Zenoh router for the tests: `python -m tests.support.processes.rmw_router ENDPOINT`, until SIGTERM.
-It is the same router as `zenohd`, in a session of eclipse-zenoh."""
+"""A Zenoh router for the tests: `python -m tests.support.processes.rmw_router ENDPOINT`, until SIGTERM;
+or with a configuration file in place of the endpoint. It is the same router as `zenohd`, in a session of
+eclipse-zenoh."""
 
 import signal
 import sys
@@ -7,7 +8,14 @@ import sys
 import zenoh
 
 
-def main(endpoint: str) -> None:
+def main(place: str) -> None:
+    config = zenoh.Config.from_file(place) if place.endswith(".json5") else with_defaults(place)
+    with zenoh.open(config):
+        print("router: running", file=sys.stderr, flush=True)
+        signal.sigwait({signal.SIGTERM, signal.SIGINT})
+
+
+def with_defaults(endpoint: str) -> zenoh.Config:
     config = zenoh.Config()
     for place, value in {
         "mode": '"router"',
@@ -18,9 +26,7 @@ def main(endpoint: str) -> None:
         "routing/router/peers_failover_brokering": "false",  # as rmw_zenoh's own configuration has it
     }.items():
         config.insert_json5(place, value)
-    with zenoh.open(config):
-        print("router: running", file=sys.stderr, flush=True)
-        signal.sigwait({signal.SIGTERM, signal.SIGINT})
+    return config
 
 
 if __name__ == "__main__":

@@ -1,0 +1,99 @@
+"""What `bridge-config` and `router-config` share: which robot it is for, its options, and the file.
+
+Exit status of both: 0 written, 1 it can't be written, 2 a mistake on the command line or a panel with
+faults.
+"""
+
+import os
+import sys
+from argparse import ArgumentTypeError
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from app.cli.arguments import PANEL_HELP
+from app.cli.output import OutputError, add_force, draft_of
+from app.cli.parser import Parser
+from app.dialect.dialect import DOMAIN_MOST
+from app.panel import Panel
+from app.panel.base import ENDPOINT
+from app.panel.model import RobotEntry
+
+
+def robot_entry(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | None:
+    """The robot that the configuration is for: of several one has to be named."""
+    names = [entry.id for entry in panel.robots]
+    if name is None and len(names) <= 1:
+        return panel.robots[0] if panel.robots else None
+    for entry in panel.robots:
+        if entry.id == name:
+            return entry
+    listed = ", ".join(names) or "none: leave --robot out"
+    parser.error(f"--robot names one of the panel's robots: there is {listed}")
+
+
+def listen_of(options: Any, entry: RobotEntry | None, default: Sequence[str]) -> tuple[str, ...]:
+    """Where the panel connects: by the command line, else by the panel file."""
+    return tuple(options.listen or (entry.connect if entry and entry.connect else default))
+
+
+def write(text: str, options: Any) -> int:
+    """Writes the file, or prints it without one. Returns the exit status."""
+    if options.output is None:
+        print(text, end="")
+        return 0
+    try:
+        with draft_of(options.output, options.force) as draft:
+            draft.write_text(text, encoding="utf-8")
+    except OutputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def add_options(parser: Parser, *, listen: str) -> None:
+    """PANEL, -o, --force, --listen, --robot; `listen` is the default of --listen in words."""
+    add = parser.add_argument
+    add("panel", nargs="?", type=Path, metavar="PANEL", help=PANEL_HELP)
+    add("-o", "--output", type=Path, metavar="FILE", help="where to write it; default: standard output")
+    add_force(parser)
+    add(
+        "--listen",
+        action="append",
+        type=endpoint,
+        metavar="ENDPOINT",
+        help="where the panel connects, such as tcp/192.0.2.10:7447; may be given several times;"
+        f" default: the robot's `connect` in the panel file, else {listen}",
+    )
+    add("--robot", metavar="ID", help="which robot, of a panel with several")
+
+
+def add_domain(parser: Parser, default: str | None, described: str) -> None:
+    """--domain"""
+    parser.add_argument(
+        "--domain",
+        type=domain,
+        default=default,
+        metavar="N",
+        help=f"ROS_DOMAIN_ID of the robot's nodes; default: {described}",
+    )
+
+
+def own_domain() -> str:
+    """The ROS domain of this machine."""
+    return os.environ.get("ROS_DOMAIN_ID") or "0"
+
+
+def domain(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdigit() else -1
+    if not 0 <= number <= DOMAIN_MOST:
+        raise ArgumentTypeError(f'"{text}" is not a ROS_DOMAIN_ID: 0 to {DOMAIN_MOST}')
+    return number
+
+
+def endpoint(text: str) -> str:
+    if not ENDPOINT.fullmatch(text):
+        raise ArgumentTypeError(
+            f'"{text}" is not a Zenoh endpoint: it must be like tcp/192.0.2.10:7447'
+        )
+    return text
