@@ -17,7 +17,7 @@ from app.diagnose.topics import TopicChecks
 from app.dialect.dialect import DEFAULT_DIALECT, Dialect, any_hash
 from app.errors import LinkError
 from app.interfaces import load_interfaces
-from app.runtime.robot_access import ROBOT_ACCESS
+from app.runtime.robot_access import ROBOT_ACCESS, access_there
 from app.survey.model import GraphSnapshot
 from app.transport.peer import RobotAccess
 from app.transport.zenoh_config import config_from
@@ -58,11 +58,15 @@ async def check_robot(
 ) -> GraphSnapshot | None:
     """Adds all findings of a robot to the report. Returns its graph, None without a link."""
     connect = robot.entry.connect if robot.entry else ()
-    access = ROBOT_ACCESS[robot.dialect]
-    dialect = access.dialect(robot.domain, any_hash)
+    dialect = ROBOT_ACCESS[robot.dialect].dialect(robot.domain, any_hash)
     endpoints = await check_connection(report, robot.id, zenoh, connect, dialect)
     if not endpoints:
         return None
+    access, *others = await access_there(robot.dialect, config_from(zenoh, endpoints), robot.domain)
+    if others:
+        report.find("link_two_kinds", ", ".join(endpoints), robot=robot.id)
+        return None
+    dialect = access.dialect(robot.domain, any_hash)
     session = await asyncio.to_thread(
         ZenohSession, config_from(zenoh, endpoints), lambda _: None, dialect
     )

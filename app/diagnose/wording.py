@@ -91,8 +91,13 @@ ERRORS: Final[Rows] = {
     "link_no_peer": (
         _LINKS["link_no_peer"],
         "Start zenoh-bridge-ros2dds on the robot: it must listen there or connect to this router. If "
-        "the robot's nodes run on rmw_zenoh, say so by `dialect` in the panel file: the doctor reads "
-        "them then.",
+        "the robot's nodes run on rmw_zenoh, start them at this router, and set `domain` in the panel "
+        "file to their ROS_DOMAIN_ID.",
+    ),
+    "link_two_kinds": (
+        _LINKS["link_two_kinds"],
+        'Say which of them is the robot: `dialect = "bridge"` or `dialect = "rmw_zenoh"` in the panel '
+        "file.",
     ),
     "link_no_ros_node": (
         _LINKS["link_no_ros_node"],

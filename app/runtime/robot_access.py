@@ -7,9 +7,18 @@ from app.transport.auto_peer import AUTO
 from app.transport.bridge_peer import BRIDGE
 from app.transport.peer import RobotAccess
 from app.transport.rmw_zenoh_peer import RMW_ZENOH
+from app.transport.zenoh_config import Config
 
 ROBOT_ACCESS: Final[dict[DialectName, RobotAccess]] = {
     "auto": AUTO,
     "bridge": BRIDGE,
     "rmw_zenoh": RMW_ZENOH,
 }
+
+
+async def access_there(name: DialectName, config: Config, domain: int) -> list[RobotAccess]:
+    """How a command reaches the robot: the row of this dialect; if what is there decides, that of each
+    kind that is there now. Never empty."""
+    access = ROBOT_ACCESS[name]
+    kinds = await access.kinds(config, domain) if access.kinds else ()
+    return [ROBOT_ACCESS[kind] for kind in sorted(kinds)] or [access]

@@ -16,14 +16,20 @@ from typing import Final
 from app.concurrency import spawn_logged
 from app.dialect.auto_dialect import AutoDialect, Kind
 from app.dialect.bridge_dialect import EVERY_BRIDGE
+from app.dialect.dialect import any_hash
 from app.dialect.peer_traits import AMBIGUOUS_TRAITS, AUTO_TRAITS, PEER_TRAITS
 from app.dialect.rmw_zenoh_tokens import every_node
 from app.errors import LinkError
 from app.ros_logging import RobotLog
+from app.survey.model import GraphSnapshot
+from app.transport.admin_space import GraphLink
 from app.transport.bridge_graph_reader import observe_bridges
 from app.transport.bridge_peer import BridgePeer
 from app.transport.peer import Peer, RobotAccess, RobotContext
+from app.transport.rmw_zenoh_graph import graph_of, observe_nodes
 from app.transport.rmw_zenoh_peer import RmwZenohPeer
+from app.transport.zenoh_config import Config
+from app.transport.zenoh_opening import in_own_thread, tokens_for_clients
 
 log = logging.getLogger("kiosk.auto")
 
@@ -117,15 +123,9 @@ class AutoPeer:
 
     async def _kinds(self) -> set[Kind]:
         """The kinds of peers that are there now."""
-        peers = (EVERY_BRIDGE, every_node(self._dialect.nodes.domain))
+        peers = _peers(self._dialect)
         others = await self._link.tokens_for_clients(peers)
-        kinds: set[Kind] = set()
-        for token in (*self._robot.graph.peer_tokens, *others):
-            if (end := self._dialect.nodes.endpoint(token)) and end.role is None:
-                kinds.add("rmw_zenoh")
-            elif (end := self._dialect.bridge.endpoint(token)) and end.role is None:
-                kinds.add("bridge")
-        return kinds
+        return _kinds_of((*self._robot.graph.peer_tokens, *others), self._dialect)
 
     async def _choose_among(self, kinds: set[Kind]) -> None:
         if not self._robot.link_up or self._chosen is not None:
@@ -162,5 +162,38 @@ class AutoPeer:
             self._signals.link_lost.emit()
 
 
-# Commands that only read look for bridges: --dialect says that there is none.
-AUTO: Final = RobotAccess(AutoDialect, AUTO_TRAITS, AutoPeer, observe_bridges)
+def _peers(dialect: AutoDialect) -> tuple[str, ...]:
+    """The key expressions of the tokens of bridges and of nodes."""
+    return EVERY_BRIDGE, every_node(dialect.nodes.domain)
+
+
+def _kinds_of(tokens: Iterable[str], dialect: AutoDialect) -> set[Kind]:
+    """The kinds of peers whose tokens are there; nodes of panels do not count."""
+    kinds: set[Kind] = set()
+    for token in tokens:
+        if (end := dialect.nodes.endpoint(token)) and end.role is None:
+            kinds.add("rmw_zenoh")
+        elif (end := dialect.bridge.endpoint(token)) and end.role is None:
+            kinds.add("bridge")
+    return kinds
+
+
+async def present_kinds(config: Config, domain: int) -> frozenset[Kind]:
+    """The `KindsThere` of a robot of which nobody said how it is reached."""
+    dialect = AutoDialect(domain, any_hash)
+    tokens = await in_own_thread(lambda: tokens_for_clients(config, _peers(dialect)))
+    return frozenset(_kinds_of(tokens, dialect))
+
+
+async def observe_either(
+    link: GraphLink, zid: str, earlier: GraphSnapshot | None = None
+) -> GraphSnapshot:
+    """The `Observe` of the session of a panel, which was opened for the kind that is there."""
+    tokens: list[str] = []
+    with suppress(LinkError):  # a bridge is waited for
+        tokens = await link.tokens()
+    observe = observe_nodes if graph_of(tokens, zid).robots else observe_bridges
+    return await observe(link, zid, earlier)
+
+
+AUTO: Final = RobotAccess(AutoDialect, AUTO_TRAITS, AutoPeer, observe_either, present_kinds)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.dialect.dialect import Dialect, TypeHash
+from app.dialect.dialect import Dialect, DialectName, TypeHash
 from app.dialect.peer_traits import PeerTraits
 from app.interfaces import Interfaces
 from app.panel.model import Panel
@@ -61,6 +61,13 @@ class Observe(Protocol):
         Empty without a robot. LinkError without a link."""
 
 
+class KindsThere(Protocol):
+    """Finds out which kinds of peers a configuration leads to now."""
+
+    async def __call__(self, config: Config, domain: int) -> frozenset[DialectName]:
+        """Takes a second at most; empty if nothing answers."""
+
+
 @dataclass(frozen=True)
 class RobotContext:
     """One robot of a panel, the link to it, what its parts signal to each other, and the configuration
@@ -81,9 +88,11 @@ class RobotContext:
 @dataclass(frozen=True, slots=True)
 class RobotAccess:
     """How a kind of robot is reached: `dialect` makes the dialect for a ROS domain and the type hashes
-    of a panel or of a command, `peer` the peer of one robot of a panel."""
+    of a panel or of a command, `peer` the peer of one robot of a panel. `kinds` is for commands, where
+    what is there decides how it is reached."""
 
     dialect: Callable[[int, TypeHash], Dialect]
     traits: PeerTraits
     peer: Callable[[RobotContext], Peer]
     observe: Observe
+    kinds: KindsThere | None = None

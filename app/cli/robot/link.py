@@ -17,18 +17,23 @@ from app.cli.arguments import ros_domain, seconds
 from app.diagnose.findings import Finding, few
 from app.dialect.dialect import DEFAULT_DIALECT, DialectName
 from app.dialect.endpoint import within
+from app.dialect.peer_traits import PeerTraits
 from app.errors import KioskError, LinkError
 from app.interfaces import DISTROS
 from app.interfaces.names import GLOBAL, NAMESPACE
 from app.panel import load_panel
-from app.runtime.robot_access import ROBOT_ACCESS
+from app.runtime.robot_access import access_there
 from app.settings import LOOPBACK_HOSTS, Settings
 from app.survey.model import GraphSnapshot, RobotGraph, SurveyedTopic, near
+from app.transport.peer import RobotAccess
 from app.transport.robot_observer import CONNECT_S, RobotObserver
-from app.transport.zenoh_config import config_from
+from app.transport.zenoh_config import Config, config_from
 
 GONE, USAGE = 1, 2
 DEFAULT_DISTRO: Final = "jazzy"
+TWO_KINDS: Final = (
+    "a bridge and nodes on rmw_zenoh are there: say with --dialect which of them is the robot"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--connect",
         action="append",
         metavar="ENDPOINT",
-        help="the bridge, such as tcp/robot1:7447; may be given several times",
+        help="the bridge or router, such as tcp/robot1:7447; may be given several times",
     )
     add("--zenoh", type=Path, metavar="FILE", help="Zenoh configuration (KIOSK_ZENOH)")
     add(
@@ -154,20 +159,37 @@ def _is_elsewhere(endpoint: str) -> bool:
     return endpoint.partition("/")[2].rpartition(":")[0] not in LOOPBACK_HOSTS
 
 
+async def _connected(place: Place) -> tuple[RobotObserver, PeerTraits]:
+    """A connected observer of the kind of robot that is there. LinkError says what is missing."""
+    config = config_from(place.zenoh, place.connect)
+    access = await _access(place, config)
+    while True:
+        observer, traits = RobotObserver(config, access, place.domain), access.traits
+        try:
+            await observer.connect(place.within_s)
+            after = await _access(place, config) if access.kinds else access
+            if after is access:
+                return observer, traits
+            access = after  # it was not there before
+        except LinkError as error:
+            await observer.close()
+            elsewhere = traits.elsewhere_hint if any(map(_is_elsewhere, observer.endpoints)) else ""
+            raise LinkError(f"{error}: {traits.start_hint}{elsewhere}") from error
+        await observer.close()
+
+
+async def _access(place: Place, config: Config) -> RobotAccess:
+    access, *others = await access_there(place.dialect, config, place.domain)
+    if others:
+        raise LinkError(TWO_KINDS)
+    return access
+
+
 @asynccontextmanager
 async def opened(place: Place) -> AsyncIterator[tuple[RobotObserver, GraphSnapshot]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
-    access = ROBOT_ACCESS[place.dialect]
-    observer, traits = (
-        RobotObserver(config_from(place.zenoh, place.connect), access, place.domain),
-        access.traits,
-    )
+    observer, traits = await _connected(place)
     try:
-        try:
-            await observer.connect(place.within_s)
-        except LinkError as error:
-            elsewhere = traits.elsewhere_hint if any(map(_is_elsewhere, observer.endpoints)) else ""
-            raise LinkError(f"{error}: {traits.start_hint}{elsewhere}") from error
         graph = await observer.observe()
         where = ", ".join(observer.endpoints)
         if not graph.robots:
