@@ -1,6 +1,6 @@
-"""A Zenoh router for the tests: `python -m tests.support.processes.rmw_router ENDPOINT`, until SIGTERM;
-or with a configuration file in place of the endpoint. It is the same router as `zenohd`, in a session of
-eclipse-zenoh."""
+"""A Zenoh router for the tests: `python -m tests.support.processes.rmw_router ENDPOINT`, until
+SIGTERM; or with a configuration file in place of the endpoint. It is the same router as `zenohd`, in a
+session of eclipse-zenoh."""
 
 import signal
 import sys
