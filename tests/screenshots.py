@@ -19,7 +19,10 @@ PANELS: Final = {
     "example": EXAMPLE,
     "shipped": PACKAGE / "panel.toml",
     "plan": ROOT / "docs/examples/plan/panel.toml",
+    "lab-gripper": ROOT / "docs/examples/lab-gripper/panel.toml",
+    "welding-cell": ROOT / "docs/examples/welding-cell/panel.toml",
 }
+PICTURED: Final = ("lab-gripper", "welding-cell")  # of the guide to panel files
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
 ALL: Final = ROOT / "build/screenshots"
 IMAGES: Final = ROOT / "docs/images"
@@ -41,6 +44,8 @@ def main() -> None:
                     language for language in loaded.readers_languages if language != loaded.language
                 ]
                 looks += [("language", language) for language in others]
+                if name in PICTURED:
+                    take_for_guide(browser, f"{server.url}/pages/{loaded.pages[0].id}", name)
                 take_all(browser, server.url, name, paths, looks)
                 if panel == EXAMPLE:
                     take_all(browser, server.url, "gallery", {"": "/gallery"}, looks)
@@ -83,6 +88,15 @@ def take_tabs(page: Page, file: str) -> None:
     for number, tab in enumerate(page.locator(".group-tab:visible").all()):
         tab.click()
         page.screenshot(path=ALL / f"{file}-tab{number}.png")
+
+
+def take_for_guide(browser: Browser, url: str, name: str) -> None:
+    """The first page of an example."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(url)
+    page.wait_for_timeout(1000 * SETTLED_S)
+    page.screenshot(path=IMAGES / f"{name}.png")
+    page.close()
 
 
 def take_for_readme(browser: Browser, url: str) -> None:

@@ -227,7 +227,11 @@ class LogWriter:
         self.head = store.head
         if now >= self._hourly_at and not more:
             self._hourly_at = now + HOUR_S
-            log.info("operator's log: %d entries, head %s", self.head.count, self.head.hash)
+            log.info(
+                "operator's log: %d entries, head %s (for `log verify --head`)",
+                self.head.count,
+                self.head.hash,
+            )
 
     def _empty_wal(self, store: Store, quiet: bool) -> None:
         now = time.monotonic()

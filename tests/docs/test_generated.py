@@ -109,7 +109,7 @@ def found_by_schema(mistake: dict[str, str]) -> bool:
         "is not a ROS 2 service type",
         "is not the absolute name of a ROS 2 node",
         '"text" has no "min", "max", "step" and "u',  # keys of another kind
-        'unknown kind "button"; one of text,',
+        'a button is "publish" for a topic, "call" for a service',
         "is missing: of a best-effort topic",
     ],
 )
