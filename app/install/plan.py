@@ -11,6 +11,7 @@ from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
 from app.install.panel_files import copies_for, users_file
 from app.install.release import CheckedPanel, Current, Release
+from app.install.router import ROUTER, RouterConfig, needs_router, router_steps, router_unit
 from app.install.step import InstallStep
 from app.install.system import Packages, Unit, User
 
@@ -79,6 +80,7 @@ def steps(options: Options, host: Host) -> list[InstallStep]:
         CheckedPanel(release.name, PANEL),
         Current(release.name),
         *own_files(assets, options.screen),
+        *(router_steps(assets, release.name, PANEL, host) if needs_router(options.panel) else ()),
         *(_of_the_screen(options, assets) if options.screen else []),
         Unit(SERVER),
         *([Unit(SCREEN)] if options.screen else []),
@@ -128,12 +130,15 @@ def uninstall_steps(host: Host) -> list[InstallStep]:
             for name in ("panel.toml", "zenoh.json5", "kiosk.toml")
         ),
         *own_files(Assets(own_wheel()), screen=True),
+        router_unit(Assets(own_wheel())),
+        RouterConfig("", PANEL),
         OwnFile(path="/etc/sysusers.d/operator-panel.conf", content="", about=""),
         User(USER, ""),
         Masked(unit="ctrl-alt-del.target", about=""),
         OwnFile(path=TOUCH_RULE, content="", about=""),
         Unit(SERVER),
         Unit(SCREEN),
+        Unit(ROUTER),
     ]
 
 
