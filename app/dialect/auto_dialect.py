@@ -39,6 +39,10 @@ class AutoDialect:
     def as_client(self) -> bool:
         return self.chosen.as_client
 
+    @property
+    def keeps_log(self) -> bool:
+        return self.chosen.keeps_log
+
     def topic(self, key: str, type_name: str) -> str:
         return self.chosen.topic(key, type_name)
 

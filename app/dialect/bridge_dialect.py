@@ -111,6 +111,7 @@ class BridgeDialect:
 
     tokens: Final = (TOKENS,)
     as_client: Final = False
+    keeps_log: Final = False
 
     def topic(self, key: str, type_name: str) -> str:
         """The key: the bridge publishes a topic on its name."""

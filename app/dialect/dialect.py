@@ -37,6 +37,11 @@ class Dialect(Protocol):
     def as_client(self) -> bool:
         """Whether a session has to be a client of a router: routers pass on nothing between peers."""
 
+    @property
+    def keeps_log(self) -> bool:
+        """Whether the session keeps the lines of its log for nodes that subscribe late: a bridge keeps
+        them itself."""
+
     def topic(self, key: str, type_name: str) -> str:
         """The key expression on which a topic is published and subscribed to."""
 

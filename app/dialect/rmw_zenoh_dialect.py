@@ -43,6 +43,10 @@ class RmwZenohDialect:
         """Nodes are peers of the router."""
         return True
 
+    @property
+    def keeps_log(self) -> bool:
+        return True
+
     def topic(self, key: str, type_name: str) -> str:
         """The key expression; "" for any type."""
         kind = dds_type(type_name) if type_name else ANY_TYPE

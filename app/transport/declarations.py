@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from app.interfaces import Interfaces
-from app.interfaces.names import ROSOUT_TOPIC, feedback, of_action, status
+from app.interfaces.names import ROSOUT, ROSOUT_TOPIC, feedback, of_action, status
 from app.panel.model import Panel
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
@@ -20,13 +20,13 @@ Named = Iterator[tuple[str, str]]  # (key, type)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Declarations:
     """Key → key expression of each topic that is subscribed to or published, and of each service that
-    is queried. `latched` are the published ones that keep their last message. `immediate`, `lossless`
-    and `recorded` are the keys of topics for `Inbox.expect`."""
+    is queried. `latched` are the published ones that keep their last messages, with how many.
+    `immediate`, `lossless` and `recorded` are the keys of topics for `Inbox.expect`."""
 
     subscribe: Mapping[str, str] = field(default_factory=dict)
     publish: Mapping[str, str] = field(default_factory=dict)
     query: Mapping[str, str] = field(default_factory=dict)
-    latched: Collection[str] = NO_KEYS
+    latched: Mapping[str, int] = field(default_factory=dict)
     immediate: Collection[str] = NO_KEYS
     lossless: Collection[str] = NO_KEYS
     recorded: Collection[str] = NO_KEYS
@@ -42,7 +42,7 @@ def declarations(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Dec
         subscribe={key: topic(key, name) for key, name in _subscribed(panel, interfaces, robot)},
         publish={key: topic(key, name) for key, name in _published(panel, robot)},
         query={key: service(key, name) for key, name in _queried(panel, interfaces, robot)},
-        latched=frozenset(_latched(panel, robot)),
+        latched=dict(_latched(panel, robot)),
     )
 
 
@@ -60,12 +60,15 @@ def _published(panel: Panel, robot: RobotState) -> Named:
         yield from ((key, name) for key in robot.possible_keys(topic))
 
 
-def _latched(panel: Panel, robot: RobotState) -> Iterator[str]:
-    """Not of holds: a subscriber that comes late must not begin to move."""
+def _latched(panel: Panel, robot: RobotState) -> Iterator[tuple[str, int]]:
+    """(key, messages that are kept). Not of holds: a subscriber that comes late must not begin to move.
+    Of a command the last one only."""
     held = {w.topic for w in panel.widgets() if isinstance(w, HoldCommand)}
     for topic in panel.publications():
         if topic not in held and panel.qos(topic).wire_qos.transient_local:
-            yield robot.key(topic)
+            yield robot.key(topic), 1
+    if robot.dialect.keeps_log:
+        yield robot.key(ROSOUT_TOPIC), ROSOUT.depth
 
 
 def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:

@@ -25,23 +25,23 @@ class Publisher(Protocol):
         """An object of Zenoh's, whose `matching` tells whether there is a subscriber."""
 
 
-def declare_publisher(session: zenoh.Session, expression: str, *, latched: bool) -> Publisher:
-    """A publisher. If it is `latched`, a subscriber that comes late gets its last message, also if none
-    was there when it was put. What it keeps ends with the session: nothing is sent again after the
+def declare_publisher(session: zenoh.Session, expression: str, *, kept: int) -> Publisher:
+    """A publisher. A subscriber that comes late gets its last `kept` messages, also if none was there
+    when they were put. What it keeps ends with the session: nothing is sent again after the
     connection was lost."""
     plain: Publisher = session.declare_publisher(expression, **SETTINGS)
-    return _Latched(session, expression, plain) if latched else plain
+    return _Latched(session, expression, plain, kept) if kept else plain
 
 
 class _Latched:
     """Zenoh's publisher with a cache does not tell who listens: a plain one does."""
 
-    def __init__(self, session: zenoh.Session, expression: str, plain: Publisher) -> None:
+    def __init__(self, session: zenoh.Session, expression: str, plain: Publisher, kept: int) -> None:
         self._plain = plain
         self._cached = declare_advanced_publisher(
             session,
             expression,
-            cache=CacheConfig(max_samples=1),
+            cache=CacheConfig(max_samples=kept),
             publisher_detection=True,
             # Orders by number: timestamps of one's own would replace those of clocks that are ahead.
             sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),

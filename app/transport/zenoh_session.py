@@ -97,7 +97,7 @@ class ZenohSession:
             )
             self._publishers = {
                 key: declare_publisher(
-                    self._session, publication, latched=key in self._declared.latched
+                    self._session, publication, kept=self._declared.latched.get(key, 0)
                 )
                 for key, publication in self._declared.publish.items()
             }

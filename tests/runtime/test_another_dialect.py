@@ -65,6 +65,7 @@ class TinyDialect:
 
     tokens = ("tiny/*/**",)
     as_client = False
+    keeps_log = False
 
     def topic(self, key: str, type_name: str) -> str:
         return f"7/{key}/{type_name.replace('/', '::')}/*"

@@ -2,6 +2,7 @@
 processes; the node makes its keys, tokens and attachments by itself and ends at what is not whole."""
 
 import asyncio
+import logging
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -15,6 +16,7 @@ from app.i18n import say
 from app.panel.model import Panel
 from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
+from app.transport.rosout import LOG_TYPE
 from app.transport.zenoh_config import config_to
 from tests.support.builders import (
     BOOL,
@@ -29,6 +31,7 @@ from tests.support.builders import (
 from tests.support.parts import ENOUGH_S
 from tests.support.rmw import RmwNode, Router
 
+log = logging.getLogger("kiosk.test")
 CALL = {
     "id": "reset",
     "kind": "call",
@@ -167,6 +170,23 @@ def test_the_panel_is_a_node_with_its_endpoints_and_each_panel_has_its_name(
                 assert first.robot.graph.nodes == {"/arm"}  # a panel is no robot
             await when(lambda: "/web_ui_2" not in robot.nodes())
         await when(lambda: robot.nodes() == ["/arm"], "the panel has left")
+
+    asyncio.run(scene())
+
+
+def test_the_panels_log_is_kept_for_nodes_that_subscribe_late(router: Router, robot: RmwNode) -> None:
+    async def scene() -> None:
+        async with session_with(router, panel()) as session:
+            await when(partial(enabled, session))
+            late = await asked(RmwNode, router, "late")
+            try:
+                await when(lambda: "/late" in session.robot.graph.nodes, "its line is written")
+                log.warning("said before the node subscribes")
+                of_logs = {"durability": "transient_local", "depth": 1000}
+                await asked(partial(late.subscribe, "/rosout", LOG_TYPE, **of_logs))
+                await when(lambda: "said before the node subscribes" in str(late.heard("/rosout")))
+            finally:
+                await asked(late.end)
 
     asyncio.run(scene())
 
