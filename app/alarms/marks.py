@@ -17,10 +17,9 @@ class AlarmMarks:
 
     def __init__(self, panel: Panel) -> None:
         self._alarms = {
-            alarm.id: alarm
-            for alarm in panel.alarms
-            if alarm.state is not None or any(alarm.marked_values)
+            alarm.id: alarm for alarm in panel.alarms if alarm.state is not None or alarm.marked_values
         }
+        self._unmarked: dict[str, Mapping[Value, int]] = {}  # robot → 0 of each value
         self._state_topic = panel.state.topic if panel.state else None
         self._active: dict[str, dict[str, AlarmRow]] = {}  # robot → id → row
         self._changed: dict[str, set[str]] = {}  # robot → topics
@@ -49,8 +48,11 @@ class AlarmMarks:
 
     def of_robot(self, robot: str) -> AlarmedValues:
         """The marks of a robot as they are now."""
-        marked = (alarm for alarm in self._alarms.values() if alarm.is_for(robot or None))
-        priorities: dict[Value, int] = {value: 0 for alarm in marked for value in alarm.marked_values}
+        if robot not in self._unmarked:
+            marked = (alarm for alarm in self._alarms.values() if alarm.is_for(robot or None))
+            values = (value for alarm in marked for value in alarm.marked_values)
+            self._unmarked[robot] = dict.fromkeys(values, 0)
+        priorities = dict(self._unmarked[robot])
         state: AlarmedState | None = None
         for row in sorted(self._active.get(robot, {}).values(), key=lambda row: row["order"]):
             alarm = self._alarms[_alarm_id(row)]

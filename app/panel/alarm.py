@@ -163,7 +163,7 @@ class Alarm(Description):
     diagnostics: Patterns | None = None
     listed: AlarmList | None = Field(None, alias="list")
 
-    @property
+    @cached_property
     def source(self) -> SourceKind | None:
         """From what it is raised; None if no key says so."""
         return next((SOURCE_KEYS[key] for key in self.given_source_keys), None)
@@ -191,14 +191,12 @@ class Alarm(Description):
         catalogue = self.listed.catalogue if self.listed else None
         return self.action is not None or catalogue is not None
 
-    @property
-    def marked_values(self) -> Iterator[tuple[str, str]]:
+    @cached_property
+    def marked_values(self) -> tuple[tuple[str, str], ...]:
         """The topics and fields of the values that it is about: those of its limits and its
         condition."""
-        if self.source == "limits" and self.topic is not None:
-            yield self.topic, self.field
-        if self.when is not None:
-            yield self.when.topic, self.when.field
+        limited = [(self.topic, self.field)] if self.source == "limits" and self.topic else []
+        return (*limited, *([(self.when.topic, self.when.field)] if self.when else []))
 
     @property
     def evaluated_topics(self) -> tuple[str, ...]:

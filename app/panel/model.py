@@ -219,7 +219,7 @@ class Panel(Description):
         """Those with an id, interlocks first."""
         return (*self.interlocks, *self.own_conditions)
 
-    @property
+    @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """All that are judged: each message counts, and a value of unknown age is known to be one."""
         return (*self.named_conditions, *(c for alarm in self.alarms for c in alarm.conditions))
@@ -233,12 +233,12 @@ class Panel(Description):
         """Topic → type of all subscriptions."""
         own = {confirm.topic: confirm.type for confirm in self.confirmations() if confirm.type}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        shown = {source.topic: source.type for source in self.monitored() if not source.on_demand}
+        shown = {source.topic: source.type for source in self.monitored if not source.on_demand}
         return own | shown | events
 
     def on_demand(self) -> dict[str, str]:
         """Topic → type of all topics that are subscribed to only while a browser shows them."""
-        return {source.topic: source.type for source in self.monitored() if source.on_demand}
+        return {source.topic: source.type for source in self.monitored if source.on_demand}
 
     def listened(self) -> dict[str, str]:
         """Topic → type of all subscriptions, also of those that are there only at times."""
@@ -247,7 +247,7 @@ class Panel(Description):
     def subscribed_fields(self) -> dict[str, list[str]]:
         """Topic → paths of the fields that the panel reads."""
         paths: dict[str, list[str]] = {}
-        for source in self.monitored():
+        for source in self.monitored:
             if not source.on_demand:
                 paths.setdefault(source.topic, []).extend(source.fields)
         for confirm in self.confirmations():
@@ -258,13 +258,14 @@ class Panel(Description):
         """The topics that confirm commands."""
         return (confirm for command in self.commands for confirm in confirms_of(command))
 
-    def monitored(self) -> Iterator[TopicSource]:
-        """What conditions, alarms and displays listen to."""
-        for condition in self.conditions:
-            yield TopicSource(condition.topic, condition.type, condition.qos, (condition.field,))
-        yield from (source for alarm in self.alarms for source in alarm.sources())
-        yield from (source for widget in self.displays for source in widget.sources())
-        yield from (source for command in self.commands for source in command.sources())
+    @cached_property
+    def monitored(self) -> tuple[TopicSource, ...]:
+        """What conditions, alarms and displays listen to, each once."""
+        judged = (TopicSource(c.topic, c.type, c.qos, (c.field,)) for c in self.conditions)
+        alarmed = (source for alarm in self.alarms for source in alarm.sources())
+        shown = (source for widget in self.displays for source in widget.sources())
+        pressed = (source for command in self.commands for source in command.sources())
+        return tuple(dict.fromkeys((*judged, *alarmed, *shown, *pressed)))
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""
@@ -286,15 +287,14 @@ class Panel(Description):
 
     @cached_property
     def adaptive_topics(self) -> frozenset[str]:
-        """The topics that are only shown, and whose reliability the panel file leaves to the
-        publisher."""
+        """Topics that are only shown, and whose reliability is their publisher's."""
         needed = [source for command in self.commands for source in command.sources()]
-        explicit = [source for source in self.monitored() if source.qos.reliability is not None]
+        explicit = [source for source in self.monitored if source.qos.reliability is not None]
         strict = {source.topic for source in (*needed, *explicit)} | {c.topic for c in self.conditions}
-        return frozenset(source.topic for source in self.monitored()) - strict
+        return frozenset(source.topic for source in self.monitored) - strict
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, the same in all places of the panel file."""
-        named = {w.topic: w.qos for w in self.senders() if isinstance(w, TopicWidget)}
-        named |= {source.topic: source.qos for source in self.monitored()}
-        return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())
+        heard = (source.qos for source in self.monitored if source.topic == topic)
+        sent = (w.qos for w in self.senders() if isinstance(w, TopicWidget) and w.topic == topic)
+        return (*heard, *sent, EVENTS_QOS if topic == EVENTS else TopicQos())[0]

@@ -247,7 +247,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
 
 def test_a_best_effort_publisher_does_not_mismatch_a_topic_that_is_only_shown() -> None:
     robot = robot_there(small_panel())
-    heard = next(source for source in small_panel().monitored() if source.topic == "/heard")
+    heard = next(source for source in small_panel().monitored if source.topic == "/heard")
     endpoint(robot, "MP", "/heard", TEXT, qos=Qos(reliable=False))
     assert topic_mismatch("MS", heard, robot) is None
     robot.reliable_readers = {robot.key("/heard")}
