@@ -28,6 +28,14 @@ class Limit(NamedTuple):
         margin = self.deadband if before else 0.0
         return value > self.value - margin if self.is_high else value < self.value + margin
 
+    def range_as(self, exceeded: bool) -> tuple[float, float]:
+        """The lowest and the highest value by which it stays exceeded, or not exceeded."""
+        margin = self.deadband if exceeded else 0.0
+        edge = self.value - margin if self.is_high else self.value + margin
+        if self.is_high:
+            return (math.nextafter(edge, math.inf), math.inf) if exceeded else (-math.inf, edge)
+        return (-math.inf, math.nextafter(edge, -math.inf)) if exceeded else (edge, math.inf)
+
 
 class Delays(NamedTuple):
     """For how many seconds a condition is met, or no longer met, before that counts."""

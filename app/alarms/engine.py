@@ -10,13 +10,14 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from typing import Final
 
 from app.alarms.entries import AlarmEntry
-from app.alarms.evaluation import levels_of, read_alarm
+from app.alarms.evaluation import levels_of, read_alarm, steady_range
 from app.alarms.first_out import FirstOut
-from app.alarms.instance import AlarmInstance, Definition, Transition, define
+from app.alarms.instance import NEVER_STEADY, AlarmInstance, Definition, Transition, define
 from app.alarms.records import entry_in, leader_in, status_in
 from app.alarms.source_watch import SourceWatch
 from app.alarms.sources import read_suppression
 from app.alarms.status import ActResult, AlarmStatus, Moment, expire, update_level, update_suppression
+from app.alarms.topic_alarms import TopicAlarms
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
@@ -45,7 +46,7 @@ class AlarmEngine:
         self._seq = 0
         self._waiting: dict[str, None] = {}  # ids of alarms to be evaluated, in order
         self._timers: list[tuple[float, str]] = []  # a heap; an alarm's own `due` is what counts
-        self._by_topic: dict[tuple[str, str], list[str]] = {}
+        self._topics = TopicAlarms()
         self._by_robot: dict[str, list[str]] = {}
         self._sources: dict[tuple[str, str], Definition] = {}  # (robot, alarm's id) → of its entries
         self._entries: dict[tuple[str, str], list[AlarmInstance]] = {}  # by the same
@@ -70,14 +71,9 @@ class AlarmEngine:
             self._entries[robot, alarm.id] = []
             self._inhibit(self._watch.add(definition))
             return
-        self._keep(definition)
+        instance = self._keep(definition)
         for topic in alarm.evaluated_topics:
-            self._listen(definition, topic)
-
-    def _listen(self, definition: Definition, topic: str) -> None:
-        """Evaluates an alarm after each message of a topic."""
-        for key in self._robots[definition.robot].possible_keys(topic):
-            self._by_topic.setdefault((definition.robot, key), []).append(definition.id)
+            self._topics.listen(instance, self._robots[robot].possible_keys(topic))
 
     def _keep(self, definition: Definition) -> AlarmInstance:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
@@ -93,7 +89,7 @@ class AlarmEngine:
     @property
     def due(self) -> float:
         """When the next evaluation is due (monotonic seconds): 0 if alarms wait for it."""
-        if self._waiting:
+        if self._waiting or self._topics.has_changed:
             return 0.0
         return min(self._timers[0][0] if self._timers else math.inf, self._watch.due)
 
@@ -107,8 +103,7 @@ class AlarmEngine:
 
     def topics_changed(self, robot: str, keys: Iterable[str]) -> None:
         """Messages arrived on topics of a robot."""
-        for key in keys:
-            self._waiting.update(dict.fromkeys(self._by_topic.get((robot, key), ())))
+        self._topics.note(robot, keys)
 
     def robot_changed(self, robot: str) -> None:
         """The link to a robot, or its graph, has changed."""
@@ -124,6 +119,7 @@ class AlarmEngine:
         """Evaluates the alarms that wait, and those whose time has come: `most` of them."""
         now = self._clock()
         self._watch.expire(self._robots, now.monotonic)
+        self._waiting.update(dict.fromkeys(self._topics.take(self._robots, now.monotonic)))
         while self._timers and self._timers[0][0] <= now.monotonic:
             at, alarm_id = heapq.heappop(self._timers)
             alarm = self.alarms[alarm_id]
@@ -181,7 +177,8 @@ class AlarmEngine:
         self._entry_count += 1
         alarm = self._keep(definition)
         if definition.alarm.suppressed_while is not None:
-            self._listen(definition, definition.alarm.suppressed_while.topic)
+            topic = definition.alarm.suppressed_while.topic
+            self._topics.listen(alarm, self._robots[definition.robot].possible_keys(topic))
         self._entries[definition.robot, definition.alarm.id].append(alarm)
         return alarm
 
@@ -208,6 +205,7 @@ class AlarmEngine:
         status = update_suppression(status, definition.rules, suppression.met is True, now)
         alarm.status, alarm.is_evaluated = status, True
         alarm.value = reading.value if reading.is_known else alarm.value
+        alarm.steady = NEVER_STEADY if reading.value is None else steady_range(alarm)
         self._set_due(alarm, min(reading.until, suppression.until))
         self._note_lock(alarm, lock)
         if not status.is_same_to_operators(before):

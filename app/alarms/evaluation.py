@@ -3,7 +3,7 @@
 import math
 
 from app.alarms.delays import DelayedCondition
-from app.alarms.instance import AlarmInstance
+from app.alarms.instance import NEVER_STEADY, AlarmInstance
 from app.alarms.sources import UNKNOWN, SourceReading, read_source
 from app.robot.state import RobotState
 
@@ -25,6 +25,17 @@ def read_alarm(
     if now >= stale_at:
         return UNKNOWN
     return SourceReading(met=entry.level > 0, until=stale_at)
+
+
+def steady_range(alarm: AlarmInstance) -> tuple[float, float]:
+    """The lowest and the highest value that change nothing of an alarm whose source is known."""
+    low, high = -math.inf, math.inf
+    for limit, condition in zip(alarm.definition.thresholds, alarm.conditions, strict=True):
+        if limit is None or condition.met != condition.active:
+            return NEVER_STEADY
+        lowest, highest = limit.range_as(condition.met)
+        low, high = max(low, lowest), min(high, highest)
+    return low, high
 
 
 def levels_of(

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, cast
+from typing import Final, NamedTuple, cast
 
 from app.alarms.delays import LIMIT_LEVELS, DelayedCondition, Delays, Limit, LimitName
 from app.alarms.entries import AlarmEntry
@@ -62,6 +62,9 @@ def _define(alarm: Alarm, robot: str) -> Definition:
     )
 
 
+NEVER_STEADY: Final = (math.inf, -math.inf)
+
+
 class Leader(NamedTuple):
     """An alarm that another one follows: it was raised `after_s` seconds before that."""
 
@@ -74,8 +77,9 @@ class Leader(NamedTuple):
 class AlarmInstance:
     """`value` is the last one of its field, `limit` the last limit that it exceeded. `entry` is what
     the robot published, for diagnostics and lists, and `heard_at` when. `leader` is the alarm of its
-    group that it followed when it was raised, None if there was none. `due` is when time alone
-    changes it, and `timer` when the engine looks at that. All in monotonic seconds."""
+    group that it followed when it was raised, None if there was none. `steady` is the range of values
+    that change nothing. `due` is when time alone changes it, and `timer` when the engine looks at that.
+    All in monotonic seconds."""
 
     definition: Definition
     status: AlarmStatus = NORMAL
@@ -85,6 +89,7 @@ class AlarmInstance:
     entry: AlarmEntry | None = None
     heard_at: float = -math.inf
     leader: Leader | None = None
+    steady: tuple[float, float] = NEVER_STEADY
     is_evaluated: bool = False
     due: float = math.inf
     timer: float = math.inf
@@ -103,7 +108,7 @@ class AlarmInstance:
 
     def restore(self, status: AlarmStatus) -> None:
         """Takes over the status of an earlier run, with what counted as met then."""
-        self.status = status
+        self.status, self.steady = status, NEVER_STEADY
         self.conditions = tuple(
             DelayedCondition(met, met)
             for limit in self.definition.thresholds

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.alarms.delays import DelayedCondition, Delays, Limit, level_of
+from app.alarms.delays import DelayedCondition, Delays, Limit, LimitName, level_of
 
 HIGH, HIGH_HIGH = Limit("high", 80.0, deadband=5.0), Limit("high_high", 95.0)
 LOW, LOW_LOW = Limit("low", 5.0, deadband=0.5), Limit("low_low", 2.0)
@@ -31,6 +31,23 @@ def test_limit_stays_exceeded_until_the_value_is_past_the_deadband(
     limit: Limit, value: float, before: bool, exceeded: bool
 ) -> None:
     assert limit.is_exceeded(value, before) is exceeded
+
+
+@given(
+    st.sampled_from(["low", "high", "low_low", "high_high"]),
+    st.floats(-1e6, 1e6),
+    st.floats(0, 100),
+    st.booleans(),
+    st.floats(allow_nan=False) | st.floats(-0.01, 0.01),
+)
+def test_only_a_value_within_the_range_leaves_a_limit_as_it_is(
+    name: LimitName, value: float, deadband: float, before: bool, heard: float
+) -> None:
+    limit = Limit(name, value, deadband)
+    lowest, highest = limit.range_as(before)
+    edge = next(edge for edge in (lowest, highest) if not math.isinf(edge))
+    for value in (heard, edge, math.nextafter(edge, math.inf), math.nextafter(edge, -math.inf)):
+        assert (limit.is_exceeded(value, before) is before) is (lowest <= value <= highest)
 
 
 def test_the_level_is_that_of_the_limit_farthest_out() -> None:

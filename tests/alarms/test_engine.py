@@ -1,17 +1,20 @@
 """Alarms of a panel are raised from what its robots publish; only those that may have changed are
 evaluated."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from app.alarms import evaluation
+from app.alarms import engine, evaluation
 from app.alarms.engine import MAX_ENTRIES, MAX_EVALUATED, AlarmEngine
 from app.alarms.entries import entries_of
-from app.alarms.instance import Definition, Transition
+from app.alarms.instance import NEVER_STEADY, AlarmInstance, Definition, Transition
 from app.alarms.sources import read_source
 from app.alarms.states import State
 from app.alarms.status import (
@@ -348,6 +351,45 @@ def test_an_evaluation_reads_only_alarms_that_may_have_changed(
     air.engine.evaluate()
     assert len(read) == 500 + MAX_EVALUATED
     assert air.engine.due == 0.0
+
+
+def test_a_value_that_no_limit_notices_evaluates_no_alarm(
+    cell: partial[Cell], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = "".join(AIR.replace('"air"', f'"air{i}"') for i in range(1_000))
+    air = cell(many)
+    evaluated: list[str] = []
+
+    def counted(alarm: AlarmInstance, *about: Any) -> Any:
+        evaluated.append(alarm.definition.id)
+        return evaluation.levels_of(alarm, *about)
+
+    monkeypatch.setattr(engine, "levels_of", counted)
+    for value, times in ((6.0, 1_000), (5.2, 0), (5.0, 0), (4.5, 1_000), (5.4, 0), (5.5, 1_000)):
+        evaluated.clear()
+        air.publish(value)
+        assert (len(evaluated), air.engine.alarms["air7"].value) == (times, value)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.sampled_from([3.9, 4.2, 4.6, 5.2, 6.0, math.nan]), st.floats(0, 4))))
+def test_values_that_are_passed_over_change_no_transition(
+    cell: partial[Cell], heard: list[tuple[float, float]]
+) -> None:
+    alarms = DELAYED + OLD.replace('"air"', '"old"')
+
+    def transitions(passes_over: bool) -> list[Transition]:
+        air = cell(alarms)
+        for value, seconds in heard:
+            air.now += seconds
+            air.engine.evaluate()
+            if not passes_over:
+                for alarm in air.engine.alarms.values():
+                    alarm.steady = NEVER_STEADY
+            air.publish(value)
+        return [t._replace(value=None) for t in air.transitions]
+
+    assert transitions(passes_over=True) == transitions(passes_over=False)
 
 
 def test_controls_are_locked_until_a_robot_has_published_its_alarms(cell: partial[Cell]) -> None:
