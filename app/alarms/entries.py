@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
+from app.errors import DecodeError
 from app.i18n import TextLike
 from app.panel.alarm import Alarm, AlarmList
 from app.panel.fault_catalogue import Catalogue, FaultTexts
@@ -51,6 +52,16 @@ def entries_of(
             yield AlarmEntry(
                 readable(name[:LONGEST_NAME]), level, text, alarm.priorities, details=details
             )
+
+
+def with_key_values(row: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The row of a status with its key values in place of the function that reads them: none where it
+    is OK, or where they are no texts."""
+    *others, read = row
+    try:
+        return (*others, read() if _number(row[1]) else ())
+    except DecodeError:
+        return (*others, ())
 
 
 def status_key(row: tuple[Any, ...]) -> tuple[Any, ...]:

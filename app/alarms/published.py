@@ -9,7 +9,13 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from app.alarms.entries import DIAGNOSTIC_FIELDS, AlarmEntry, entries_of, status_key
+from app.alarms.entries import (
+    DIAGNOSTIC_FIELDS,
+    AlarmEntry,
+    entries_of,
+    status_key,
+    with_key_values,
+)
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import Interfaces, RowReader, Rows, Walk
@@ -78,6 +84,7 @@ class _Source:
         return [entry for row in rows if (entry := self._status(row)) is not None]
 
     def _status(self, row: tuple[Any, ...]) -> AlarmEntry | None:
+        row = with_key_values(row)
         name, heard = row[0], status_key(row)
         known = self.statuses.get(name)
         if known is None or known[0] != heard:
@@ -114,7 +121,7 @@ def _sources(panel: Panel, robot: str, interfaces: Interfaces) -> Iterator[_Sour
             path, fields, most = STATUS, DIAGNOSTIC_FIELDS, MAX_STATUSES
         else:
             continue
-        reader = interfaces.row_reader(type_name, path, fields, most)
+        reader = interfaces.row_reader(type_name, path, fields, most, last_later=listed is None)
         catalogue: Catalogue = {}
         if listed is not None and listed.catalogue is not None:
             catalogue = read_catalogue(listed.catalogue, panel.language)
@@ -151,7 +158,11 @@ class PublishedAlarms:
             source.queued.add(sample, len(sample.payload))
         if not self._scheduled:
             self._scheduled = True
-            self._slices.schedule(self._decode)
+            self._slices.schedule_calmly(self._decode, self._is_behind)
+
+    def _is_behind(self) -> bool:
+        """Whether messages arrive faster than they are decoded."""
+        return any(len(source.queued) > 1 for source in self._sources)
 
     def _decode(self, until: float) -> bool:
         """Decodes until a time (monotonic seconds); returns whether nothing is left."""

@@ -136,13 +136,19 @@ class Interfaces:
         return self._field_readers[key]
 
     def row_reader(
-        self, type_name: str, path: str, fields: Sequence[str | None], most: int
+        self,
+        type_name: str,
+        path: str,
+        fields: Sequence[str | None],
+        most: int,
+        last_later: bool = False,
     ) -> RowReader:
         """A reader of the fields of each element of the list at a path, up to `most` elements; None is
-        the element itself. InterfaceError if the type has no such field."""
+        the element itself. With `last_later` a row has a function that reads its last field.
+        InterfaceError if the type has no such field."""
         self.require(type_name)
         wanted = self._resolver.select_rows(type_name, path, fields)
-        return self._codec.row_reader(type_name, wanted, fields, most)
+        return self._codec.row_reader(type_name, wanted, fields, most, last_later)
 
     def type_hash(self, type_name: str) -> str:
         """The REP 2016 type hash, `RIHS01_…`, of a message, a part, a service or an action.

@@ -15,6 +15,8 @@ from app.interfaces import FieldReader, Fields, Walk
 
 FIRST_SHARE_S: Final = 0.01  # of a turn in which messages arrive, for all of them
 LATER_SHARE_S: Final = 0.003  # of each later turn
+CALM_SHARE_S: Final = 0.001  # of a turn, for what may wait a moment
+CALM_PAUSE_S: Final = 0.004  # then
 SMALL_BYTES: Final = 2_000  # decoded at once, however much has arrived in this turn
 
 Resume = Callable[
@@ -61,6 +63,15 @@ class Slices:
         if len(self._pending) == 1:
             loop.call_soon(self._resume_next)
 
+    def schedule_calmly(self, go_on: Resume, is_behind: Callable[[], bool]) -> None:
+        """The same in shorter slices, with pauses in which presses go on, until it is behind."""
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            self.schedule(go_on)
+            return
+        loop.call_soon(self._resume_calmly, loop, go_on, is_behind)
+
     async def read_all(self, reader: FieldReader, data: bytes) -> Fields:
         """Decodes a message, over as many turns as needed; DecodeError if the bytes are no such
         message."""
@@ -93,6 +104,16 @@ class Slices:
 
     def _end_turn(self) -> None:
         self._until = None
+
+    def _resume_calmly(
+        self, loop: asyncio.AbstractEventLoop, go_on: Resume, is_behind: Callable[[], bool]
+    ) -> None:
+        if go_on(self._now() + CALM_SHARE_S):
+            return
+        if is_behind():
+            self.schedule(go_on)
+        else:
+            loop.call_later(CALM_PAUSE_S, self._resume_calmly, loop, go_on, is_behind)
 
     def _resume_next(self) -> None:
         """Continues the next pending message, round robin."""

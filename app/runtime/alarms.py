@@ -32,7 +32,7 @@ from app.runtime.robot_alarms import RobotAlarms
 
 log = logging.getLogger("kiosk.alarms")
 
-AT_ONCE: Final = 25  # alarms that are evaluated in one turn: 2 ms if all are raised
+AT_ONCE: Final = 10  # alarms that are evaluated in one turn: 1 ms if all are raised
 REFRESH_EVERY_S: Final = 1.0  # what robots say of alarms that stand
 SHOW_EVERY_S: Final = 0.05
 ROWS_AT_ONCE: Final = 100  # that have changed: 10 ms to render

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.alarms.entries import AlarmEntry
+from app.alarms.entries import LONGEST_TEXT, AlarmEntry
 from app.alarms.published import CHUNK, MAX_QUEUED, MAX_STATUSES, PublishedAlarms
 from app.i18n import render
 from app.panel import load_panel
@@ -62,6 +62,44 @@ def test_a_status_has_its_message_and_key_values(tmp_path: Path) -> None:
     (entry,) = robot.entries
     assert (entry.name, entry.level, entry.text) == ("motor 7", 2, "Hot")
     assert entry.details == "rpm: 1200, load: 80 %"
+
+
+def test_a_status_is_read_again_where_it_has_changed(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    hot: dict[str, Any] = {"name": "motor 7", "level": 2, "message": "Hot"}
+    rpm = [{"key": "rpm", "value": "1200"}]
+    for status in (
+        {**hot, "level": 0, "message": "OK"},
+        {**hot, "values": rpm},
+        {**hot, "values": rpm},
+        {**hot, "values": [{"key": "rpm", "value": "900"}]},
+        {**hot, "level": 1, "values": rpm},
+        {**hot, "hardware_id": "m7", "message": "", "values": rpm},
+    ):
+        robot.entries.clear()
+        robot.send({"name": "lamp", "level": 0}, status, {**status, "name": "motor 8"})
+        level, text = status["level"], status["message"] or "m7"
+        details = f"rpm: {status['values'][0]['value']}" if level else ""
+        expected = [("motor 7", level, text, details), ("motor 8", level, text, details)]
+        assert [(e.name, e.level, e.text, e.details) for e in robot.entries] == expected
+
+
+def test_a_status_whose_key_values_are_no_texts_is_an_alarm(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    values = [{"key": "rpm", "value": "1200"}]
+    payload = INTERFACES.encode(ARRAY, {"status": [{"name": "motor 7", "level": 2, "values": values}]})
+    robot.send_bytes(payload.replace(b"1200", b"12\xff\xff"))
+    ((name, level, details),) = [(e.name, e.level, e.details) for e in robot.entries]
+    assert (name, level, details) == ("motor 7", 2, "")
+
+
+def test_statuses_of_any_length_are_read(tmp_path: Path) -> None:
+    robot = received(tmp_path, HEALTH)
+    texts = ["a" * n for n in (1, 2, 3, 4, 5, 990, 999, 1_000, 1_001, 5_000)]
+    for _ in range(2):
+        robot.entries.clear()
+        robot.send(*({"name": f"motor {i}", "level": 1, "message": t} for i, t in enumerate(texts)))
+        assert [str(entry.text) for entry in robot.entries] == [t[:LONGEST_TEXT] for t in texts]
 
 
 def test_a_message_with_more_statuses_than_are_read_is_bounded(tmp_path: Path) -> None:

@@ -64,11 +64,16 @@ class Codec:
         return FieldReader(name, ops, self._fields_and_class, calls)
 
     def row_reader(
-        self, name: str, wanted: Selection, fields: Sequence[str | None], most: int
+        self,
+        name: str,
+        wanted: Selection,
+        fields: Sequence[str | None],
+        most: int,
+        last_later: bool = False,
     ) -> RowReader:
         """A reader of the selected fields of each element of a list."""
         ops = self._plans.make_program(name, wanted)
-        return RowReader(name, ops, self._fields_and_class, fields, most)
+        return RowReader(name, ops, self._fields_and_class, fields, most, last_later)
 
     def message_class(self, name: str) -> type[Any]:
         """The class of a structure's message objects: fields as attributes, constants on the class."""

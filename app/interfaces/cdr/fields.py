@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from functools import partial
+from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from app.errors import DecodeError
 from app.interfaces.cdr.encapsulation import check_end, split_header
 from app.interfaces.cdr.formats import is_number
+from app.interfaces.cdr.layout import PHASES
 from app.interfaces.cdr.reader import ByteOrder, Read, value_reader
 from app.interfaces.cdr.scanner import Scan
 from app.interfaces.cdr.steps import Mark, Op
@@ -42,6 +44,7 @@ class Fields:
         return path in self._ambiguous
 
 
+LONGEST_KNOWN: Final = 1_000  # bytes of the values that are kept
 Result = TypeVar("Result", covariant=True)
 
 
@@ -185,8 +188,9 @@ class FieldReader(_Program):
 
 
 class Rows(NamedTuple):
-    """The values of the fields of a list's elements, in the fields' order; `total` is the number of all
-    elements, also of those beyond the most that are read."""
+    """The values of the fields of a list's elements, in the fields' order, and a function in place of
+    the last if that is read later; `total` is the number of all elements, also of those beyond the most
+    that are read."""
 
     values: list[tuple[Any, ...]]
     total: int
@@ -216,13 +220,48 @@ class _RowWalk(_MessageWalk):
         for marks in scan.rows:
             self._count += 1
             if self._count <= most:
-                values = {path: self.value_at(m, at) for m, at in marks.items() for path in m.paths}
+                if self._reader.last_later:
+                    self._rows.append(self._known(marks))
+                    continue
+                values = self._read(marks)
                 self._rows.append(tuple(values.get(name or "") for name in fields))
         scan.rows.clear()
 
+    def _read(self, marks: Mapping[Mark, int]) -> dict[str, Any]:
+        return {path: self.value_at(mark, at) for mark, at in marks.items() for path in mark.paths}
+
+    def _known(self, marks: dict[Mark, int]) -> tuple[Any, ...]:
+        """The row with a function that reads its last value: the values before it are the same as of
+        the same bytes before."""
+        assert isinstance(self._reader, RowReader)
+        fields, known, offsets = self._reader.fields, self._reader.known, tuple(marks.values())
+        start, end, last = offsets[0], offsets[-1], next(reversed(marks))
+        if fields[-1] not in last.paths:  # it is not behind the others
+            read = self._read(marks)
+            return (*(read.get(name or "") for name in fields[:-1]), partial(read.get, fields[-1]))
+        later = partial(self._read_later, last, end)
+        key = self._order, start % PHASES, bytes(self._body[start : min(end, start + LONGEST_KNOWN)])
+        values = known.get(key)
+        if values is None:
+            read = self._read({mark: at for mark, at in marks.items() if mark is not last})
+            values = tuple(read.get(name or "") for name in fields[:-1])
+            if end - start < LONGEST_KNOWN:
+                if len(known) >= self._reader.most:
+                    known.clear()
+                known[key] = values
+        return (*values, later)
+
+    def _read_later(self, mark: Mark, at: int) -> Any:
+        try:
+            return self.value_at(mark, at)
+        except Exception as error:  # no received bytes may stop the panel
+            raise self.failed(error) from error
+
 
 class RowReader(_Program):
-    """Reads the same fields of each element of a list, up to `most` elements."""
+    """Reads the same fields of each element of a list, up to `most` elements. `last_later`: the last
+    one is read only where its value is asked for. `known` has the values before it, by the order and
+    the phase of their bytes and by these."""
 
     def __init__(
         self,
@@ -231,10 +270,13 @@ class RowReader(_Program):
         make: StructureFactory,
         fields: Sequence[str | None],
         most: int,
+        last_later: bool = False,
     ) -> None:
         super().__init__(type_name, ops, make)
         self.fields = fields
         self.most = most
+        self.last_later = last_later
+        self.known: dict[tuple[ByteOrder, int, bytes], tuple[Any, ...]] = {}
 
     def walk(self, data: bytes) -> Walk[Rows]:
         """Starts to decode a message."""
