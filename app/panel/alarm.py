@@ -21,7 +21,8 @@ from app.panel.base import (
 )
 from app.panel.condition import Condition
 from app.panel.field_paths import FieldPath, MessageField
-from app.panel.widgets.displays import Factor, StateValue
+from app.panel.number_format import Factor
+from app.panel.widgets.displays import StateValue
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
 from app.panel.widgets.parameter import NodeName

@@ -1,6 +1,11 @@
-"""The description of a condition: a field of a topic, and the values of it that meet the condition."""
+"""The description of a condition: a field of a topic, and the values of it that meet the condition.
+
+With `scale` and `offset` the comparisons are of `value * scale + offset`, in the unit that is shown. On
+load they become comparisons of the field's own value, so that they are exact.
+"""
 
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Final, Self
 
@@ -10,6 +15,7 @@ from app.i18n import PanelText, TextLike
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Id, Label, Seconds, TopicName, TopicQos, Type
 from app.panel.field_paths import FieldPath
+from app.panel.number_format import FORMAT, Factor
 from app.panel.widgets.numbers import Unit
 
 VALUE: Final = "{value}"  # in `own_sentence`: the value that does not meet the condition
@@ -53,9 +59,13 @@ class Condition(Description):
         Annotated[tuple[ComparedValue, ...], Field(strict=False), AfterValidator(_non_empty)] | None
     ) = None
     unit: Unit = ""
+    scale: Factor = 1.0
+    offset: Factor = 0.0
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
     _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
+    _written: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
     @property
     def name(self) -> TextLike:
@@ -74,6 +84,25 @@ class Condition(Description):
         return {key: value for key, value in values.items() if value is not None}
 
     @property
+    def is_scaled(self) -> bool:
+        """Whether what is shown is another number than that of the field."""
+        return (self.scale, self.offset) != (1.0, 0.0)
+
+    def shown(self, value: float) -> float:
+        """The number that is shown for the field's value."""
+        return value * self.scale + self.offset if self.is_scaled else value
+
+    def unscaled(self, compared: float) -> float:
+        """The field's value for which this number is shown."""
+        exact = (Fraction(repr(compared)) - Fraction(repr(self.offset))) / Fraction(repr(self.scale))
+        return int(exact) if exact.denominator == 1 else float(exact)
+
+    @property
+    def written(self) -> Mapping[str, Any]:
+        """Key → value of the comparisons as they are shown."""
+        return self._written or self.comparisons
+
+    @property
     def constants(self) -> Mapping[Any, str]:
         """Value → name of the constants by which the field's values are shown; set on load."""
         return self._constants
@@ -83,6 +112,21 @@ class Condition(Description):
         resolved = self.model_copy(update=dict(comparisons))
         resolved._constants = constants
         return resolved
+
+    def of_field(self) -> Self:
+        """The condition with comparisons of the field's own value in place of those that are shown.
+        With a negative scale the least value that is shown is the field's greatest."""
+        if not self.is_scaled:
+            return self
+        raw: dict[str, Any] = {
+            key: tuple(map(self.unscaled, value)) if key == "one_of" else self.unscaled(value)
+            for key, value in self.comparisons.items()
+        }
+        if self.scale < 0:
+            raw["min"], raw["max"] = raw.get("max"), raw.get("min")
+        made = self.model_copy(update=raw)
+        made._written = self.comparisons
+        return made
 
 
 class NamedCondition(Condition):

@@ -90,7 +90,9 @@ def resolve_names(value: Any, kind: Type, interfaces: Interfaces, names: Mapping
 
 
 def resolve_condition(condition: Resolved, interfaces: Interfaces) -> Resolved:
-    """The condition with values in place of constants' names in its comparisons."""
+    """The condition with values in place of constants' names in its comparisons, and in place of what
+    is shown those of the field."""
+    condition = condition.of_field()
     kind = interfaces.type_at(condition.type, condition.field)
     constants = interfaces.constants(parent_type(condition, interfaces))
     values = {

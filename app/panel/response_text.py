@@ -11,7 +11,7 @@ from app.errors import FieldError
 from app.i18n import TextLike
 from app.i18n.values import each_language
 from app.panel.constants import NUMBERS
-from app.panel.widgets.displays import FORMAT
+from app.panel.number_format import FORMAT
 
 DIGITS: Final = 4  # significant digits of a number without a format
 SMALLEST: Final = 1e-4  # nearer to 0 it is written with an exponent

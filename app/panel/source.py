@@ -6,7 +6,8 @@ from pydantic import AfterValidator, BaseModel, Field
 
 from app.panel.base import Description, Id, Seconds, TopicName, TopicQos, Type, non_empty
 from app.panel.field_paths import FieldPath
-from app.panel.widgets.displays import FORMAT_OR_TIME, Factor, LampState
+from app.panel.number_format import Factor
+from app.panel.widgets.displays import FORMAT_OR_TIME, LampState
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.numbers import Unit
 

@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from app.errors import Fault
 from app.interfaces.validation import format_value
+from app.panel.condition import Condition
 from app.panel.faults.table_keys import inner_model, known_keys
 from app.panel.faults.wording import list_names
 from app.panel.model import Panel
@@ -60,7 +61,10 @@ class _Walk:
         }
         if NAME not in table or not reads_source(model):
             return whole
-        return self._with_source(whole, known_keys(model), place)
+        keys = [
+            key for key in known_keys(model) if not issubclass(model, Condition) or key not in OF_NUMBER
+        ]
+        return self._with_source(whole, keys, place)
 
     def _value(self, model: type[BaseModel] | None, value: Any, place: str) -> Any:
         if isinstance(value, dict):
@@ -91,7 +95,8 @@ def _shared(source: Mapping[str, Any], table: Mapping[str, Any], keys: list[str]
     """The keys that a table has from its source: those that it knows and does not have itself.
 
     What is about one field is not that of another field. A scale, an offset and the unit of the result
-    belong together: all of them, or none."""
+    belong together: all of them, or none. A condition compares what the robot sends, unless it has a
+    scale itself."""
     shared = {*source} - {"id"}
     is_about_topic = {"stale_s", "diagnostics", "list"} & table.keys()  # of an alarm
     if is_about_topic:
@@ -100,5 +105,5 @@ def _shared(source: Mapping[str, Any], table: Mapping[str, Any], keys: list[str]
         shared &= {*OWN, "max_age_s"}
     scaling = OF_NUMBER & source.keys()
     if scaling and (OF_NUMBER & table.keys() or not scaling <= {*keys}):
-        shared -= {*OF_NUMBER, "unit"}
+        shared -= {*OF_NUMBER, "unit", *(() if {*keys} >= OF_NUMBER else ("format",))}
     return (key for key in source if key in shared and key in keys and key not in table)

@@ -195,30 +195,38 @@ def not_finite(value: float) -> Text:
 
 
 def _needs(condition: Condition) -> Iterator[TextLike]:
-    if condition.equals is not None:
-        yield _value_text(condition, condition.equals, condition.unit)
-    if condition.one_of is not None:
+    wanted = condition.written
+    if "equals" in wanted:
+        yield _value_text(condition, wanted["equals"], condition.unit)
+    if "one_of" in wanted:
         *all_but_last, last = (
-            _value_text(condition, value, condition.unit) for value in condition.one_of
+            _value_text(condition, value, condition.unit) for value in wanted["one_of"]
         )
         yield say("condition_either", first=tuple(all_but_last), last=last) if all_but_last else last
-    if condition.min is not None or condition.max is not None:
+    if "min" in wanted or "max" in wanted:
         yield _limits(condition)
-    if condition.not_equals is not None:
-        yield say("condition_not", value=_value_text(condition, condition.not_equals, condition.unit))
+    if "not_equals" in wanted:
+        yield say("condition_not", value=_value_text(condition, wanted["not_equals"], condition.unit))
 
 
 def _limits(condition: Condition) -> Text:
     low, high = (
         "" if limit is None else _value_text(condition, limit, "")
-        for limit in (condition.min, condition.max)
+        for limit in (condition.written.get("min"), condition.written.get("max"))
     )
     code = "limits_both" if low and high else "limits_low" if low else "limits_high"
     return say(code, low=low, high=high, unit=after_space(condition.unit))
 
 
 def _received_text(condition: Condition, value: Any, wanted: TextLike) -> TextLike:
-    """The value that was received, in as few digits as distinguish it from the one that is needed."""
+    """The value that was received as it is shown: in the condition's format, else in as few digits as
+    distinguish it from the one that is needed."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = condition.shown(value)
+        if condition.format is not None and math.isfinite(value):
+            text = number(format(value, condition.format), condition.unit)
+            if condition.comparisons and render(text) not in render(wanted):
+                return text
     if not isinstance(value, float):
         return _value_text(condition, value, condition.unit)
     if math.isnan(value):

@@ -9,6 +9,7 @@ from app.interfaces.definitions import FLOAT_TYPES
 from app.panel.condition import Condition
 from app.panel.values import same_value
 from app.simulator import robot
+from app.simulator.values.guesses import Span
 from app.simulator.values.signals import Signal, as_type, swing
 
 APART_S: Final = 3.0  # by which each interlock drops later than the one before
@@ -34,10 +35,12 @@ def permitting(
     others: Sequence[Any],
     offset: float,
     period_s: float | None,
+    usual: Span | None = None,
 ) -> Signal:
     """A field of the base type `kind` that satisfies its interlocks, and then does not; `others` are
-    further values that the field may have. Where no value satisfies all, each has its turn."""
-    values = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others))
+    further values that the field may have, and numbers stay in its `usual` span where the limits leave
+    room in it. Where no value satisfies all, each has its turn."""
+    values = (_as_kind(candidate, kind) for candidate in _candidates(interlocks, kind, others, usual))
     candidates = [choice for choice in values if _fits(choice, kind)]
     met = [sum(satisfies(interlock, candidate) for interlock in interlocks) for candidate in candidates]
     best, least = max(met), min(met)
@@ -45,7 +48,7 @@ def permitting(
     bad = [
         candidate for candidate, count in zip(candidates, met, strict=True) if count == least
     ] or good
-    moving = _moving(interlocks, kind) if best == len(interlocks) else None
+    moving = _moving(interlocks, kind, usual) if best == len(interlocks) else None
     turn_s = period_s or robot.PERMITTED_S + robot.FORBIDDEN_S
 
     def value(t: float) -> Any:
@@ -76,7 +79,9 @@ def satisfies(interlock: Condition, value: Any) -> bool:
     )
 
 
-def _candidates(interlocks: Sequence[Condition], kind: str, others: Sequence[Any]) -> Iterator[Any]:
+def _candidates(
+    interlocks: Sequence[Condition], kind: str, others: Sequence[Any], usual: Span | None
+) -> Iterator[Any]:
     """Values to choose from, the likeliest first."""
     if kind == "bool":
         yield from (True, False)
@@ -88,12 +93,19 @@ def _candidates(interlocks: Sequence[Condition], kind: str, others: Sequence[Any
             if value is not None:
                 yield value
         if "min" in comparisons or "max" in comparisons:
-            low, high = _limits(interlock)
+            low, high = _limits(interlock, usual)
             span = high - low
-            yield from ((low + high) / 2, low - span / 4, high + span / 4, low, high)
+            below, above = low - span / 4, high + span / 4
+            if usual is not None and low > 0:
+                below = max(below, low / 2)
+            if usual is not None and usual.high > high:
+                above = min(above, usual.high)
+            yield from ((low + high) / 2, below, above, low, high)
     yield from others
     for interlock in interlocks if numeric else ():
-        for comparison in interlock.comparisons.values():
+        for key, comparison in interlock.comparisons.items():
+            if usual is not None and key in ("min", "max"):
+                continue
             near = comparison if isinstance(comparison, tuple) else (comparison,)
             for value in near:
                 yield from (value + 1, value - 1)
@@ -104,19 +116,28 @@ def _candidates(interlocks: Sequence[Condition], kind: str, others: Sequence[Any
         yield from ("ready", "not ready")
 
 
-def _limits(interlock: Condition) -> tuple[float, float]:
-    """Both limits: one that is not given is a fifth of the other away."""
+def _limits(interlock: Condition, usual: Span | None) -> tuple[float, float]:
+    """Both limits: one that is not given is the end of the usual span, else a fifth of the other
+    away."""
     low, high = interlock.comparisons.get("min"), interlock.comparisons.get("max")
     if low is None:
         assert high is not None
+        if usual is not None and usual.low < high:
+            return usual.low, high
         return high - max(abs(high) / 5, 4), high
-    return low, low + max(abs(low) / 5, 4) if high is None else high
+    if high is None:
+        if usual is not None and usual.high > low:
+            return low, usual.high
+        return low, low + max(abs(low) / 5, 4)
+    return low, high
 
 
-def _moving(interlocks: Sequence[Condition], kind: str) -> Signal | None:
+def _moving(interlocks: Sequence[Condition], kind: str, usual: Span | None) -> Signal | None:
     """A number that moves inside the limits, if there are any."""
     limits = [
-        _limits(interlock) for interlock in interlocks if {"min", "max"} & interlock.comparisons.keys()
+        _limits(interlock, usual)
+        for interlock in interlocks
+        if {"min", "max"} & interlock.comparisons.keys()
     ]
     if not limits:
         return None

@@ -234,3 +234,49 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
     assert shows == []
     assert take(6.2, 4.0) == (True, False)
     assert shows == [6.2]
+
+
+@pytest.mark.parametrize(
+    ("type_name", "conditions", "place", "words"),
+    [
+        ("Float64", "scale = 0\nmin = 20", "interlock[0].scale", "every value would be the same"),
+        (
+            "Float64",
+            'scale = 100\nequals = "FULL"',
+            "interlock[0].equals",
+            'as it is shown, not "FULL"',
+        ),
+        ("Float64", "scale = 100\nmin = 20\nmax = 15", "interlock[0].max", "15 is less than min (20)"),
+        ("Float64", "scale = -1\nmin = 20\nmax = 15", "interlock[0].max", "15 is less than min (20)"),
+        (
+            "Int8",
+            "scale = 0.1\nequals = 0.25",
+            "interlock[0].equals",
+            "is 2.5 in the message, which must",
+        ),
+        (
+            "Int8",
+            'scale = 0.1\nmin = 0.25\nformat = "d"',
+            "interlock[0].format",
+            "is for whole numbers",
+        ),
+        ("Header", 'field = "age(stamp)"\nmax = 5', "interlock[0].max_age_s", "its message arrived"),
+    ],
+)
+def test_a_scale_that_does_not_fit_is_a_fault(
+    tmp_path: Path, type_name: str, conditions: str, place: str, words: str
+) -> None:
+    with pytest.raises(PanelError) as error:
+        load_panel(file_of(tmp_path, type_name, conditions))
+    (fault,) = error.value.faults
+    assert fault.place == place
+    assert words in fault.message
+
+
+@pytest.mark.parametrize(("scale", "limit", "met"), [(0.1, "min = 0.25", [3]), (-1, "max = -3", [3])])
+def test_limits_between_two_values_of_a_field(
+    tmp_path: Path, scale: float, limit: str, met: list[int]
+) -> None:
+    conditions = f'field = "data"\nscale = {scale}\n{limit}'
+    _, interlock = robot_of(file_of(tmp_path, "Int8", conditions))
+    assert [value for value in (1, 2, 3) if permits(interlock, value)] == met

@@ -110,7 +110,7 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
 
 def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsOf) -> None:
     assert faults_of(GOOD) == []
-    comparisons = [*COMPARISONS, "unit"]  # not all fit one condition
+    comparisons = [*COMPARISONS, "unit", "scale", "offset", "format"]  # not all fit one condition
     conditions = [f"{table}.{key}" for table in ("interlock", "condition") for key in comparisons]
     left_out = ["type", *comparisons[1:]]
     of_alarms = [f"{table}.{key}" for table in ("when", "while") for key in left_out]
@@ -130,7 +130,8 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
         own |= {"grow": True}  # of any kind, but of few widgets
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
-        refused = ["confirm_press", "consequence"] if kind == "switch" else []  # it switches back
+        # A switch switches back; options are the file's or the robot's.
+        refused = {"switch": ["confirm_press", "consequence"], "select": ["options_from"]}.get(kind, [])
         assert list(lacking(own | ({"qos": qos} if qos else {}), model)) == refused, kind
 
 

@@ -10,6 +10,8 @@ from app.panel.condition import Condition
 from app.panel.constants import resolve_condition
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
+from app.panel.number_range import to_float32
+from app.permission import conditions
 from app.permission.conditions import ConditionState, condition_state, refusal
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.verdict import Verdict, locked
@@ -33,6 +35,7 @@ from tests.support.samples import BATTERY
 
 FLOAT = "std_msgs/msg/Float64"
 BATTERY_TYPE = "sensor_msgs/msg/BatteryState"
+SCALED = {"type": BATTERY_TYPE, "field": "percentage", "scale": 100, "unit": "%"}
 
 
 def air(**keys: object) -> Condition:
@@ -178,6 +181,28 @@ def test_a_value_before_a_cut_is_unknown(robot: RobotState) -> None:
 def test_without_a_link_no_condition_is_met(robot: RobotState) -> None:
     robot.link_up = False
     assert state_of(air(), robot).verdict == locked("link_unreachable")
+
+
+@pytest.mark.parametrize(
+    ("value", "comparisons", "is_met", "shown"),
+    [
+        (0.29, {"min": 29}, True, "29 %"),
+        (0.2899, {"min": 29, "format": ".0f"}, False, "28.99 %"),  # "29 %" would look like the limit
+        (0.123, {"min": 29, "format": ".0f"}, False, "12 %"),
+        (0.29, {"equals": 29}, True, "29 %"),
+        (0.3, {"max": 29.5}, False, "30 %"),
+        (0.3, {"scale": -100, "min": -29}, False, "-30 %"),
+        (0.3, {"scale": 1, "offset": -0.5, "unit": "", "max": -0.1}, True, "-0.2"),
+    ],
+)
+def test_comparisons_are_of_the_value_that_is_shown(
+    value: float, comparisons: Table, is_met: bool, shown: str
+) -> None:
+    table = {"topic": ENABLED, **SCALED, **comparisons}
+    condition = resolve_condition(Condition.model_validate(table), INTERFACES)
+    received = to_float32(value)
+    assert conditions.permits(condition, received) is is_met
+    assert f"{ENABLED} is {shown}: it must be" in render(conditions.unmet(condition, received))
 
 
 def test_a_topic_of_another_type_does_not_meet_a_condition(robot: RobotState) -> None:

@@ -107,6 +107,15 @@ def test_functions_of_interlocks_permit_and_forbid(
     assert met == {True, False}
 
 
+@pytest.mark.parametrize("limits", ["min = 0.2", "scale = 100\nmin = 20", "scale = 100\nmax = 90"])
+def test_a_field_of_an_interlock_stays_within_what_it_can_be(loaded: Loaded, limits: str) -> None:
+    battery = 'topic = "/battery"\ntype = "sensor_msgs/msg/BatteryState"\nfield = "percentage"\n'
+    panel = loaded(f'[[interlock]]\nid = "charge"\n{battery}unit = "%"\n{limits}\n')
+    values = Stepped(panel).run(ROUND_S * 2).values("/battery", "percentage")
+    assert {permits(panel.interlocks[0], value) for value in values} == {True, False}
+    assert 0 <= min(values) < max(values) <= 1
+
+
 def test_constants_and_lamps_show_all_their_values(loaded: Loaded) -> None:
     lamp = (
         '[[page.widget]]\nid = "lamp"\nkind = "indicator"\nlabel = "Lamp"\ntopic = "/lamp"\n'

@@ -19,6 +19,7 @@ from app.panel.constants import (
 )
 from app.panel.model import Panel
 from app.panel.values import same_value
+from app.panel.widgets.displays import format_fault
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
@@ -87,17 +88,42 @@ def _comparison_faults(
     place: str, condition: Condition, kind: Type, interfaces: Interfaces
 ) -> Iterator[Fault]:
     numeric = kind.name in NUMBERS
-    if condition.unit and not numeric:
-        yield _number_only_fault(place, "unit", condition, kind)
+    if not numeric and (given := _number_keys(condition)):
+        yield from (_number_only_fault(place, key, condition, kind) for key in given)
+        return
+    if condition.is_scaled:
+        faults = list(_scaled_faults(place, condition))
+        yield from faults
+        if faults:
+            return
+    yield from format_fault(place, condition, kind.name)
     alone = next((key for key in EXCLUSIVE if key in condition.comparisons), None)
     if alone and (others := [key for key in condition.comparisons if key != alone]):
         reason = f"has no meaning beside {alone}, which says all: leave it out"
         yield from (Fault(f"{place}.{key}", reason, cause=f"alone {place}") for key in others)
         return
-    faults = list(_value_faults(place, condition, kind, interfaces))
+    raw = condition.of_field()
+    faults = list(_value_faults(place, raw, kind, interfaces))
     yield from faults
     if numeric and not faults:
-        yield from _unsatisfiable_faults(place, condition, kind, interfaces)
+        yield from _unsatisfiable_faults(place, condition, raw, kind, interfaces)
+
+
+def _number_keys(condition: Condition) -> list[str]:
+    """The given keys that are for numbers only."""
+    given = {"unit": condition.unit, "scale": condition.scale != 1.0, "offset": condition.offset}
+    return [key for key, value in {**given, "format": condition.format}.items() if value]
+
+
+def _scaled_faults(place: str, condition: Condition) -> Iterator[Fault]:
+    """Faults of a scale, and of comparisons that it can't be applied to."""
+    if condition.scale == 0:
+        yield Fault(f"{place}.scale", "is 0: every value would be the same")
+    for key, compared in condition.comparisons.items():
+        for value in compared if key == "one_of" else (compared,):
+            if isinstance(value, bool | str):
+                message = f"must be a number, as it is shown, not {format_value(value)}"
+                yield Fault(f"{place}.{key}", message, cause=f"scale {place}")
 
 
 def _value_faults(
@@ -117,8 +143,11 @@ def _value_faults(
             cause = f"condition {place}"
             if isinstance(value, str) and kind.name in NUMBERS:
                 yield Fault(at, unknown_constant(value, kind, type_name, constants), cause=cause)
+            elif condition.is_scaled and key in ("min", "max"):
+                continue  # may lie between two values of the field
             elif fault := _value_mismatch(value, kind):
-                yield Fault(at, fault, cause=cause)
+                is_of = f"is {value:g} in the message, which " if condition.is_scaled else ""
+                yield Fault(at, f"{is_of}{fault}", cause=cause)
             elif any(same_value(value, other) for other in seen):
                 yield Fault(at, f"{format_value(written)} is there already")
             seen.append(value)
@@ -140,7 +169,7 @@ def _value_mismatch(value: Any, kind: Type) -> str | None:
 
 
 def _unsatisfiable_faults(
-    place: str, condition: Condition, kind: Type, interfaces: Interfaces
+    place: str, written: Condition, condition: Condition, kind: Type, interfaces: Interfaces
 ) -> Iterator[Fault]:
     constants = interfaces.constants(parent_type(condition, interfaces))
     lowest, highest = INTEGER_RANGES.get(kind.name, (-math.inf, math.inf))
@@ -153,8 +182,8 @@ def _unsatisfiable_faults(
         )
     )
     if low > high:
-        low_text, high_text = format_value(condition.min), format_value(condition.max)
+        low_text, high_text = format_value(written.min), format_value(written.max)
         yield Fault(f"{place}.max", f"{high_text} is less than min ({low_text}): no value permits")
     elif low == high == excluded:
-        reason = f"{format_value(condition.not_equals)} is all that the limits leave: no value permits"
+        reason = f"{format_value(written.not_equals)} is all that the limits leave: no value permits"
         yield Fault(f"{place}.not_equals", reason)

@@ -13,18 +13,15 @@ from app.interfaces.validation import fitting_constants, format_value, unknown_c
 from app.panel.base import Description, Label, Span, non_empty
 from app.panel.constants import NUMBERS, HasField, parent_type, value_mismatch
 from app.panel.faults.wording import list_names
+from app.panel.number_format import FORMAT, Factor
 from app.panel.times import DEFAULT_FORMATS, time_faults
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
 
-# [+] [,] [.digits] [f, e, g, % or d]: the part of Python's format language that can't fail.
-FORMAT: Final = r"^\+?,?(\.[0-9]{1,2}[feg%]|[feg%d])$"
 CONSTANTS: Final = r"^([A-Z][A-Z0-9_]*)?$"  # what names begin with; "" for all
 # The same, or a time: see `app.panel.times`.
 FORMAT_OR_TIME: Final = rf"{FORMAT}|^(time|age|duration)$"
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
-
-Factor = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Readout(Display):

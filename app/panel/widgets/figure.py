@@ -11,8 +11,9 @@ from app.interfaces import Interfaces
 from app.panel.base import Label
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
+from app.panel.number_format import FORMAT, Factor
 from app.panel.values import number_text
-from app.panel.widgets.displays import FORMAT, Factor, format_fault
+from app.panel.widgets.displays import format_fault
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.panel.widgets.numbers import Unit
 from app.panel.widgets.topic_fields import OrNumber, number_field_faults, number_or_table

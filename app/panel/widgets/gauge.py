@@ -12,8 +12,9 @@ from app.interfaces import Interfaces
 from app.interfaces.validation import format_value
 from app.panel.base import Span
 from app.panel.constants import NUMBERS
+from app.panel.number_format import FORMAT, Factor
 from app.panel.values import number_text
-from app.panel.widgets.displays import FORMAT, Factor, format_fault
+from app.panel.widgets.displays import format_fault
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.panel.widgets.numbers import Number, Unit
 from app.panel.widgets.topic_fields import OrNumber, number_field_faults, number_or_table

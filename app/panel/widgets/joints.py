@@ -14,8 +14,8 @@ from app.panel.base import Description, Label, Seconds, Span, TopicName, Type, n
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
 from app.panel.field_paths import MessageField
+from app.panel.number_format import FORMAT
 from app.panel.values import number_text
-from app.panel.widgets.displays import FORMAT
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.numbers import Number
 

@@ -11,10 +11,10 @@ from app.errors import Fault
 from app.i18n import ENGLISH, Text
 from app.i18n.typed_numbers import read_number
 from app.panel.base import Seconds, Span
+from app.panel.number_format import FORMAT
 from app.panel.number_range import to_float32
 from app.panel.template import placeholder_ids
 from app.panel.values import number_text
-from app.panel.widgets.displays import FORMAT
 from app.panel.widgets.families import CheckContext, EntryWidget, TopicField, TopicSource
 from app.panel.widgets.numbers import Number, NumberInput, SteppedWidget, Unit
 from app.panel.widgets.publish import Confirm, PublishPress

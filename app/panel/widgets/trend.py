@@ -23,7 +23,8 @@ from app.panel.base import (
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
 from app.panel.field_paths import FieldPath
-from app.panel.widgets.displays import FORMAT, Factor, Readout
+from app.panel.number_format import FORMAT, Factor
+from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
 from app.panel.widgets.numbers import Unit
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
+from app.i18n import render
 from app.interfaces import INTEGER_RANGES, Interfaces, parent_path
 from app.interfaces.definitions import FLOAT_TYPES
 from app.interfaces.field_path import field_call, field_name, field_paths
@@ -13,7 +14,7 @@ from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.model import Panel
 from app.simulator.interlocks import offset_of, permitting
 from app.simulator.kinds import Shown
-from app.simulator.values.guesses import Span, guessed, moving, span_of
+from app.simulator.values.guesses import UNITS, Span, guessed, moving, span_of
 from app.simulator.values.known_types import KNOWN, Moment
 from app.simulator.values.messages import Message, field_constants
 from app.simulator.values.paths import get
@@ -190,7 +191,22 @@ class _Field:
         others = [value for shown_field in self._shown for value in shown_field.values]
         others += [*self._constants, *interlocks[0].constants]
         offset = self._panel_fields.offsets[self._topic, self._path]
-        return permitting(interlocks, kind, others, offset, entry.period_s)
+        usual = self._usual(interlocks)
+        return permitting(interlocks, kind, others, offset, entry.period_s, usual)
+
+    def _usual(self, interlocks: Sequence[Condition]) -> Span | None:
+        """The span that the message, a widget or the unit says; None where none of them does."""
+        numbers = [value for value in self._own if not isinstance(value, bool | str)]
+        if numbers:
+            return Span(min(numbers), max(numbers))
+        shown = [(render(c.unit), c.scale, c.offset) for c in interlocks]
+        shown += [(each.unit, each.scale, each.offset) for each in self._shown]
+        for unit, scale, offset in shown:
+            if unit in UNITS and scale:
+                ends = (UNITS[unit].low, UNITS[unit].high)
+                low, high = sorted((end - offset) / scale for end in ends)
+                return Span(low, high)
+        return None
 
     @cached_property
     def _parent(self) -> str:
