@@ -15,10 +15,12 @@ from app.commands.transport import Transport
 from app.errors import InputError, NotFound
 from app.i18n import ENGLISH, TextLike, number, say
 from app.interfaces import Interfaces
+from app.interfaces.validation import format_value
 from app.panel.constants import resolve_at
 from app.panel.model import Panel
 from app.panel.template import add_now, fill, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
+from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
 from app.panel.widgets.publish import Confirm, Publish, PublishPress
@@ -26,6 +28,7 @@ from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
 from app.permission.interlocks import reported_value
+from app.permission.robot_options import options_now
 from app.robot.command_status import FinalCheck, Outcome
 from app.robot.state import RobotState
 
@@ -103,12 +106,23 @@ class Dispatcher:
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, value: widget.sent_value(widget.check_value(value)),
+            SelectInput: self._check_option,
             Parameter: self._parameters.check_value,
             Step: self._check_step,
             Switch: lambda widget, value: widget.check_value(value),
         }
         require_rows("dispatch", self.dispatches, PressCommand)
         require_rows("check of its entries", self.checks, EntryWidget)
+
+    def _check_option(self, widget: SelectInput, value: Any) -> Any:
+        """The chosen option; InputError for one that the robot no longer lists."""
+        chosen = widget.sent_value(widget.check_value(value))
+        source = widget.options_from
+        if source is None:
+            return chosen
+        if chosen in options_now(widget, source, self._robot, self._monotonic()).texts:
+            return chosen
+        raise InputError(say("input_option_gone", label=widget.label, given=format_value(chosen)))
 
     def _check_step(self, widget: Step, value: Any) -> float:
         """The value of a press, which is one step from the one that the robot reports now: what the

@@ -24,6 +24,7 @@ from app.permission.interlocks import (
     link_verdict,
 )
 from app.permission.principal import Principal
+from app.permission.robot_options import options_verdict
 from app.permission.verdict import PERMITTED, WITHOUT_CONTROL, Verdict, locked, with_advice
 from app.robot.state import RobotState
 
@@ -95,6 +96,12 @@ CHECKS: Final = (
         alone=False,
         alike=True,
     ),
+    Check(
+        "options",
+        lambda request: options_verdict(request.widget.id, request.robot, request.now),
+        alone=False,
+        alike=True,
+    ),
     # Uniform buttons are those that no alarm locks.
     Check(
         "alarms",
@@ -150,7 +157,8 @@ def permissions(
         return permission(PermissionRequest(widget, robot, now, link, own, grounds))
 
     verdicts: dict[str, Verdict] = {}
-    groups = panel.uniform_buttons.values() if all(check.alike for check in CHECKS) else ()
+    alike = all(check.alike for check in CHECKS) and not robot.selects
+    groups = panel.uniform_buttons.values() if alike else ()
     for buttons in groups:
         blocked = blocked_buttons(buttons, robot)
         usable = [button for button in buttons if button.id not in blocked] if blocked else buttons

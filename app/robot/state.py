@@ -19,6 +19,7 @@ from app.interfaces import Interfaces, has_key
 from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of, possible_keys
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
+from app.panel.used_options import selects_by_command
 from app.panel.widgets.parameter import GET
 from app.robot.alarm_action import AlarmAction
 from app.robot.alarmed import NO_ALARMED
@@ -92,6 +93,7 @@ class RobotState:
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
         self.conditions = {condition.id: condition for condition in panel.named_conditions}
+        self.selects = selects_by_command(panel)
         self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
         self.silent_publishers = SilentPublishers(self._condition_keys, traits)
         self.topic_publishers = TopicPublishers()

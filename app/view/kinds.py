@@ -15,6 +15,7 @@ from app.panel.widgets.families import BaseWidget, Command, Display, Input, Pres
 from app.panel.widgets.figure import Figure
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
@@ -42,6 +43,7 @@ from app.view.machine_values import machine_state
 from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
 from app.view.result_age import result_age
+from app.view.select_values import select
 from app.view.sequence_values import sequence
 from app.view.step_values import step
 from app.view.switch_values import switch
@@ -168,6 +170,7 @@ def _switched(widget: Switch, robot: RobotState, verdict: Verdict, now: float) -
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: lambda widget, robot, verdict, now: ({}, math.inf),
     Input: lambda widget, robot, verdict, now: ({}, math.inf),
+    SelectInput: lambda widget, robot, verdict, now: select(widget, robot, now),
     Numeric: lambda widget, robot, verdict, now: ({"limits": widget.limits_text}, math.inf),
     PressCommand: _pressed,
     PublishPress: _published,

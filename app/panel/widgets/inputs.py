@@ -12,8 +12,13 @@ from app.i18n.values import alike
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, SaidLabel, Span, catalogue_default, non_empty
 from app.panel.values import same_value
-from app.panel.widgets.families import CheckContext, Input
+from app.panel.widgets.families import CheckContext, DisplayWidget, Input, TopicSource
+from app.panel.widgets.robot_options import KEY, RobotOptions
 
+MISSING: Final = (
+    'is missing: write options, like [{ value = 1, label = "One" }], or options_from, like '
+    '{ topic = "/stations", type = "cell_msgs/msg/Names", field = "names" }'
+)
 BOOL_TEXTS: Final = {"true": True, "false": False}
 
 
@@ -85,52 +90,83 @@ class Option(Description):
         return self.value if isinstance(self.value, str) else json.dumps(self.value)
 
 
-class SelectInput(Input):
+class SelectInput(DisplayWidget, Input):
+    """Its options are those of the panel file, or with `options_from` the robot's."""
+
     kind: Literal["select"]
     span: Span = 6
-    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(non_empty)]
+    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(non_empty)] | None = None
+    options_from: RobotOptions | None = None
     default: Any = None
+
+    def sources(self) -> Iterator[TopicSource]:
+        if self.options_from is not None:
+            yield self.options_from.source()
+
+    @property
+    def own_options(self) -> tuple[Option, ...]:
+        """The options of the panel file."""
+        return self.options or ()
 
     @property
     def initial_text(self) -> str:
-        """The key of the option that is selected initially."""
-        first = (option for option in self.options if same_value(option.value, self.default))
-        return next(first, self.options[0]).key
+        """The key of the option that is selected initially; "" where the robot has the options, and
+        none is the default."""
+        if self.options_from is not None:
+            return self.default or ""
+        first = (option for option in self.own_options if same_value(option.value, self.default))
+        return next(first, self.own_options[0]).key
 
     @property
     def value_description(self) -> str:
-        return "the values of its options"
+        return "text" if self.options_from else "the values of its options"
 
     def describe_value(self, value: Any, *, narrow: bool) -> str:
-        return format_value(value)
+        return self.value_description if self.options_from else format_value(value)
 
     @property
     def comment(self) -> str:
-        return f"one of {', '.join(format_value(option.value) for option in self.options)}"
+        if self.options_from is not None:
+            return f"one of the texts that {self.options_from.topic} lists"
+        return f"one of {', '.join(format_value(option.value) for option in self.own_options)}"
 
     @property
     def default_value(self) -> Any:
         return self.default
 
     def examples(self) -> list[Any]:
-        return [option.value for option in self.options]
+        return ["text"] if self.options_from else [option.value for option in self.own_options]
 
     def check_value(self, value: Any) -> Any:
-        """The value of the option with the given value or key; forms and browsers send keys."""
-        for option in self.options:
+        """The value of the option with the given value or key; forms and browsers send keys. Of the
+        robot's options any text, which a press compares with the list."""
+        if self.options_from is not None and isinstance(value, str) and value:
+            return value
+        if self.options_from is not None:
+            raise InputError(say("input_not_chosen", label=self.label))
+        for option in self.own_options:
             if same_value(option.value, value) or option.key == value:
                 return option.value
-        options = tuple(option.label for option in self.options)
+        options = tuple(option.label for option in self.own_options)
         raise InputError(
             say("input_not_an_option", label=self.label, options=options, given=format_value(value))
         )
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        yield from option_faults(place, self.options)
+        if (self.options is None) == (self.options_from is None):
+            both = "stands beside options: write the one or the other" if self.options else MISSING
+            yield Fault(f"{place}.{KEY if self.options else 'options'}", both)
+            return
+        if self.options_from is not None:
+            yield from self.options_from.faults(f"{place}.{KEY}", checking.interfaces)
+            if self.default is not None and not isinstance(self.default, str):
+                yield Fault(f"{place}.default", "must be a text, as the robot's options are")
+            return
+        yield from option_faults(place, self.own_options)
         if self.default is not None and not any(
-            same_value(o.value, self.default) for o in self.options
+            same_value(o.value, self.default) for o in self.own_options
         ):
-            there = ", ".join(format_value(option.value) for option in self.options)
+            there = ", ".join(format_value(option.value) for option in self.own_options)
             yield Fault(
                 f"{place}.default", f"{format_value(self.default)} is no option; there is {there}"
             )

@@ -56,7 +56,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "text": WidgetKind(TextInput, tiles.ENTRY, styles=("entries",), script=False),
     "number": WidgetKind(NumberInput, tiles.NUMBER, styles=("entries",), script=False),
     "slider": WidgetKind(SliderInput, tiles.SLIDER, styles=("entries",), script=False),
-    "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script=False),
+    "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script=True),
     "toggle": WidgetKind(ToggleInput, tiles.ENTRY, styles=("entries",), script=False),
     "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
     "hold": WidgetKind(Hold, tiles.KEY, styles=(), script=True),
