@@ -56,9 +56,10 @@ def _good(structure: Structure, interfaces: Interfaces, depth: int) -> Fields:
 
 
 def feedback_at(
-    type_name: str, interfaces: Interfaces, progress: Mapping[str, float]
+    type_name: str, interfaces: Interfaces, progress: Mapping[str, tuple[float, float]]
 ) -> Callable[[Moment, float], Fields]:
-    """Feedback when a part (0 to 1) of the goal is done; `progress` is path → its value at the end."""
+    """Feedback when a part (0 to 1) of the goal is done; `progress` is path → its values at the start
+    and at the end."""
     structure = interfaces.structures[type_name]
     base = plausible(type_name, interfaces)
 
@@ -67,9 +68,9 @@ def feedback_at(
         for field in structure.fields:
             if (value := _partly(field, part)) is not None:
                 fields[field.name] = value
-        for path, most in progress.items():
+        for path, (first, last) in progress.items():
             kind = interfaces.type_at(type_name, path).name
-            value = _number(part * most, kind)
+            value = _number(first + part * (last - first), kind)
             put(fields, type_name, path, value, interfaces.structures)
         return fields
 

@@ -78,12 +78,14 @@ class Served:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acted:
-    """An action that the panel sends goals to; its feedback's field `progress` goes up to `most`."""
+    """An action that the panel sends goals to; its feedback's field `progress` goes up to `most`, or
+    falls from there."""
 
     action: str
     type: str
     progress: str | None = None
     most: float = 100.0
+    falls: bool = False
     shown: tuple[str, ...] = ()
 
 
@@ -262,6 +264,7 @@ def _action(action: Action, _: Interfaces) -> Iterator[Need]:
         type=action.type,
         progress=action.progress,
         most=action.progress_max,
+        falls=action.progress_falls,
         shown=tuple(response_paths(action.feedback)),
     )
 

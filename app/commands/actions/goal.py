@@ -56,6 +56,7 @@ class Goal:
     doubt: TextLike = ""
     feedback_text: TextLike = ""
     fraction: float | None = None
+    greatest: float = 0.0  # value of a progress that falls
 
     def advance(self, state: int) -> bool:
         """Sets a later state; False if the goal has this or a later state already."""
@@ -70,9 +71,18 @@ class Goal:
         widget = self.widget
         if widget.progress is not None:
             progress = message.get(FEEDBACK + widget.progress)
-            done = math.nan if progress is None else float(progress) / widget.progress_max
+            done = math.nan if progress is None else self._done(float(progress))
             self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         self.feedback_text = with_fields(widget.feedback, message, FEEDBACK)
+
+    def _done(self, progress: float) -> float:
+        """The part of the goal that is done; NaN while it is not known from where the progress
+        falls."""
+        if not self.widget.progress_falls:
+            return progress / self.widget.progress_max
+        self.greatest = max(self.greatest, progress if math.isfinite(progress) else 0.0)
+        whole = self.widget.falls_from or self.greatest
+        return 1 - progress / whole if whole else math.nan
 
     @property
     def is_running(self) -> bool:

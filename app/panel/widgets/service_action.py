@@ -80,7 +80,8 @@ class Call(ServerCommand):
 
 class Action(ServerCommand):
     """A goal of an action, with a cancel button. `progress` is a field of the feedback, from 0 to
-    `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
+    `progress_max`. With `progress_falls` it falls to 0 from there, by default from its greatest value
+    so far: a distance that remains. `feedback` and `result` are shown with `{field}` filled in."""
 
     kind: Literal["action"]
     action: TopicName
@@ -88,6 +89,7 @@ class Action(ServerCommand):
     goal: dict[str, Any] = Field(default_factory=dict)
     progress: MessageField | None = None
     progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
+    progress_falls: bool = False
     feedback: AnyText = ""
     result: AnyText = ""
     span: Span = 6
@@ -104,6 +106,11 @@ class Action(ServerCommand):
     @property
     def server_name(self) -> str:
         return self.action
+
+    @property
+    def falls_from(self) -> float | None:
+        """From where the progress falls, if the panel file says it."""
+        return self.progress_max if "progress_max" in self.model_fields_set else None
 
     @property
     def action_text(self) -> str:
