@@ -36,7 +36,8 @@ ROS_KEY: Final = re.compile(rf"[A-Za-z_]\w*(?:/\w+)*|{ROS_NAME.pattern}", re.ASC
 ROS_TYPE: Final = re.compile(
     r"[a-z]\w*(?:/(?:msg|srv|action))?/[A-Z]\w*|(?:bool|integer|double|string)(?:\[\])?", re.ASCII
 )
-FIELD: Final = re.compile(r"[a-z]\w*(?:\.[a-z]\w*|\[\d{1,6}\])*", re.ASCII)
+_PATH: Final = r"[a-z]\w*(?:\.[a-z]\w*|\[\d{1,6}\])*"
+FIELD: Final = re.compile(rf"{_PATH}|[a-z]{{3,6}}\({_PATH}(?:, ?{_PATH})?\)", re.ASCII)
 HEX: Final = re.compile(r"[0-9a-f.\-]{1,64}")
 VERSION: Final = re.compile(r"v?\d[\w.+\-]{0,60}", re.ASCII)
 TIME: Final = re.compile(r"[\dT:.+\- Z]{4,40}")

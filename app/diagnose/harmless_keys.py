@@ -32,8 +32,8 @@ _NUMBERS: Final = """
     enabled entries_read fit global high high_high hz keys kiosk lines local low low_low max max_age_s
     max_bytes max_hz max_length max_mb max_side_px min mm_per_px near normal offset one_shot own
     confirm_s period_s press_expires_s progress_falls progress_max ramp_s range rate_hz
-    require_publisher required rows rows_shown scale scan setpoint silent size_mb sounds span takeover_after_s timeout_s
-    width within_s
+    require_publisher required rows rows_shown scale scan setpoint silent size_mb sounds span
+    takeover_after_s timeout_s width within_s
 """
 _PANEL_TEXTS: Final = """
     answer by constants default demo feedback frame_id goal icon interfaces key label message name note
@@ -45,7 +45,7 @@ PANEL: Final = rules(
         "page widget group robot frame screen control diagnostics record qos confirm sort column pen",
         None,
     ),
-    ("joint states x_axis y_axis current reported steps recovery", None),
+    ("joint states x_axis y_axis current reported steps recovery options_from", None),
     (_NUMBERS, NUMBER),
     ("step", NUMBER),
     ("keep window windows", DURATION),
