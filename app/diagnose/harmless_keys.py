@@ -32,8 +32,8 @@ _NUMBERS: Final = """
     enabled entries_read fit global high high_high hz keys kiosk lines local low low_low max max_age_s
     max_bytes max_hz max_length max_mb max_side_px min mm_per_px near normal offset one_shot own
     confirm_s period_s press_expires_s progress_falls progress_max ramp_s range rate_hz
-    require_publisher required rows rows_shown scale scan setpoint silent size_mb sounds span
-    takeover_after_s timeout_s width within_s
+    require_publisher required right_max right_min rows rows_shown scale scan setpoint silent size_mb
+    sounds span takeover_after_s timeout_s width within_s
 """
 _PANEL_TEXTS: Final = """
     answer by constants default demo feedback frame_id goal icon interfaces key label message name note
@@ -58,6 +58,7 @@ PANEL: Final = rules(
     ("format", re.compile(r"\+?,?(\.\d{1,2}[feg%]|[feg%d])|time|age|duration")),
     ("kind", words(" ".join(KINDS))),
     ("mode", words("demo live")),
+    ("axis", words("left right")),
     ("distro", words("humble iron jazzy kilted lyrical rolling")),
     ("language languages", words("de en ja")),
     ("theme", words("light dark contrast")),
@@ -137,6 +138,7 @@ GRAPH: Final = ZENOH | rules(
 VERSIONS: Final = re.compile(r"\(a checkout, not installed\)|[\w.+\-/() ]{1,80}", re.ASCII)
 SETTINGS: Final = rules(
     ("mode", words("demo live")),
+    ("axis", words("left right")),
     ("hosts", re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]{1,80}")),
     ("proxies", re.compile(r"[0-9a-fA-F:./]{2,50}")),
     ("log_level", words("debug info warn error fatal")),

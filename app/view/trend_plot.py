@@ -9,17 +9,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
 from app.clock import offset_text
 from app.i18n import TextLike, number
 from app.i18n.locales import MINUS
 from app.i18n.values import together
-from app.panel.widgets.trend import Pen, Trend
+from app.panel.widgets.trend import Axis, Pen, Trend
 from app.robot.history import Column, History
 from app.robot.state import RobotState
 
 SIZE: Final = 1000
+AXES: Final[Sequence[Axis]] = ("left", "right")
 NAME_ROOM: Final = 12  # percent of the height that the name of a limit takes
 COLUMNS: Final = 240
 VALUE_TICKS: Final = 4
@@ -87,6 +89,7 @@ class Plot:
     times: Sequence[Tick]
     limits: Sequence[Limit]
     bands: Sequence[Band]
+    right_values: Sequence[Tick] = ()  # of the right axis, whose lines are not drawn
 
 
 def plot(widget: Trend, robot: RobotState, monotonic: float, wall: float) -> Plot:
@@ -122,37 +125,51 @@ def _finite(value: float) -> float:
 
 def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: float) -> Plot:
     """The plot of columns from `begin` to `end`, which are seconds of the wall clock."""
-    low, high = value_range(widget, columns)
+    ends = {axis: value_range(widget, columns, axis) for axis in _axes(widget)}
 
-    def place(value: float) -> float:
+    def place(value: float, axis: Axis = "left") -> float:
+        low, high = ends[axis]
         return round(min(max((high - value) / (high - low), -0.5), 1.5) * 100, 2)
 
     width = (end - begin) / COLUMNS
     pens = list(enumerate(widget.pens))
     bands = [
-        Band(i, place(pen.normal[1]), round(place(pen.normal[0]) - place(pen.normal[1]), 2))
+        Band(i, place(pen.normal[1], pen.axis), round(low - place(pen.normal[1], pen.axis), 2))
         for i, pen in pens
         if pen.normal
+        for low in [place(pen.normal[0], pen.axis)]
     ]
     limits = [
-        Limit(i, place(value), together((f"{letter} ", number(f"{value:g}"))), letter)
+        Limit(i, place(value, pen.axis), together((f"{letter} ", number(f"{value:g}"))), letter)
         for i, pen in pens
         for value, letter in ((pen.high, "H"), (pen.low, "L"))
         if value is not None
     ]
-    lines = [_line(column, begin, end, width, place) for column in columns]
-    ticks = [Tick(place(value), number(text)) for value, text in value_ticks(low, high)]
-    return Plot(lines, ticks, list(time_ticks(begin, end)), limits, bands)
-
-
-def value_range(widget: Trend, columns: Sequence[Sequence[Column]]) -> tuple[float, float]:
-    """The lowest and highest value of the axis: as the panel file says, else of all that is drawn."""
-    limits = [
-        v for pen in widget.pens for v in (pen.low, pen.high, *(pen.normal or ())) if v is not None
+    lines = [
+        _line(column, begin, end, width, partial(place, axis=pen.axis))
+        for column, (_, pen) in zip(columns, pens, strict=True)
     ]
-    lows = [column.low for pen in columns for column in pen] + limits
-    highs = [column.high for pen in columns for column in pen] + limits
-    return axis_range(min(lows, default=0.0), max(highs, default=1.0), widget.min, widget.max)
+    left, right = (
+        [Tick(place(value, axis), number(text)) for value, text in value_ticks(*ends[axis])]
+        if axis in ends
+        else []
+        for axis in AXES
+    )
+    return Plot(lines, left, list(time_ticks(begin, end)), limits, bands, right)
+
+
+def _axes(widget: Trend) -> Sequence[Axis]:
+    return AXES if widget.has_right_axis else AXES[:1]
+
+
+def value_range(widget: Trend, columns: Sequence[Sequence[Column]], axis: Axis) -> tuple[float, float]:
+    """The lowest and highest value of an axis: as the panel file says, else of all that its pens
+    draw."""
+    pens = [(pen, drawn) for pen, drawn in zip(widget.pens, columns, strict=True) if pen.axis == axis]
+    limits = [v for pen, _ in pens for v in (pen.low, pen.high, *(pen.normal or ())) if v is not None]
+    lows = [column.low for _, drawn in pens for column in drawn] + limits
+    highs = [column.high for _, drawn in pens for column in drawn] + limits
+    return axis_range(min(lows, default=0.0), max(highs, default=1.0), *widget.axis_ends(axis))
 
 
 def axis_range(low: float, high: float, fixed_low: float | None, fixed_high: float | None) -> Range:

@@ -105,6 +105,7 @@ type Pen = {
   low: number | undefined;
   high: number | undefined;
   normal: number[] | undefined;
+  axis: string;
   line: SVGPathElement;
   mark: SVGUseElement;
 };

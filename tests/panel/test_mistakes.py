@@ -131,7 +131,11 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
         own |= {"grow": True}  # of any kind, but of few widgets
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
         # A switch switches back; options are the file's or the robot's.
-        refused = {"switch": ["confirm_press", "consequence"], "select": ["options_from"]}.get(kind, [])
+        refused = {
+            "switch": ["confirm_press", "consequence"],
+            "select": ["options_from"],
+            "trend": ["right_min", "right_max"],  # its pen is on the left
+        }.get(kind, [])
         assert list(lacking(own | ({"qos": qos} if qos else {}), model)) == refused, kind
 
 

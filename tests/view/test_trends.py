@@ -218,3 +218,31 @@ def test_the_plot_of_a_page_has_the_window_until_now() -> None:
     assert len(shown.lines[1].path.split("L")) >= COLUMNS
     assert shown.lines[1].x == pytest.approx(100.0, abs=0.5)
     assert shown.lines[0].path == ""
+
+
+def test_pens_on_the_right_have_an_axis_of_their_own() -> None:
+    left, right = {"topic": "/load", "type": FLOAT, "label": "Load"}, {**PENS[0], "axis": "right"}
+    widget, _ = cell(pen=[left, right], min=0.0, max=100.0, right_min=4.0, right_max=8.0)
+    drawn = draw(widget, [columns((0, 25.0, 25.0, 25.0)), columns((0, 7.0, 7.0, 7.0))], 0.0, 600.0)
+    assert [line.y for line in drawn.lines] == [75.0, 25.0]
+    assert [render(tick.text) for tick in drawn.values] == ["0", "25", "50", "75", "100"]
+    assert [render(tick.text) for tick in drawn.right_values] == ["4", "5", "6", "7", "8"]
+    assert [(limit.pen, limit.place) for limit in drawn.limits] == [(1, 37.5), (1, 75.0)]
+    alone, _ = cell()
+    assert draw(alone, [columns((0, 5.0, 5.0, 5.0)), []], 0.0, 600.0).right_values == []
+
+
+@pytest.mark.parametrize(
+    ("keys", "place"),
+    [
+        ({"right_min": 1.0}, "right_min"),
+        ({"pen": [{**PENS[0], "axis": "right"}]}, "pen[0].axis"),
+        (
+            {"pen": [PENS[0], {**PENS[1], "axis": "right"}], "right_min": 2.0, "right_max": 1.0},
+            "right_min",
+        ),
+    ],
+)
+def test_an_axis_that_does_not_fit_is_a_fault(keys: Table, place: str) -> None:
+    widget = Trend.model_validate({**TREND, **keys})
+    assert [fault.place for fault in widget._axis_faults("w")] == [f"w.{place}"]

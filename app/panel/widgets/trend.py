@@ -74,9 +74,12 @@ def history_bytes(keep_s: float) -> int:
 Duration = Annotated[str, AfterValidator(_check_duration)]
 
 
+Axis = Literal["left", "right"]
+
+
 class Pen(Description):
     """One line of a trend: a field as `value * scale + offset`. `normal` is the lowest and the highest
-    normal value."""
+    normal value, and `axis` the side with its numbers."""
 
     topic: TopicName
     type: Type
@@ -90,6 +93,7 @@ class Pen(Description):
     low: Factor | None = None
     high: Factor | None = None
     normal: Annotated[tuple[Factor, ...], Field(strict=False, min_length=2, max_length=2)] | None = None
+    axis: Axis = "left"
 
     def shown(self, value: float) -> float:
         """A value of the field as the trend has it."""
@@ -112,7 +116,7 @@ class Pen(Description):
 
 class Trend(DisplayWidget):
     """Fields over the time of `window`, of which the server keeps `keep`. A silence longer than
-    `max_age_s` is a gap."""
+    `max_age_s` is a gap. `min` and `max` are of the left axis."""
 
     kind: Literal["trend"]
     pens: Annotated[
@@ -125,6 +129,8 @@ class Trend(DisplayWidget):
     max_age_s: Seconds = 5.0
     min: Factor | None = None
     max: Factor | None = None
+    right_min: Factor | None = None
+    right_max: Factor | None = None
     keys: bool = True
     span: Span = 12
 
@@ -167,8 +173,31 @@ class Trend(DisplayWidget):
             if seconds_of(duration) > self.keep_s:
                 message = f'"{duration}" is longer than what is kept, which is "{self.keep}"'
                 yield Fault(f"{place}.{key}", message)
-        if self.min is not None and self.max is not None and self.min >= self.max:
-            yield Fault(f"{place}.min", f"{self.min:g} is not below max, which is {self.max:g}")
+        yield from self._axis_faults(place)
+
+    def axis_ends(self, axis: Axis) -> tuple[float | None, float | None]:
+        """The lower and the upper end of an axis, as far as they are fixed."""
+        return (self.min, self.max) if axis == "left" else (self.right_min, self.right_max)
+
+    @property
+    def has_right_axis(self) -> bool:
+        """Whether pens have their numbers on the right."""
+        return any(pen.axis == "right" for pen in self.pens)
+
+    def _axis_faults(self, place: str) -> Iterator[Fault]:
+        names: dict[Axis, tuple[str, str]] = {
+            "left": ("min", "max"),
+            "right": ("right_min", "right_max"),
+        }
+        for axis, (low_key, high_key) in names.items():
+            low, high = self.axis_ends(axis)
+            if low is not None and high is not None and low >= high:
+                yield Fault(f"{place}.{low_key}", f"{low:g} is not below {high_key}, which is {high:g}")
+        for key in ("right_min", "right_max") if not self.has_right_axis else ():
+            if getattr(self, key) is not None:
+                yield Fault(f"{place}.{key}", 'is for pens with axis = "right": there is none')
+        if all(pen.axis == "right" for pen in self.pens):
+            yield Fault(f"{place}.pen[0].axis", 'is "right" of every pen: leave one on the left')
 
 
 def kept_fields(trends: Iterable[Trend]) -> dict[tuple[str, str], Trend]:

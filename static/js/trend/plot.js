@@ -41,6 +41,7 @@ export class Plot {
       low: numberOr(pen.dataset.low),
       high: numberOr(pen.dataset.high),
       normal: pen.dataset.normal?.split(" ").map(Number),
+      axis: pen.dataset.axis ?? "left",
       line: root.querySelectorAll(".pens > path.line")[i],
       mark: root.querySelectorAll("use.end")[i],
     }));
@@ -56,31 +57,42 @@ export class Plot {
   draw(view, columns) {
     this.#view = view;
     const { begin, end } = view;
-    const [low, high] = this.#range(columns);
+    /** @type {Record<string, [number, number]>} */
+    const ends = { left: this.#range(columns, "left"), right: this.#range(columns, "right") };
     /** @param {number} time */
     const x = (time) => ((time - begin) / (end - begin)) * SIZE;
-    /** @param {number} value */
-    const y = (value) => Math.min(Math.max((high - value) / (high - low), -0.5), 1.5) * SIZE;
+    /** @param {string} axis @returns {(value: number) => number} */
+    const on = (axis) => {
+      const [low, high] = ends[axis];
+      return (value) => Math.min(Math.max((high - value) / (high - low), -0.5), 1.5) * SIZE;
+    };
+    const y = on("left");
     /** @param {string} name */
     const part = (name) => find(this.#root, name);
-    const values = [...valueTicks(low, high, Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX)))];
+    const most = Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX));
+    const values = [...valueTicks(...ends.left, most)];
     const times = [...this.#timeTicks()];
     part(".grid-lines").innerHTML =
       values.map(([value]) => `<path d="M0 ${y(value)}h${SIZE}"/>`).join("") +
       times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
-    part(".values").innerHTML = values
-      .map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${numberText(text)}</text>`)
-      .join("");
+    /** @param {string} at @param {string} axis @param {[number, string][]} ticks */
+    const ticksAt = (at, axis, ticks) =>
+      ticks.map(([value, text]) => `<text ${at} dy="5" y="${on(axis)(value) / 10}%">${numberText(text)}</text>`).join("");
+    part(".values").innerHTML = ticksAt('x="0" dx="-6"', "left", values);
+    const right = this.#root.dataset.right === undefined ? [] : [...valueTicks(...ends.right, most)];
+    part(".right-values").innerHTML = ticksAt('x="100%" dx="6"', "right", right);
     part(".times").innerHTML = times
       .map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`)
       .join("");
-    const limits = this.pens.flatMap(({ high, low }, i) => [
-      ...(high === undefined ? [] : [{ letter: "H", at: high, i }]),
-      ...(low === undefined ? [] : [{ letter: "L", at: low, i }]),
+    const limits = this.pens.flatMap(({ high, low, axis }, i) => [
+      ...(high === undefined ? [] : [{ letter: "H", at: high, axis, i }]),
+      ...(low === undefined ? [] : [{ letter: "L", at: low, axis, i }]),
     ]);
-    part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
+    part(".limits").innerHTML = limits
+      .map(({ at, axis, i }) => `<path class="pen-${i}" d="M0 ${on(axis)(at)}h${SIZE}"/>`)
+      .join("");
     const named = limits
-      .map((limit) => ({ ...limit, place: y(limit.at) / 10 }))
+      .map((limit) => ({ ...limit, place: on(limit.axis)(limit.at) / 10 }))
       .filter(({ place }) => place >= 0 && place <= 100);
     part(".limit-names").innerHTML = named
       .map(
@@ -89,10 +101,10 @@ export class Plot {
       )
       .join("");
     part(".bands").innerHTML = this.pens
-      .flatMap(({ normal }) => (normal ? [normal] : []))
-      .map(([from, to]) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`)
+      .flatMap(({ normal, axis }) => (normal ? [normal.map(on(axis))] : []))
+      .map(([from, to]) => `<rect class="band" x="0" width="${SIZE}" y="${to}" height="${from - to}"/>`)
       .join("");
-    for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
+    for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, on(pen.axis));
   }
 
   // Through the lowest and the highest value of each column: no peak is lost.
@@ -126,18 +138,22 @@ export class Plot {
     return (number + 0.5) * this.#view.width;
   }
 
-  /** @param {Column[][]} columns */
-  #range(columns) {
+  /** @param {Column[][]} columns @param {string} axis @returns {[number, number]} */
+  #range(columns, axis) {
+    const own = this.pens.map((pen) => pen.axis === axis);
     const fixed = this.pens
+      .filter((_, i) => own[i])
       .flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])])
       .filter((value) => value !== undefined);
-    const { min, max } = this.#root.dataset;
+    const { min, max, rightMin, rightMax } = this.#root.dataset;
+    const drawn = columns.filter((_, i) => own[i]).flat();
     /** @param {1 | 2} index @param {(a: number, b: number) => number} pick @param {number} none */
-    const ends = (index, pick, none) => [...columns.flat().map((column) => column[index]), ...fixed].reduce(pick, none);
+    const ends = (index, pick, none) => [...drawn.map((column) => column[index]), ...fixed].reduce(pick, none);
     const low = ends(1, (a, b) => Math.min(a, b), Infinity);
     const high = ends(2, (a, b) => Math.max(a, b), -Infinity);
     const [lowest, highest] = low <= high ? [low, high] : [0, 1]; // nothing is drawn
-    return axisRange(lowest, highest, numberOr(min), numberOr(max));
+    const [from, to] = axis === "left" ? [min, max] : [rightMin, rightMax];
+    return axisRange(lowest, highest, numberOr(from), numberOr(to));
   }
 
   /** @returns {Generator<[number, string]>} */
