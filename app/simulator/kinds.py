@@ -78,14 +78,12 @@ class Served:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acted:
-    """An action that the panel sends goals to; its feedback's field `progress` goes up to `most`, or
-    falls from there."""
+    """An action that the panel sends goals to; its feedback's field `progress` has these `ends`."""
 
     action: str
     type: str
     progress: str | None = None
-    most: float = 100.0
-    falls: bool = False
+    ends: tuple[float, float] = (0.0, 100.0)
     shown: tuple[str, ...] = ()
 
 
@@ -263,8 +261,7 @@ def _action(action: Action, _: Interfaces) -> Iterator[Need]:
         action=action.action,
         type=action.type,
         progress=action.progress,
-        most=action.progress_max,
-        falls=action.progress_falls,
+        ends=action.progress_ends,
         shown=tuple(response_paths(action.feedback)),
     )
 

@@ -261,9 +261,7 @@ class PanelRobot:
                 continue
             types = self._interfaces.action_types(widgets[0].type)
             progress = {
-                widget.progress: (widget.most, 0.0) if widget.falls else (0.0, widget.most)
-                for widget in widgets
-                if widget.progress is not None
+                widget.progress: widget.ends for widget in widgets if widget.progress is not None
             }
             actions[name] = SimulatedAction(
                 widgets[0].type,

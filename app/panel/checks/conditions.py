@@ -88,8 +88,8 @@ def _comparison_faults(
     place: str, condition: Condition, kind: Type, interfaces: Interfaces
 ) -> Iterator[Fault]:
     numeric = kind.name in NUMBERS
-    if not numeric and (given := _number_keys(condition)):
-        yield from (_number_only_fault(place, key, condition, kind) for key in given)
+    if not numeric and (keys := _number_keys(condition)):
+        yield from (_number_only_fault(place, key, condition, kind) for key in keys)
         return
     if condition.is_scaled:
         faults = list(_scaled_faults(place, condition))
@@ -111,8 +111,13 @@ def _comparison_faults(
 
 def _number_keys(condition: Condition) -> list[str]:
     """The given keys that are for numbers only."""
-    given = {"unit": condition.unit, "scale": condition.scale != 1.0, "offset": condition.offset}
-    return [key for key, value in {**given, "format": condition.format}.items() if value]
+    values = {
+        "unit": condition.unit,
+        "scale": condition.scale != 1.0,
+        "offset": condition.offset,
+        "format": condition.format,
+    }
+    return [key for key, value in values.items() if value]
 
 
 def _scaled_faults(place: str, condition: Condition) -> Iterator[Fault]:

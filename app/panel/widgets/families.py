@@ -32,7 +32,7 @@ from app.panel.base import (
 from app.panel.checks.types import field_faults, whole_field
 from app.panel.faults.wording import list_names
 from app.panel.field_paths import FieldPath
-from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
+from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, SIGNS, KeyColour, KeyRole
 from app.panel.widgets.sent_message import SentMessage
 
 
@@ -256,8 +256,9 @@ class KeyCommand(Command):
 
     @property
     def shown_icon(self) -> str:
-        """The icon of the panel file, or that of the role; "" without one."""
-        return self.icon or ICONS.get(self.role, "")
+        """The icon of the file or the role; "" without one, and where the label is its sign."""
+        icon = self.icon or ICONS.get(self.role, "")
+        return "" if self.label in tuple(SIGNS.get(icon, "")) else icon
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.colour is not None and self.colour not in (allowed := COLOURS[self.role]):

@@ -18,4 +18,14 @@ COLOURS: Final[Mapping[KeyRole, tuple[KeyColour, ...]]] = {
 }
 # A key of another role has the colour of the theme's keys.
 OWN_COLOURS: Final[Mapping[KeyRole, KeyColour]] = {"start": "white", "stop": "black", "reset": "blue"}
+# Signs that look like an icon: a key with such a label has the sign alone.
+SIGNS: Final[Mapping[str, str]] = {
+    "minus": "-−–",
+    "plus": "+",
+    "arrow-left": "←",
+    "arrow-right": "→",
+    "arrow-up": "↑",
+    "arrow-down": "↓",
+    "x": "×✕",
+}
 ICONS: Final[Mapping[KeyRole, str]] = {"start": "play", "stop": "square", "reset": "rotate-ccw"}

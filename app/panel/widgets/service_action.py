@@ -108,6 +108,12 @@ class Action(ServerCommand):
         return self.action
 
     @property
+    def progress_ends(self) -> tuple[float, float]:
+        """The progress at first and at last."""
+        ends = (0.0, self.progress_max)
+        return (ends[1], ends[0]) if self.progress_falls else ends
+
+    @property
     def falls_from(self) -> float | None:
         """From where the progress falls, if the panel file says it."""
         return self.progress_max if "progress_max" in self.model_fields_set else None

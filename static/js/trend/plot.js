@@ -77,7 +77,9 @@ export class Plot {
       times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
     /** @param {string} at @param {string} axis @param {[number, string][]} ticks */
     const ticksAt = (at, axis, ticks) =>
-      ticks.map(([value, text]) => `<text ${at} dy="5" y="${on(axis)(value) / 10}%">${numberText(text)}</text>`).join("");
+      ticks
+        .map(([value, text]) => `<text ${at} dy="5" y="${on(axis)(value) / 10}%">${numberText(text)}</text>`)
+        .join("");
     part(".values").innerHTML = ticksAt('x="0" dx="-6"', "left", values);
     const right = this.#root.dataset.right === undefined ? [] : [...valueTicks(...ends.right, most)];
     part(".right-values").innerHTML = ticksAt('x="100%" dx="6"', "right", right);
