@@ -93,9 +93,14 @@ def limit(seconds: float) -> float:
 def ears(domain: int) -> RosNode:
     """A node that receives everything that the panel sends."""
     node = RosNode(domain, "ears")
+    listening(node)
+    return node
+
+
+def listening(node: RosNode) -> None:
+    """The node subscribes to everything that the panel sends."""
     for topic in SENT_ON.values():
         node.subscribe(topic, TEXT, depth=1000)
-    return node
 
 
 def permitting(node: RosNode) -> None:
