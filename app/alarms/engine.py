@@ -162,6 +162,8 @@ class AlarmEngine:
     def _receive_entry(
         self, alarm: AlarmInstance, source: Definition, entry: AlarmEntry, at: float
     ) -> None:
+        if not entry.level and alarm.entry is not None:
+            entry = entry._replace(text=alarm.entry.text)  # what it was, not what is well now
         is_new = alarm.entry != entry or alarm.status.unknown_since or not alarm.is_evaluated
         alarm.heard_at = at
         if is_new:

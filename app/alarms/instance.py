@@ -124,9 +124,12 @@ class AlarmInstance:
 
     @property
     def text(self) -> TextLike:
-        """What it says: the robot's own text, or that of the panel file."""
+        """What it says: the robot's own text (of a diagnostic status with its name) or that of the
+        panel file."""
         if self.entry is not None:
-            return self.entry.text
+            text = self.entry.text
+            named = self.definition.alarm.diagnostics and text != self.entry.name
+            return f"{self.entry.name}: {text}" if named else text
         return self.definition.alarm.text or self.definition.id
 
     @property

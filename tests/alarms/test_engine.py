@@ -296,7 +296,10 @@ def test_each_status_of_diagnostics_is_an_alarm(cell: partial[Cell]) -> None:
     assert [first.definition.id, second.definition.id] == ["health:motor 8", "health:motor 7"]
     assert (first.priority, second.priority) == (2, 3)
     assert first.entry is not None
-    assert english(first.entry.text) == "Burnt"
+    assert english(first.text) == "motor 8: Burnt"
+    rows[8] = ("motor 8", OK, "all is well", "M8")
+    robot.publish_entries("health", *rows)
+    assert english(first.text) == "motor 8: Burnt"  # still not acknowledged: what was, is read
 
 
 def test_a_status_that_disappears_is_not_known(cell: partial[Cell]) -> None:

@@ -49,7 +49,7 @@ def test_a_status_of_a_node_is_an_alarm_on_the_stream_at_once(
                     rows = event["rows"]
                 took_s.append(time.monotonic() - began)
         row = rows["health:motor 11"]
-        assert (row["text"], row["details"], row["priority"]) == ("Hot", "temperature: 91", 2)
+        assert (row["text"], row["details"], row["priority"]) == ("motor 11: Hot", "temperature: 91", 2)
         assert kiosk.snapshot()["alarms"]["standing"] == 11
         print("from the publish to the event, in ms:", *sorted(round(s * 1000) for s in took_s))
         assert min(took_s) < WITHIN_S
