@@ -19,7 +19,7 @@ from app.panel.widgets.camera import Camera
 from app.permission.client_places import ClientPlaces, PlaceLimits
 from app.robot.camera_topic import CameraTopicState
 from app.robot.pictures import NoPicture, Picture, picture
-from app.robot.sample import Buffer
+from app.robot.sample import Buffer, Sample
 from app.transport.peer import RobotContext
 
 LINGER_S: Final = 6.0  # a page without scripts requests the next frame after five seconds
@@ -85,6 +85,7 @@ class Feed:
         self._newest: Frame | None = None  # set on the link's thread
         self._state = CameraTopicState()
         self._viewed_at = -math.inf  # of the newest frame that the view knows of
+        self._counted = 0  # the number of the newest frame whose traffic was recorded
         self._next_frame: asyncio.Future[None] | None = None  # if a viewer waits for it
         self._encoding: tuple[Frame, asyncio.Task[Picture]] | None = None
 
@@ -111,6 +112,7 @@ class Feed:
             if self._newest is newest:  # none has arrived in between
                 await asyncio.shield(self._next_frame)
         self._show(newest)
+        self._count(newest)
         return newest
 
     async def picture(self, frame: Frame, widget: Camera) -> Picture:
@@ -148,7 +150,7 @@ class Feed:
             return
         self._state = self._robot.camera_topics[self._key] = CameraTopicState()
         self._viewed_at = -math.inf
-        self._newest = None  # what arrived while the last subscription ended
+        self._newest, self._counted = None, 0  # what arrived while the last subscription ended
         expression = self._robot.dialect.topic(self._key, self._type)
         self._update_tokens()
         with suppress(LinkError):  # the next session subscribes
@@ -169,6 +171,13 @@ class Feed:
         next_frame, self._next_frame = self._next_frame, None
         if next_frame is not None and not next_frame.done():
             next_frame.set_result(None)
+
+    def _count(self, frame: Frame) -> None:
+        """Records a frame and those before it that no viewer took, once for all viewers."""
+        if frame.number > self._counted:
+            skipped, self._counted = frame.number - self._counted - 1, frame.number
+            sample = Sample(frame.payload, 0, frame.at, frame.wall, None, skipped)
+            self._robot.traffic.record(self._key, sample)
 
     def _show(self, frame: Frame) -> None:
         """The view has a deadline for the age of a frame: only the first frame after it changes it."""

@@ -140,6 +140,24 @@ def test_a_slow_browser_gets_the_newest_and_delays_no_other(kiosk: Server) -> No
             slow.recv(0.3)  # nothing that was not asked for
 
 
+def test_the_page_of_diagnostics_has_the_rate_of_a_camera_that_is_looked_at(kiosk: Server) -> None:
+    def packed() -> dict[str, Any]:
+        topics = kiosk.http.get("/diagnostics").json()["topics"]
+        return next(row for row in topics if row["name"] == "/test_packed")
+
+    counted = packed()["count"]
+    with looking(kiosk, "packed") as socket, looking(kiosk, "packed") as other:
+        first = ask(socket)["number"]
+        ask(other)
+        last = first
+        while last < first + 20:
+            last = ask(socket)["number"]
+    known = packed()
+    assert 20 < known["count"] - counted <= last  # those between that nobody took too, each once
+    assert known["size"] > 0
+    assert 0 < known["rate_hz"] < 20
+
+
 def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNode, page: Page) -> None:
     page.goto(kiosk.url)
     expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
