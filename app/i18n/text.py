@@ -26,6 +26,8 @@ BETWEEN: Final = frozenset({"between_sentences", "between_lines", "between_names
 PANEL, PARTS, TIME, DATE_TIME = "=panel", "=parts", "=time", "=date_time"
 DAY, SHORT_DAY = "=day", "=short_day"
 NUMBER, NUMBERS = "=number", "=numbers"
+ENDED = "=ended"
+ENDS: Final = (".", "!", "?", "…", ":", "。", "！", "？", "：")  # of sentences
 
 
 class Text:
@@ -101,6 +103,12 @@ def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> Tex
     return texts[0] if texts else ""
 
 
+def ended(text: TextLike) -> TextLike:
+    """The text as a sentence that another follows: one of the panel file may lack its full stop."""
+    is_plain = isinstance(text, Text) and text.is_sentence
+    return text if is_plain or text == "" else Text(ENDED, (("said", text),))
+
+
 def render(text: TextLike, language: str = ENGLISH) -> str:
     """The text in a language."""
     return text if isinstance(text, str) else _rendered(text, language)
@@ -151,6 +159,11 @@ def _parts(params: Mapping[str, Any], language: str) -> str:
     return "".join(str(_written(part, language)) for part in params["parts"])
 
 
+def _ended(params: Mapping[str, Any], language: str) -> str:
+    said = str(_written(params["said"], language)).rstrip()
+    return said if said.endswith(ENDS) else sentences(language)["with_stop"].format(said=said)
+
+
 def _number(params: Mapping[str, Any], language: str) -> str:
     text = number_in(params["text"], language)
     return f"{text} {_written(unit, language)}" if (unit := params["unit"]) else text
@@ -167,6 +180,7 @@ _WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
     PARTS: _parts,
     NUMBER: _number,
     NUMBERS: _numbers,
+    ENDED: _ended,
     TIME: lambda params, language: time_in(params["at"], language),
     DAY: lambda params, language: day_in(params["at"], language),
     SHORT_DAY: lambda params, language: short_day_in(params["at"], language),

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from app.dialect.peer_traits import EVERY_SENTENCES, PeerSentences
-from app.i18n import joined, number, say
+from app.i18n import ended, joined, number, say
 from app.interfaces import has_key
 from app.panel.condition import NamedCondition
 from app.panel.interlock import Interlock
@@ -141,7 +141,8 @@ def _with_publishers(verdict: Verdict, interlock: Interlock, robot: RobotState) 
     publishers = robot.topic_publishers.of_topic(robot.key(interlock.topic), robot.graph)
     if publishers.number < SEVERAL or verdict.reason is None:
         return verdict
-    return replace(verdict, reason=joined([verdict.reason, publishers.sentence(interlock.topic)]))
+    said = publishers.sentence(interlock.topic)
+    return replace(verdict, reason=joined([ended(verdict.reason), said]))
 
 
 def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:

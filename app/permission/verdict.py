@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from app.i18n import TextLike, joined, say
+from app.i18n import TextLike, ended, joined, say
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,4 +43,4 @@ def with_advice(verdict: Verdict, advice: TextLike) -> Verdict:
     """A lock whose reason goes on with what to do; the same one again for the same."""
     if verdict.permitted:
         return verdict
-    return replace(verdict, reason=joined((verdict.reason or "", advice)))
+    return replace(verdict, reason=joined((ended(verdict.reason or ""), advice)))

@@ -25,7 +25,7 @@ LAYERS: Final = (
 )  # fmt: skip
 SHARED: Final = ("entries", "marks", "facts")  # by several kinds of widgets
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
-OWN_PAGES: Final = ("log", "alarms", "alarm-history", "alarm-report", "diagnostics")
+OWN_PAGES: Final = ("log", "alarms", "alarm-history", "alarm-report", "diagnostics", "help")
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {

@@ -19,13 +19,14 @@ REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not b
 class FramedPage(NamedTuple):
     """`robot` is the id of the robot whose frame is around the page, "" for the first. `alarms_page` is
     the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
-    for another page. `vary` names the request header by which the address has another content."""
+    for another page. `is_help`: it is the page of help. `vary` names the request header by which the address has another content."""
 
     template: str
     title: Text
     robot: str = ""
     alarms_page: str | None = None
     diagnostics_query: str | None = None
+    is_help: bool = False
     vary: str = ""
 
 
@@ -47,6 +48,7 @@ def framed_page(
         REFRESH_S,
         alarms_page=page.alarms_page,
         diagnostics_query=page.diagnostics_query,
+        is_help=page.is_help,
     )
     html = state.templates.render(page.template, language_of(request), **frame, **context)
     headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})

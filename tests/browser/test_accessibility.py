@@ -113,7 +113,7 @@ def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, page: Page) -> 
     theme: the contrast of the others' colours is tested by `tests/web/test_tokens.py`."""
     languages = sorted(files_of_languages())
     pages = [f"/pages/{described.id}" for described in load_panel(PACKAGE / "panel.toml").pages]
-    for number, path in enumerate([*pages, "/gallery", "/log"]):
+    for number, path in enumerate([*pages, "/gallery", "/log", "/help"]):
         language = languages[number % len(languages)]
         page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
         page.goto(shipped.url + path)

@@ -101,3 +101,46 @@ def test_the_brands_colour_is_in_its_corner_only(branded: Server, page: Page) ->
     page.locator("#menu").get_by_role("button", name="Deutsch").click()
     expect(page.locator(".language")).to_have_text("Deutsch")
     expect(page.locator(".machine-state .details")).to_contain_text("Automatik")
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_the_menu_has_what_the_header_has_no_room_for(
+    branded: Server, page: Page, language: str
+) -> None:
+    page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": branded.url}])
+    page.goto(branded.url)
+    sized(page, 800, 480).evaluate(DRAWN)
+    facts = page.locator("#menu .of-header")
+    expect(facts).not_to_be_visible()
+    page.locator(".menu-key").click()
+    expect(facts).to_be_visible()
+    expect(facts).to_contain_text("4711")  # the order
+    expect(facts).to_contain_text(page.locator("#day").inner_text())
+    mode = page.locator('.machine-state [data-text="detail0"]')
+    expect(facts).to_contain_text(mode.text_content() or "none")
+    for name in ("#clock", '.machine-state [data-text="detail0"]'):
+        page.locator(name).evaluate("(text) => (text.firstChild.data = 'renewed ' + text.className)")
+        expect(facts).to_contain_text("renewed")  # it follows the header
+    sized(page, 1280, 800).evaluate(DRAWN)
+    expect(facts).not_to_be_visible()
+
+
+def test_a_phone_has_a_heading(branded: Server, page: Page) -> None:
+    page.goto(branded.url)
+    sized(page, 390, 844).evaluate(DRAWN)
+    expect(page.get_by_role("heading", level=1)).to_have_text("Robot cell 1")
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_help_says_what_the_signs_mean_in_each_theme_and_language(branded: Server, page: Page) -> None:
+    page.goto(branded.url)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    page.locator(".menu-key").click()
+    page.locator("#menu").get_by_role("link", name="Help").click()
+    expect(page.locator(".signs li")).to_have_count(16)
+    expect(page.locator("main > .version")).to_contain_text("operator-panel")
+    expect(page.locator("[data-widget=stop] > button")).to_be_enabled()
+    page.locator(".menu-key").click()
+    page.locator("#menu").get_by_role("button", name="日本語").click()
+    expect(page.locator(".signs h2").first).to_have_text("ボタン")
+    assert page.url.endswith("/help")

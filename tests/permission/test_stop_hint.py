@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.i18n import say
+from app.i18n import render, say
 from app.robot.state import RobotState
 from app.view.view import build_view, lock_all
 from tests.support.builders import (
@@ -70,3 +70,22 @@ def test_failed_view_shows_the_hint_at_the_stop_button_only(robot: RobotState) -
     view = lock_all(panel, build_view(panel, robot, NOW), say("view_failed")).view
     reasons = {name: str(english(view["widgets"][name]["reason"])) for name in ("stop", "start")}
     assert reasons["stop"] == f"{reasons['start']} {HINT}"
+
+
+@pytest.mark.parametrize(
+    ("locked", "language", "shown"),
+    [
+        ("Guard door open", "en", f"Guard door open. {HINT}"),
+        ("Is the guard door open?", "en", f"Is the guard door open? {HINT}"),
+        ("Close the guard door.", "de", f"Close the guard door. {HINT}"),
+        ({"en": "Guard door open", "ja": "安全扉が開"}, "ja", f"安全扉が開。{HINT}"),
+    ],
+)
+def test_a_lock_without_a_full_stop_does_not_run_into_the_hint(
+    robot: RobotState, locked: Any, language: str, shown: str
+) -> None:
+    permits(robot, False)
+    panel = panel_of(STOP, START, stop_hint=HINT, interlock={"locked": locked})
+    widgets = build_view(panel, robot, NOW).view["widgets"]
+    assert render(widgets["stop"]["reason"], language) == shown
+    assert HINT not in render(widgets["start"]["reason"], language)

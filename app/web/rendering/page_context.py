@@ -59,6 +59,7 @@ class PageContext(TypedDict):
     is_log: bool
     is_alarms: bool
     is_diagnostics: bool
+    is_help: bool
     inside: Markup | None
     base: str
     robot: str
@@ -94,10 +95,11 @@ def page_context(
     embedded: bool = False,
     alarms_page: str | None = None,
     diagnostics_query: str | None = None,
+    is_help: bool = False,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
     `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
-    query of the page of diagnostics, for that page.
+    query of the page of diagnostics, for that page; `is_help`: it is the page of help.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = _faded(session.presses.receipt(request.query_params.get("receipt", "")))
@@ -112,10 +114,12 @@ def page_context(
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
-    is_log = page.id == FRAME_ONLY and not is_alarms and not is_diagnostics
+    is_log = page.id == FRAME_ONLY and not (is_alarms or is_diagnostics or is_help)
     back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
     if is_diagnostics:
         back = f"{state.root}/diagnostics?{diagnostics_query}"
+    if is_help:
+        back = f"{state.root}/help"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -135,6 +139,7 @@ def page_context(
         is_log=is_log,
         is_alarms=is_alarms,
         is_diagnostics=is_diagnostics,
+        is_help=is_help,
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

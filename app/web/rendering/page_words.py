@@ -41,6 +41,7 @@ WORDS: Final = (
     "cleaning",
     "cleaning_end",
     "diagnostics_title",
+    "help",
 )
 TREND_WORDS: Final = (
     "trend_earlier",

@@ -50,7 +50,7 @@ AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
 FORM_FIELDS_MOST: Final = 600
 OWN_PAGE: Final = re.compile(
-    r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics)(\?[!-~]*)?"
+    r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics|help)(\?[!-~]*)?"
 )
 OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
 TOO_OFTEN: Final = say("control_too_often")

@@ -39,6 +39,7 @@ OTHER_PAGES = (
     "error.html",
     "gallery.html",
     "log.html",
+    "help.html",
     "alarms.html",
     "alarm-history.html",
     "alarm-report.html",
