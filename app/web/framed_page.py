@@ -19,7 +19,8 @@ REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not b
 class FramedPage(NamedTuple):
     """`robot` is the id of the robot whose frame is around the page, "" for the first. `alarms_page` is
     the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
-    for another page. `is_help`: it is the page of help. `vary` names the request header by which the address has another content."""
+    for another page. `is_help`: it is the page of help. `vary` names the request header by which the
+    address has another content."""
 
     template: str
     title: Text

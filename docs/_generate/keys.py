@@ -49,7 +49,9 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     source = {
         f"{name}.source": "oven" for name, table in tables.items() if "source" in table["properties"]
     }
-    return grow | source | examples | own
+    with_label = (name for name, table in tables.items() if "show_label" in table["properties"])
+    label = {f"{name}.show_label": False for name in with_label}
+    return grow | label | source | examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:

@@ -55,7 +55,7 @@ POOR: Final = """() => {
     if (!box || style.clipPath !== "none") continue;
     const behind = document.elementsFromPoint(box.x + box.width / 2, box.y + box.height / 2)
       .concat(document.documentElement)
-      .map((found) => getComputedStyle(found))
+      .map((each) => getComputedStyle(each))
       .find(({ backgroundColor, backgroundImage }) =>
         isOpaque(backgroundColor) || backgroundImage !== "none");
     if (!behind || behind.backgroundImage !== "none") continue;
@@ -86,12 +86,12 @@ def test_texts_of_every_page_have_the_contrast_of_aaa(shipped: Server, page: Pag
         expect(page.locator("html")).to_have_attribute("data-theme", theme)
         expect(page.locator("[data-widget=stop] > button")).to_be_enabled()
         assert page.evaluate("document.body.innerText.length") > 100
-        if found := page.evaluate(POOR):
-            poor[path] = found
+        if texts := page.evaluate(POOR):
+            poor[path] = texts
     page.goto(f"{shipped.url}/pages/cell")
     expect(page.locator("[data-widget=stop] > button")).to_be_enabled()
     page.evaluate("pageGuard.fail('as the test says')")  # all is old and locked
     expect(page.locator("body[data-locked]")).to_be_attached()
-    if found := page.evaluate(POOR):
-        poor["locked"] = found
+    if texts := page.evaluate(POOR):
+        poor["locked"] = texts
     assert poor == {}

@@ -128,7 +128,7 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     assert list(lacking(together, Page)) == ["template", "styles"]
     for kind, (model, *_) in KINDS.items():
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
-        own |= {"grow": True}  # of any kind, but of few widgets
+        own |= {"grow": True, "show_label": False}  # of any kind, but of few widgets
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
         # A switch switches back; options are the file's or the robot's.
         refused = {

@@ -259,7 +259,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[0].widget[0]",
             '"kind" is missing; one of text, number, slider, select, toggle, publish',
         ),
-        (with_widget(1, shade="red"), f"{BUTTON}.shade", "unknown key; known here: id, label, span"),
+        (with_widget(1, shade="red"), f"{BUTTON}.shade", "known here: id, label, show_label"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
         (with_widget(1, max_length=3), f"{BUTTON}.max_length", "unknown key"),
         (with_widget(1, label=""), f"{BUTTON}.label", "must not be empty"),
@@ -488,7 +488,7 @@ def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> 
     assert faults(load, tables(page=[page])) == {
         "page[0].widget[0].constants": (
             'unknown key, as "order"; known here: '
-            "id, label, span, rows, grow, kind, max_length, default, scan"
+            "id, label, show_label, span, rows, grow, kind, max_length, default, scan"
         )
     }
 

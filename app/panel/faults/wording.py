@@ -64,6 +64,8 @@ def describe_error(error: Mapping[str, Any], key: str, header: str = "") -> str:
             return f"must be a list of {listed}, not {value}"
         case "dict_type":
             return f'must be a table, like {{ field = "value" }}, not {value}'
+        case "string_too_short" if key == "label":
+            return "must not be empty: show_label = false leaves the label of a widget out"
         case "string_too_short" | "too_short":
             return "must not be empty"
         case "string_too_long" | "too_long":

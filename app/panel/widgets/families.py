@@ -70,15 +70,15 @@ class TopicSource(NamedTuple):
 class BaseWidget(Description):
     """The keys of every widget; `span` is its width in columns of its group, which are twelfths of the
     page where the group does not say, and `rows` its height in rows of its group; with `grow` its row
-    takes the height that is left."""
+    takes the height that is left. Without `show_label` its label is only read aloud."""
 
     id: Id
     label: Label
+    show_label: bool = True
     span: Span = 12
     rows: Annotated[int, Field(ge=1, le=8)] = 1
     grow: bool = False
     kind: str
-
     why_needed: ClassVar[Mapping[str, str]] = {}  # why a key is required, if that is not obvious
     required_types: ClassVar[tuple[str, ...]] = ()  # that the server needs for this kind
     allowed_in_frame: ClassVar[bool] = False  # whether the frame around the pages may have it
