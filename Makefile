@@ -246,15 +246,17 @@ lock:
 	$(MAKE) --no-print-directory .venv/test
 	.venv/bin/python -m app.interfaces.make_builtin
 
-# The panel's fonts from npm's @fontsource packages. The Japanese one keeps only what is needed.
-fonts:
+# The panel's fonts from npm's @fontsource packages, and the widths of their letters. The Japanese one keeps only what
+# is needed.
+fonts: .venv/test
 	mkdir -p build/fonts
 	cd build/fonts && for name in ibm-plex-sans noto-sans-jp; do npm pack --silent @fontsource/$$name@5.3.0 && tar xzf fontsource-$$name-5.3.0.tgz && cp package/LICENSE ../../static/fonts/$$name.LICENSE && mv package $$name || exit 1; done
 	$(PYTHON) deploy/font_characters.py > build/fonts/characters.txt
 	for weight in 400 700; do \
 		cp build/fonts/ibm-plex-sans/files/ibm-plex-sans-latin-$$weight-normal.woff2 static/fonts/ibm-plex-sans-$$weight.woff2 && \
-		uvx --from 'fonttools[woff]==4.68.0' pyftsubset build/fonts/noto-sans-jp/files/noto-sans-jp-japanese-$$weight-normal.woff2 --text-file=build/fonts/characters.txt --flavor=woff2 --layout-features=kern,palt,locl,ccmp --desubroutinize --no-hinting --output-file=static/fonts/noto-sans-jp-$$weight.woff2 || exit 1; \
+		.venv/bin/python -m fontTools.subset build/fonts/noto-sans-jp/files/noto-sans-jp-japanese-$$weight-normal.woff2 --text-file=build/fonts/characters.txt --flavor=woff2 --layout-features=kern,palt,locl,ccmp --desubroutinize --no-hinting --output-file=static/fonts/noto-sans-jp-$$weight.woff2 || exit 1; \
 	done
+	.venv/bin/python -m deploy.font_widths
 
 clean:
 	rm -rf .venv .venv-ros .venv-docs .venv-release dist build .mypy_cache .ruff_cache
