@@ -13,6 +13,7 @@ from app.panel.model import Panel
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.trend import Trend, history_bytes
+from app.panel.widths.cut_texts import cut_notes
 
 MOVING: Final = (HoldCommand, Action)
 
@@ -28,6 +29,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from _trend_notes(panel)
     yield from unit_notes(panel, interfaces)
     yield from fit_notes(panel)
+    yield from cut_notes(panel)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)
 

@@ -1,0 +1,85 @@
+"""Places for texts, and whether a text is cut in one."""
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from app.i18n import TextLike, render
+from app.panel.widgets.tiles import Screen
+from app.panel.widths.letters import text_width
+from app.panel.widths.lines import NEAR, line_count, widest_piece
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """The sizes of texts, as static/css/tokens.css has them."""
+
+    small: float
+    text: float
+    label: float
+    value: float
+
+
+SIZES: Final = {"normal": Sizes(15, 17, 20, 26), "large": Sizes(17, 20, 24, 30)}
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Where a widget stands: its width and height in px, and the page around it."""
+
+    width: float
+    height: float
+    screen: Screen
+    sizes: Sizes
+    fit: bool
+
+
+class Cut(NamedTuple):
+    """A text that is cut: which part of it, what it needs, and what it has."""
+
+    text: str
+    needs: str
+    has: str
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """The place of a text: `lines` of `width` px, of which the first is shorter by `indent`. With
+    `wraps` a text has several lines, and none is broken inside a word. `after` stands behind the text
+    on the same line."""
+
+    part: str  # the key of the text in the panel file, or what it is
+    text: TextLike
+    width: float
+    size: float
+    bold: bool = False
+    lines: int = 1
+    wraps: bool = False
+    indent: float = 0.0
+    after: TextLike = ""
+    after_size: float = 0.0
+    after_bold: bool = False
+    name: str = "place"
+
+    def cut(self, language: str) -> Cut | None:
+        """What is cut of the text in a language; None for nothing."""
+        text = render(self.text, language)
+        after = render(self.after, language)
+        tail = text_width(after, self.after_size or self.size, bold=self.after_bold)
+        if not self.wraps:
+            needs = self.indent + text_width(text, self.size, bold=self.bold) + tail
+            return _too_wide(text + after, needs, self) if needs > self.width + NEAR else None
+        word, needs = widest_piece(text, self.size, bold=self.bold)
+        if needs > self.width + NEAR:
+            return _too_wide(word, needs, self)
+        whole = f"{text} {after.replace(' ', NO_BREAK)}" if after else text
+        lines = line_count(whole, self.width, self.size, bold=self.bold, indent=self.indent)
+        if lines <= self.lines:
+            return None
+        return Cut(text, f"{lines} lines", f"{self.lines} of {self.width:.0f} px")
+
+
+NO_BREAK: Final = "\u00a0"
+
+
+def _too_wide(text: str, needs: float, box: Box) -> Cut:
+    return Cut(text, f"{needs:.0f} px", f"{max(box.width, 0):.0f}")

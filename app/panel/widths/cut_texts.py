@@ -1,0 +1,166 @@
+"""Which texts of a panel are cut, on which screens and in which languages."""
+
+from collections.abc import Iterable, Iterator
+from typing import Final, NamedTuple
+
+from app.errors import Note
+from app.panel.checks.fit import GAP, group_width, page_width, row_heights
+from app.panel.layout import COLUMNS, Group, Page, is_button
+from app.panel.model import Panel
+from app.panel.widgets.families import KeyCommand
+from app.panel.widgets.tiles import (
+    ENTRY_MM,
+    GAP_MM,
+    KEY_MM,
+    LOW_SCREEN,
+    MIDDLE,
+    NARROW,
+    Screen,
+)
+from app.panel.widths.boxes import SIZES, Box, Cell, Cut
+from app.panel.widths.reasons import reason_texts
+from app.panel.widths.texts import face_texts, texts
+
+KIOSK_SCREENS: Final = ("1280x800", "1024x600", "800x480")  # where the panel file names none
+MAX_KEY_MM: Final = 28.0  # on a page that fits
+TAB_PAD: Final = 9.0  # of a page's tab, with the border of the rail
+GROUP_TAB_PAD: Final = 8.0
+FRAME_KEY_PAD: Final = 15.0  # of the rail and of a button's face
+FRAME_FACE_PADS: Final = 2.0  # less above and below than on other buttons
+Placed = Iterator[tuple[str, Box]]
+
+
+class Finding(NamedTuple):
+    """A text that is cut on one screen."""
+
+    place: str
+    box: Box
+    language: str
+    cut: Cut
+    size: str
+
+
+def cut_notes(panel: Panel) -> Iterator[Note]:
+    """A note for each text that is cut on a screen of the panel."""
+    by_text: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for finding in findings(panel):
+        key = finding.place, finding.cut.text, finding.cut.needs, finding.box.name
+        by_text.setdefault(key, []).append(finding)
+    for (place, text, needs, name), cuts in by_text.items():
+        languages = {finding.language for finding in cuts}
+        tags = f" ({', '.join(sorted(languages))})" if len(panel.readers_languages) > 1 else ""
+        yield Note(place, f'"{text}"{tags} needs {needs}, the {name} has {_has(cuts)}')
+
+
+def _has(cuts: Iterable[Finding]) -> str:
+    """What a text has on each screen: "80 at 800x480"."""
+    sizes: dict[str, list[str]] = {}
+    for finding in cuts:
+        named = sizes.setdefault(finding.cut.has, [])
+        if finding.size not in named:
+            named.append(finding.size)
+    return ", ".join(f"{has} at {' and '.join(named)}" for has, named in sizes.items())
+
+
+def findings(panel: Panel) -> Iterator[Finding]:
+    """Every text that is cut, for each screen and language."""
+    for size in panel.screens or KIOSK_SCREENS:
+        screen = Screen.from_size(size, panel.mm_per_px)
+        for place, box in boxes(panel, screen):
+            for language in panel.readers_languages:
+                if cut := box.cut(language):
+                    yield Finding(f"{place}.{box.part}", box, language, cut, size)
+
+
+def boxes(panel: Panel, screen: Screen) -> Placed:
+    """(place in the panel file, place of a text) of every text on a screen; a phone's pages scroll."""
+    if screen.width < NARROW:
+        return
+    yield from _rail(panel, screen)
+    for p, page in enumerate(panel.pages):
+        if not page.template:
+            yield from ((f"page[{p}]{place}", box) for place, box in _page(panel, page, screen))
+
+
+def _rail(panel: Panel, screen: Screen) -> Placed:
+    sizes = SIZES[panel.text_size]
+    for p, page in enumerate(panel.pages if len(panel.pages) > 1 else ()):
+        width = screen.rail - TAB_PAD
+        title = Box("title", page.title, width, sizes.small, bold=True, lines=3, wraps=True, name="tab")
+        yield f"page[{p}]", title
+    interlocks = {interlock.id: interlock for interlock in panel.interlocks}
+    stops = {widget.id for widget in panel.stops}
+    for w, widget in enumerate(panel.frame.widgets):
+        if not isinstance(widget, KeyCommand):
+            continue
+        is_low = screen.height <= LOW_SCREEN and widget.id not in stops
+        height = screen.touch(ENTRY_MM if is_low else KEY_MM) + FRAME_FACE_PADS
+        cell = Cell(screen.rail, height, screen, sizes, fit=True)
+        inside = screen.rail - FRAME_KEY_PAD
+        for box in face_texts(widget, inside, cell, sizes.text):
+            yield f"frame.widget[{w}]", box
+        for box in reason_texts(widget, interlocks, cell, inside=inside):
+            yield f"frame.widget[{w}]", box
+
+
+def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
+    interlocks = {interlock.id: interlock for interlock in panel.interlocks}
+    own = 1 if page.own else 0
+    for number, group in enumerate(page.parts):
+        at = "" if number < own else f".group[{number - own}]"
+        width = _group_width(group, page, screen, page_width(panel, screen))
+        for box in _headings(panel, page, number, screen, width):
+            yield at, box
+        for w, cell in enumerate(_cells(panel, page, group, screen, width)):
+            widget = group.widgets[w]
+            for box in (*texts(widget, cell), *reason_texts(widget, interlocks, cell)):
+                yield f"{at}.widget[{w}]", box
+
+
+def _group_width(group: Group, page: Page, screen: Screen, width: float) -> float:
+    """The width inside a group."""
+    if page.fit:
+        return group_width(group, page, screen, width)
+    span = group.span if screen.width >= MIDDLE else COLUMNS
+    return (width + GAP) * span / COLUMNS - GAP - 2 * screen.pad
+
+
+def _cells(panel: Panel, page: Page, group: Group, screen: Screen, width: float) -> Iterator[Cell]:
+    """The cells of a group's widgets, in their order."""
+    gap = GAP_MM * screen.mm
+    column = (width - gap * (group.grid - 1)) / group.grid
+    heights = row_heights(group, screen)
+    for widget, row, rows in group.cells():
+        span = group.span_of(widget)
+        height = sum(heights[row : row + rows]) + GAP * (rows - 1)
+        if is_button(widget):
+            height -= gap - GAP
+            height = min(height, MAX_KEY_MM * screen.mm) if page.fit else height
+        yield Cell(column * span + gap * (span - 1), height, screen, SIZES[panel.text_size], page.fit)
+
+
+def _headings(panel: Panel, page: Page, number: int, screen: Screen, width: float) -> Iterator[Box]:
+    """The title of a group, as its heading or as a tab, and the note beside it."""
+    sizes, group = SIZES[panel.text_size], page.parts[number]
+    title = group.title or page.title
+    if tab := _tab_width(panel, page, number, screen):
+        inside = tab - GROUP_TAB_PAD
+        yield Box("title", title, inside, sizes.text, bold=True, lines=2, wraps=True, name="tab")
+    elif group.title:
+        yield Box("title", title, width, sizes.text, bold=True, name="heading")
+        if group.note:
+            yield Box("note", group.note, width, sizes.small, name="heading")
+
+
+def _tab_width(panel: Panel, page: Page, number: int, screen: Screen) -> float:
+    """The width of the tab of a group that takes turns with others; 0 for one that does not."""
+    count = len(page.parts)
+    if not page.fit or screen.is_wide or count == 1:
+        return 0.0
+    width = page_width(panel, screen)
+    if screen.width < MIDDLE and not screen.is_upright:
+        return (width - 4 * (count - 1)) / count
+    if count == 2 or number == 0:
+        return 0.0
+    half = (width - GAP) / 2 if screen.width >= MIDDLE else width
+    return (half - 4 * (count - 2)) / (count - 1)

@@ -1,0 +1,245 @@
+"""The texts of each kind of widgets and their places, from the sizes that static/css gives them.
+
+tests/browser/test_widths_in_browser.py holds them against a browser. What has no known longest text is
+not measured: values of topics without a scale, receipts, and the server's own sentences.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from app.i18n import say
+from app.i18n.values import each_language, together
+from app.panel.widgets.displays import Indicator
+from app.panel.widgets.families import BaseWidget, KeyCommand
+from app.panel.widgets.figure import Figure
+from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.inputs import SelectInput, ToggleInput
+from app.panel.widgets.joints import Joints
+from app.panel.widgets.joystick import Joystick
+from app.panel.widgets.kinds import find_row
+from app.panel.widgets.numbers import Numeric, SliderInput
+from app.panel.widgets.sequence import Sequence
+from app.panel.widgets.service_action import Action
+from app.panel.widgets.static import PageLink, Picture, TextLabel
+from app.panel.widgets.step import Step
+from app.panel.widgets.switch import Switch
+from app.panel.widgets.table import Table
+from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE
+from app.panel.widths.boxes import Box, Cell
+from app.panel.widths.letters import text_width
+from app.panel.widths.values import after_gap, ends, formatted, with_some_value
+
+Texts = Callable[[Any, Cell], Iterator[Box]]
+BORDERS: Final = 3.0  # of a button, left and right
+FACE_PAD: Final = 16.0
+NARROW_FACE, NARROW_LABEL = 160.0, 17.0  # up to this width a button's label has this size
+LAMP: Final = 46.0  # with the gap beside it, as the following ones
+STEP_NUMBER: Final = 38.0
+SWITCH_GAP: Final = 12.0
+FIELD_PAD: Final = 27.0  # of an input, with its borders
+PICKER: Final = 24.0  # the arrow of a choice
+NO_NAMES: Final = 620.0  # on a lower screen the name of a figure is only read aloud
+JOINT_NAME_EM: Final = 7.0
+MANY: Final = 99  # lines of a text that makes its place higher
+
+
+def texts(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
+    """The texts of a widget in their places."""
+    yield from find_row(TEXTS, widget)(widget, cell)
+
+
+def face_texts(widget: KeyCommand, inside: float, cell: Cell, size: float = 0.0) -> Iterator[Box]:
+    """Label and note of a button with this width inside, and this size of the label."""
+    size = size or (NARROW_LABEL if inside <= NARROW_FACE else cell.sizes.label)
+    box = Box("label", widget.label, inside, size, bold=True, lines=2, wraps=True, name="button")
+    yield box
+    if widget.note:
+        yield replace(box, part="note", text=widget.note, size=cell.sizes.small, bold=False)
+
+
+def _label(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
+    yield Box("label", widget.label, cell.width, cell.sizes.small)
+
+
+def _nothing(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
+    yield from ()
+
+
+def _key(widget: KeyCommand, cell: Cell) -> Iterator[Box]:
+    yield from face_texts(widget, cell.width - FACE_PAD, cell)
+
+
+def _action(widget: Action, cell: Cell) -> Iterator[Box]:
+    third = (cell.width - GAP_MM * cell.screen.mm) / 3
+    yield from face_texts(widget, 2 * third - FACE_PAD, cell)
+    size = cell.sizes.text if cell.width <= 380 else cell.sizes.label
+    width = third - BORDERS
+    yield Box("cancel", say("cancel"), width, size, bold=True, lines=2, wraps=True, name="button")
+
+
+def _link(widget: PageLink, cell: Cell) -> Iterator[Box]:
+    width = cell.width - FACE_PAD - BORDERS
+    yield Box("label", widget.label, width, cell.sizes.label, lines=2, wraps=True, name="button")
+
+
+def _text_label(widget: TextLabel, cell: Cell) -> Iterator[Box]:
+    sizes = {"small": cell.sizes.small, "normal": cell.sizes.text, "large": cell.sizes.value}
+    is_large = widget.size == "large"
+    yield Box("label", widget.label, cell.width, sizes[widget.size], is_large, lines=MANY, wraps=True)
+
+
+def _indicator(widget: Indicator, cell: Cell) -> Iterator[Box]:
+    width = cell.width - LAMP
+    yield Box("label", widget.label, width, cell.sizes.small)
+    size = cell.sizes.text if cell.width <= 180 else cell.sizes.label
+    for number, state in enumerate(widget.states):
+        part, lines = f"states[{number}].text", 1 if cell.fit else 2
+        yield Box(part, state.text, width, size, bold=True, lines=lines, wraps=not cell.fit)
+
+
+def _figure(widget: Figure, cell: Cell) -> Iterator[Box]:
+    if cell.screen.height > NO_NAMES:
+        yield from _label(widget, cell)
+    if not isinstance(widget.target, float):
+        return
+    is_small = cell.width <= 300
+    size = 48.0 if is_small or cell.screen.height <= LOW_SCREEN else 64.0
+    target = formatted(widget.target, None)
+    rest = together([" ", say("figure_target", target=target), after_gap(widget.unit)])
+    width = cell.width - _beside(widget, cell)
+    number = formatted(widget.target, widget.format)
+    rest_size = cell.sizes.label if is_small else 24.0
+    yield Box("target", number, width, size, bold=True, after=rest, after_size=rest_size)
+
+
+def _beside(figure: Figure, cell: Cell) -> float:
+    """The width of the lines beside the number, with the gap."""
+    widths = [
+        text_width(text, cell.sizes.small if number else cell.sizes.label, bold=not number)
+        for number, line in enumerate(figure.lines)
+        for text in each_language(with_some_value(line.text)).values()
+    ]
+    return 12 + max(widths) if widths else 0.0
+
+
+def _gauge(widget: Gauge, cell: Cell) -> Iterator[Box]:
+    if widget.orientation == "horizontal":
+        return
+    yield from _label(widget, cell)
+    width = cell.width - (80.0 if cell.width >= 150 else 48.0) - 5
+    size = cell.sizes.label if cell.width <= 170 else cell.sizes.value
+    yield from _numbers(widget, width, size, cell)
+
+
+def _numbers(widget: Gauge | Step, width: float, size: float, cell: Cell) -> Iterator[Box]:
+    """The ends of a scale, each with its unit, which is smaller."""
+    unit = after_gap(widget.unit)
+    for number in ends(widget.min, widget.max, widget.format):
+        yield Box("value", number, width, size, bold=True, after=unit, after_size=cell.sizes.small)
+
+
+def _number(widget: Numeric, cell: Cell) -> Iterator[Box]:
+    """With the limits beside the label: on a narrow one the range only, else what is left of them."""
+    small = cell.sizes.small
+    ranges = (
+        max(text_width(str(widget.range_text), small), 3 * small) if cell.width <= 330 else 3 * small
+    )
+    named = together([widget.label, " (", widget.unit, ")"]) if widget.unit else widget.label
+    yield Box("label", named, cell.width - 8 - ranges, small)
+    if isinstance(widget, SliderInput):
+        return
+    steps = 0.0 if cell.width <= 200 else 2 * (cell.screen.touch(ENTRY_MM) + 8)
+    for number in ends(widget.min, widget.max, None):
+        yield Box("value", number, cell.width - steps - FIELD_PAD, cell.sizes.label, bold=True)
+
+
+def _select(widget: SelectInput, cell: Cell) -> Iterator[Box]:
+    yield from _label(widget, cell)
+    width = cell.width - FIELD_PAD - PICKER
+    for number, option in enumerate(widget.options):
+        yield Box(f"options[{number}].label", option.label, width, cell.sizes.label)
+
+
+def _toggle(widget: ToggleInput, cell: Cell) -> Iterator[Box]:
+    yield from _label(widget, cell)
+    width = cell.width - 2 * cell.screen.touch(ENTRY_MM)  # less 12 for the gap, as it is less 12 wide
+    for part, text in (("on", widget.on), ("off", widget.off)):
+        yield Box(part, text, width, cell.sizes.label, bold=True, lines=2, wraps=True)
+
+
+def _switch(widget: Switch, cell: Cell) -> Iterator[Box]:
+    yield from _label(widget, cell)
+    is_narrow = cell.width <= 200
+    size = cell.sizes.text if is_narrow else cell.sizes.label
+    width = (cell.width - BORDERS) / 2 - (1.5 if is_narrow else 13.5)
+    for part, text in (("on", widget.on), ("off", widget.off)):
+        yield Box(part, text, width, size, bold=True, name="button")
+
+
+def _step(widget: Step, cell: Cell) -> Iterator[Box]:
+    width = step_width(cell)
+    yield Box("label", widget.label, width, cell.sizes.small)
+    yield from _numbers(widget, width, cell.sizes.value, cell)
+
+
+def step_width(cell: Cell) -> float:
+    """The width between the buttons of a step."""
+    return cell.width - 2 * cell.screen.touch(KEY_MM) - 16
+
+
+def _table(widget: Table, cell: Cell) -> Iterator[Box]:
+    yield from _label(widget, cell)
+    last = len(widget.columns) - 1
+    size = cell.sizes.text if cell.screen.height <= LOW_SCREEN else 18.0
+    for number, (column, percent) in enumerate(zip(widget.columns, widget.widths, strict=True)):
+        width = cell.width * percent / 100 - (0 if number == last else 10)
+        place = f"column[{number}]"
+        yield Box(f"{place}.label", column.label, width, cell.sizes.small)
+        for s, state in enumerate(column.states):
+            yield Box(f"{place}.states[{s}].text", state.text, width - 32, size, bold=True)
+
+
+def _joints(widget: Joints, cell: Cell) -> Iterator[Box]:
+    yield from _label(widget, cell)
+    size = cell.sizes.text
+    for number, joint in enumerate(widget.joints):
+        part, width = f"joint[{number}].label", JOINT_NAME_EM * size
+        yield Box(part, joint.shown_label, width, size, bold=True)
+
+
+def _sequence(widget: Sequence, cell: Cell) -> Iterator[Box]:
+    beside = widget.has_picture and cell.screen.width < MIDDLE
+    width = ((cell.width - 12) * 3 / 5 if beside else cell.width) - 12 - STEP_NUMBER
+    is_low = cell.screen.height <= LOW_SCREEN
+    height = 40.0 if is_low else 46.0
+    for place, step in widget.all_steps:
+        left = height - 14 * 1.1 if step.note else height
+        lines = max(1, int(left / (cell.sizes.text * 1.1)))
+        if step.text is not None:
+            part = f"{place}.text"
+            yield Box(part, step.text, width, cell.sizes.text, bold=True, lines=lines, wraps=True)
+        if step.note is not None:
+            yield Box(f"{place}.note", step.note, width, 14.0, wraps=True)
+
+
+TEXTS: Final[Mapping[type[BaseWidget], Texts]] = {
+    BaseWidget: _label,
+    KeyCommand: _key,
+    Action: _action,
+    Joystick: _nothing,
+    PageLink: _link,
+    TextLabel: _text_label,
+    Picture: _nothing,
+    Indicator: _indicator,
+    Figure: _figure,
+    Gauge: _gauge,
+    Numeric: _number,
+    SelectInput: _select,
+    ToggleInput: _toggle,
+    Switch: _switch,
+    Step: _step,
+    Table: _table,
+    Joints: _joints,
+    Sequence: _sequence,
+}
