@@ -1,6 +1,6 @@
 """Places for texts, and whether a text is cut in one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 from app.i18n import TextLike, render
@@ -45,7 +45,7 @@ class Cut(NamedTuple):
 class Box:
     """The place of a text: `lines` of `width` px, of which the first is shorter by `indent`. With
     `wraps` a text has several lines, and none is broken inside a word. `after` stands behind the text
-    on the same line."""
+    on the same line, `beside` takes some of the width, `least_beside` at least."""
 
     part: str  # the key of the text in the panel file, or what it is
     text: TextLike
@@ -58,10 +58,17 @@ class Box:
     after: TextLike = ""
     after_size: float = 0.0
     after_bold: bool = False
+    beside: TextLike = ""
+    beside_size: float = 0.0
+    least_beside: float = 0.0
     name: str = "place"
 
     def cut(self, language: str) -> Cut | None:
         """What is cut of the text in a language; None for nothing."""
+        if self.beside:
+            return replace(self, width=self.width - self.width_beside(language), beside="").cut(
+                language
+            )
         text = render(self.text, language)
         after = render(self.after, language)
         tail = text_width(after, self.after_size or self.size, bold=self.after_bold)
@@ -76,6 +83,10 @@ class Box:
         if lines <= self.lines:
             return None
         return Cut(text, f"{lines} lines", f"{self.lines} of {self.width:.0f} px")
+
+    def width_beside(self, language: str) -> float:
+        width = text_width(render(self.beside, language), self.beside_size or self.size)
+        return max(width, self.least_beside)
 
 
 NO_BREAK: Final = "\u00a0"

@@ -1,6 +1,7 @@
 """Which texts of a panel are cut, on which screens and in which languages."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 from app.errors import Note
@@ -19,11 +20,12 @@ from app.panel.widgets.tiles import (
 )
 from app.panel.widths.boxes import SIZES, Box, Cell, Cut
 from app.panel.widths.reasons import reason_texts
-from app.panel.widths.texts import face_texts, texts
+from app.panel.widths.texts import MANY, face_texts, texts
 
 KIOSK_SCREENS: Final = ("1280x800", "1024x600", "800x480")  # where the panel file names none
 MAX_KEY_MM: Final = 28.0  # on a page that fits
 TAB_PAD: Final = 9.0  # of a page's tab, with the border of the rail
+HEAD_GAP: Final = 12.0
 GROUP_TAB_PAD: Final = 8.0
 FRAME_KEY_PAD: Final = 15.0  # of the rail and of a button's face
 FRAME_FACE_PADS: Final = 2.0  # less above and below than on other buttons
@@ -42,24 +44,26 @@ class Finding(NamedTuple):
 
 def cut_notes(panel: Panel) -> Iterator[Note]:
     """A note for each text that is cut on a screen of the panel."""
-    by_text: dict[tuple[str, str, str, str], list[Finding]] = {}
+    by_text: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings(panel):
-        key = finding.place, finding.cut.text, finding.cut.needs, finding.box.name
-        by_text.setdefault(key, []).append(finding)
-    for (place, text, needs, name), cuts in by_text.items():
+        by_text.setdefault((finding.place, finding.cut.text), []).append(finding)
+    for (place, text), cuts in by_text.items():
         languages = {finding.language for finding in cuts}
         tags = f" ({', '.join(sorted(languages))})" if len(panel.readers_languages) > 1 else ""
-        yield Note(place, f'"{text}"{tags} needs {needs}, the {name} has {_has(cuts)}')
+        yield Note(place, f'"{text}"{tags} {_needs(cuts)}')
 
 
-def _has(cuts: Iterable[Finding]) -> str:
-    """What a text has on each screen: "80 at 800x480"."""
-    sizes: dict[str, list[str]] = {}
+def _needs(cuts: Iterable[Finding]) -> str:
+    """What a text needs and has on each screen: "needs 96 px, the button has 80 at 800x480"."""
+    sizes: dict[tuple[str, str], list[str]] = {}
     for finding in cuts:
-        named = sizes.setdefault(finding.cut.has, [])
+        named = sizes.setdefault(
+            (finding.cut.needs, f"the {finding.box.name} has {finding.cut.has}"), []
+        )
         if finding.size not in named:
             named.append(finding.size)
-    return ", ".join(f"{has} at {' and '.join(named)}" for has, named in sizes.items())
+    said = (f"needs {need}, {has} at {' and '.join(named)}" for (need, has), named in sizes.items())
+    return "; ".join(said)
 
 
 def findings(panel: Panel) -> Iterator[Finding]:
@@ -86,7 +90,9 @@ def _rail(panel: Panel, screen: Screen) -> Placed:
     sizes = SIZES[panel.text_size]
     for p, page in enumerate(panel.pages if len(panel.pages) > 1 else ()):
         width = screen.rail - TAB_PAD
-        title = Box("title", page.title, width, sizes.small, bold=True, lines=3, wraps=True, name="tab")
+        title = Box(
+            "title", page.title, width, sizes.small, bold=True, lines=MANY, wraps=True, name="tab"
+        )
         yield f"page[{p}]", title
     interlocks = {interlock.id: interlock for interlock in panel.interlocks}
     stops = {widget.id for widget in panel.stops}
@@ -147,9 +153,11 @@ def _headings(panel: Panel, page: Page, number: int, screen: Screen, width: floa
         inside = tab - GROUP_TAB_PAD
         yield Box("title", title, inside, sizes.text, bold=True, lines=2, wraps=True, name="tab")
     elif group.title:
-        yield Box("title", title, width, sizes.text, bold=True, name="heading")
+        heading = Box("title", title, width, sizes.text, bold=True, name="heading")
         if group.note:
-            yield Box("note", group.note, width, sizes.small, name="heading")
+            left = width - HEAD_GAP
+            heading = replace(heading, width=left, beside=group.note, beside_size=sizes.small)
+        yield heading
 
 
 def _tab_width(panel: Panel, page: Page, number: int, screen: Screen) -> float:

@@ -10,6 +10,8 @@ from typing import Any, Final
 
 from app.i18n import say
 from app.i18n.values import each_language, together
+from app.panel.widgets.camera import Camera
+from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator
 from app.panel.widgets.families import BaseWidget, KeyCommand
 from app.panel.widgets.figure import Figure
@@ -18,7 +20,10 @@ from app.panel.widgets.inputs import SelectInput, ToggleInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.joystick import Joystick
 from app.panel.widgets.kinds import find_row
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric, SliderInput
+from app.panel.widgets.pallet import Pallet
+from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.static import PageLink, Picture, TextLabel
@@ -36,6 +41,9 @@ FACE_PAD: Final = 16.0
 NARROW_FACE, NARROW_LABEL = 160.0, 17.0  # up to this width a button's label has this size
 LAMP: Final = 46.0  # with the gap beside it, as the following ones
 STEP_NUMBER: Final = 38.0
+LEAST_LIMITS: Final = 3.0  # of what stands beside a label, in the size of its letters
+MARKS: Final = 26.0  # of a value that is not normal
+TOP: Final = 0.6  # of its width: the title of a sequence
 SWITCH_GAP: Final = 12.0
 FIELD_PAD: Final = 27.0  # of an input, with its borders
 PICKER: Final = 24.0  # the arrow of a choice
@@ -75,7 +83,7 @@ def _action(widget: Action, cell: Cell) -> Iterator[Box]:
     yield from face_texts(widget, 2 * third - FACE_PAD, cell)
     size = cell.sizes.text if cell.width <= 380 else cell.sizes.label
     width = third - BORDERS
-    yield Box("cancel", say("cancel"), width, size, bold=True, lines=2, wraps=True, name="button")
+    yield Box("cancel", say("cancel"), width, size, bold=True, name="button")
 
 
 def _link(widget: PageLink, cell: Cell) -> Iterator[Box]:
@@ -126,7 +134,7 @@ def _beside(figure: Figure, cell: Cell) -> float:
 def _gauge(widget: Gauge, cell: Cell) -> Iterator[Box]:
     if widget.orientation == "horizontal":
         return
-    yield from _label(widget, cell)
+    yield Box("label", widget.label, cell.width - MARKS, cell.sizes.small)
     width = cell.width - (80.0 if cell.width >= 150 else 48.0) - 5
     size = cell.sizes.label if cell.width <= 170 else cell.sizes.value
     yield from _numbers(widget, width, size, cell)
@@ -141,17 +149,30 @@ def _numbers(widget: Gauge | Step, width: float, size: float, cell: Cell) -> Ite
 
 def _number(widget: Numeric, cell: Cell) -> Iterator[Box]:
     """With the limits beside the label: on a narrow one the range only, else what is left of them."""
-    small = cell.sizes.small
-    ranges = (
-        max(text_width(str(widget.range_text), small), 3 * small) if cell.width <= 330 else 3 * small
-    )
     named = together([widget.label, " (", widget.unit, ")"]) if widget.unit else widget.label
-    yield Box("label", named, cell.width - 8 - ranges, small)
+    least = LEAST_LIMITS * cell.sizes.small
+    box = Box("label", named, cell.width - 8, cell.sizes.small)
+    is_narrow = cell.width <= 330
+    yield (
+        replace(box, beside=widget.range_text, least_beside=least)
+        if is_narrow
+        else replace(box, width=box.width - least)
+    )
     if isinstance(widget, SliderInput):
         return
     steps = 0.0 if cell.width <= 200 else 2 * (cell.screen.touch(ENTRY_MM) + 8)
     for number in ends(widget.min, widget.max, None):
         yield Box("value", number, cell.width - steps - FIELD_PAD, cell.sizes.label, bold=True)
+
+
+def _parameter(widget: Parameter, cell: Cell) -> Iterator[Box]:
+    limits = 8 + LEAST_LIMITS * cell.sizes.small
+    yield Box("label", widget.label, cell.width - limits, cell.sizes.small)
+
+
+def _pallet(widget: Pallet, cell: Cell) -> Iterator[Box]:
+    if cell.screen.height > NO_NAMES:
+        yield from _label(widget, cell)
 
 
 def _select(widget: SelectInput, cell: Cell) -> Iterator[Box]:
@@ -169,7 +190,7 @@ def _toggle(widget: ToggleInput, cell: Cell) -> Iterator[Box]:
 
 
 def _switch(widget: Switch, cell: Cell) -> Iterator[Box]:
-    yield from _label(widget, cell)
+    yield Box("label", widget.label, cell.width - 8, cell.sizes.small)
     is_narrow = cell.width <= 200
     size = cell.sizes.text if is_narrow else cell.sizes.label
     width = (cell.width - BORDERS) / 2 - (1.5 if is_narrow else 13.5)
@@ -213,6 +234,7 @@ def _sequence(widget: Sequence, cell: Cell) -> Iterator[Box]:
     width = ((cell.width - 12) * 3 / 5 if beside else cell.width) - 12 - STEP_NUMBER
     is_low = cell.screen.height <= LOW_SCREEN
     height = 40.0 if is_low else 46.0
+    yield Box("label", widget.label, TOP * cell.width, cell.sizes.text, bold=True)
     for place, step in widget.all_steps:
         left = height - 14 * 1.1 if step.note else height
         lines = max(1, int(left / (cell.sizes.text * 1.1)))
@@ -228,6 +250,11 @@ TEXTS: Final[Mapping[type[BaseWidget], Texts]] = {
     KeyCommand: _key,
     Action: _action,
     Joystick: _nothing,
+    Camera: _nothing,
+    Conditions: _nothing,
+    LogView: _nothing,
+    Pallet: _pallet,
+    Parameter: _parameter,
     PageLink: _link,
     TextLabel: _text_label,
     Picture: _nothing,

@@ -1,0 +1,71 @@
+"""What `app.check` says of texts that are cut, without a browser."""
+
+from typing import Any
+
+import pytest
+
+from app.panel import Panel
+from app.panel.widths.cut_texts import cut_notes
+from app.panel.widths.lines import line_count, widest_piece
+
+KEY = {"kind": "publish", "topic": "/a", "type": "std_msgs/msg/Empty", "message": {}}
+GOAL = {
+    "kind": "action",
+    "action": "/goal",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 1},
+}
+
+
+def noted(*widgets: dict[str, Any], **more: Any) -> list[str]:
+    """The notes of a page with these widgets in four columns, on the screen of 800 x 480 pixels."""
+    group = {"columns": 4, "widget": [{"id": f"w{n}", **each} for n, each in enumerate(widgets)]}
+    page = {"id": "p", "title": "P", "group": [group]}
+    panel = {"title": "T", "screens": ["800x480"], "languages": ["en", "de"], "page": [page], **more}
+    return [f"{note.place}: {note.message}" for note in cut_notes(Panel.model_validate(panel))]
+
+
+def test_a_word_that_is_wider_than_its_button_is_named_with_both_widths() -> None:
+    (note,) = noted({**KEY, "label": "Verpackungsmaschine"}, {**KEY, "label": "Start"})
+    assert note == (
+        "page[0].group[0].widget[0].label: "
+        '"Verpackungsmaschine" (de, en) needs 180 px, the button has 159 at 800x480'
+    )
+
+
+@pytest.mark.parametrize(("span", "count"), [(1, 1), (4, 0)])
+def test_the_products_own_words_are_measured_too(span: int, count: int) -> None:
+    notes = noted({**GOAL, "label": "Go", "span": span})
+    assert (
+        sum('"Abbrechen" (de) needs 87 px, the button has 48 at 800x480' in note for note in notes)
+        == count
+    )
+
+
+def test_a_reason_has_the_lines_that_its_button_is_high() -> None:
+    locked = "Close the guard door at the north side of the cell until it locks, then touch Reset"
+    interlock = {"id": "guard", "topic": "/guard", "locked": {"en": locked, "de": "Tür zu"}}
+    (note,) = noted({**KEY, "label": "Start", "interlock": "guard"}, interlock=[interlock])
+    assert note.startswith("page[0].group[0].widget[0].interlock: ")
+    assert "(en) needs 4 lines, the button has 3 of 159 px" in note
+
+
+def test_texts_of_all_screens_are_in_one_note() -> None:
+    key = {**KEY, "label": "Verpackungsmaschinensteuerung"}
+    (note,) = noted(key, screens=["800x480", "1024x600"])
+    assert note.count("Verpackungsmaschinensteuerung") == 1
+    assert "at 800x480" in note
+    assert "at 1024x600" in note
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [("Close door", 1), ("Close the door", 2), ("安全扉を閉める", 2), ("Tür\u00adschließer", 2)],
+)
+def test_lines_end_where_a_browser_ends_them(text: str, lines: int) -> None:
+    assert line_count(text, 100, 20, bold=False) == lines
+
+
+def test_no_line_begins_with_a_full_stop() -> None:
+    word, _ = widest_piece("閉める。", 20, bold=False)
+    assert word == "る。"
