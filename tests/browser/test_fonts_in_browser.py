@@ -1,4 +1,4 @@
-"""What needs its place, with each set of fonts that a kiosk may have."""
+"""What needs its place, with each set of fonts that a kiosk may have, without the panel's own."""
 
 from typing import Final
 
@@ -19,7 +19,7 @@ from tests.browser.test_control_in_browser import (
 )
 from tests.browser.test_pages import SIZES
 from tests.runtime.test_several_robots import MANY, heard, ten
-from tests.support.browser.fonts import SETS
+from tests.support.browser.fonts import SETS, WITHOUT_OWN
 from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import TAP_AGAIN_MS, Server, until
 
@@ -31,7 +31,7 @@ SCROLLED: Final = "() => [document.documentElement.scrollWidth, document.documen
 
 @pytest.fixture(scope="module", params=SETS)
 def fonts(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
+    return f"{request.param}{WITHOUT_OWN}"
 
 
 def publish_at(page: Page, size: tuple[int, int]) -> FloatRect:
@@ -39,6 +39,12 @@ def publish_at(page: Page, size: tuple[int, int]) -> FloatRect:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.evaluate(DRAWN)
     return place(button(page, "Publish"))
+
+
+def test_letters_are_those_of_the_system(opens: Opens) -> None:
+    page = opens(FIRST)
+    assert page.evaluate("() => document.fonts.check('700 17px \"IBM Plex Sans\"')")
+    assert not page.evaluate("() => [...document.fonts].some((font) => font.status === 'loaded')")
 
 
 def test_control_bar_fits_and_does_not_shift_on_a_control_request(opens: Opens) -> None:

@@ -201,7 +201,8 @@ def _switch(widget: Switch, cell: Cell) -> Iterator[Box]:
 def _step(widget: Step, cell: Cell) -> Iterator[Box]:
     width = step_width(cell)
     yield Box("label", widget.label, width, cell.sizes.small)
-    yield from _numbers(widget, width, cell.sizes.value, cell)
+    size = cell.sizes.label if cell.width <= 330 else cell.sizes.value
+    yield from _numbers(widget, width, size, cell)
 
 
 def step_width(cell: Cell) -> float:

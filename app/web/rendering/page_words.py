@@ -35,6 +35,7 @@ WORDS: Final = (
     "rosout_node",
     "rosout_search",
     "rosout_pause",
+    "table_empty",
     *(word.code for word in LEVEL_WORDS.values()),
     "frame_keys",
     "clean",

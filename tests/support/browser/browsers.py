@@ -21,7 +21,7 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
-from tests.support.browser.fonts import fonts_file
+from tests.support.browser.fonts import WITHOUT_OWN, fonts_file
 from tests.support.parts import CHROMIUM_FLAGS, ENOUGH_S, HEADLESS
 
 SIZE: Final = (1280, 800)
@@ -38,14 +38,18 @@ class Browsers:
 
     def browser(self, fonts: str, folders: pytest.TempPathFactory) -> Browser:
         if fonts not in self._running:
-            self._running[fonts] = self._started(fonts_file(fonts, folders.mktemp("fonts")))
+            without_own = ["--disable-remote-fonts"] if fonts.endswith(WITHOUT_OWN) else []
+            file = fonts_file(fonts, folders.mktemp("fonts"))
+            self._running[fonts] = self._started(file, without_own)
         return self._running[fonts]
 
-    def _started(self, fonts: Path) -> Browser:
+    def _started(self, fonts: Path, more: list[str]) -> Browser:
         if self._playwright is None:
             self._playwright = sync_playwright().start()
         env: dict[str, str | float | bool] = {**os.environ, "FONTCONFIG_FILE": str(fonts)}
-        return self._playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS, env=env)
+        return self._playwright.chromium.launch(
+            executable_path=HEADLESS, args=[*CHROMIUM_FLAGS, *more], env=env
+        )
 
     def close(self) -> None:
         for browser in self._running.values():

@@ -15,9 +15,12 @@ SETS: Final[Mapping[str, Sequence[str]]] = {
 }
 
 
+WITHOUT_OWN: Final = " without the panel's own"  # behind the name of a set
+
+
 def fonts_file(name: str, folder: Path) -> Path:
     """A fontconfig file with only one of the sets."""
-    folders = "".join(f"<dir>{folder}</dir>" for folder in SETS[name])
+    folders = "".join(f"<dir>{folder}</dir>" for folder in SETS[name.removesuffix(WITHOUT_OWN)])
     path = folder / "fonts.conf"
     path.write_text(
         '<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd">'
