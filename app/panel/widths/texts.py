@@ -184,7 +184,9 @@ def _select(widget: SelectInput, cell: Cell) -> Iterator[Box]:
 
 def _toggle(widget: ToggleInput, cell: Cell) -> Iterator[Box]:
     yield from _label(widget, cell)
-    width = cell.width - 2 * cell.screen.touch(ENTRY_MM)  # less 12 for the gap, as it is less 12 wide
+    entry = cell.screen.touch(ENTRY_MM)
+    slide = 1.5 * entry if cell.width <= 200 else 2 * entry - SWITCH_GAP
+    width = cell.width - slide - SWITCH_GAP
     for part, text in (("on", widget.on), ("off", widget.off)):
         yield Box(part, text, width, cell.sizes.label, bold=True, lines=2, wraps=True)
 
