@@ -67,8 +67,8 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
 def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -> None:
     page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": server.url}])
     page.goto(server.url)
-    tabs = page.locator(".pages a").evaluate_all("(tabs) => tabs.map((tab) => tab.href)")
-    for path in tabs or [server.url]:
+    paths = page.locator(".pages a").evaluate_all("(tabs) => tabs.map((tab) => tab.href)")
+    for path in paths or [server.url]:
         page.goto(path)
         expect(page.locator("html[data-floor]")).to_be_attached()
         for width, height in SIZES:
