@@ -119,7 +119,6 @@ SPOTS: Final = {
     "label": ("h3", ""),
     "interlock": (".why", '[data-text="reason"]'),
     "note": (".face > .note", ""),
-    "cancel": (".cancel", "span"),
     "value": (".value", '[data-text="text"]'),
     "states": (".value", ""),
     "steps": ("li > p > span", ""),
@@ -187,16 +186,14 @@ def text_of_width(box: Box, language: str, width: float) -> str:
 def sample_texts(box: Box, language: str) -> tuple[str, str]:
     """A text that has just room in its place, and one that is just cut. Japanese without spaces may
     begin on the second line."""
+    width = box.width - (box.width_beside(language) if box.beside else 0.0)
     if box.wraps and language == "ja":
-        rows = [
-            int((box.width - indent) / box.size) for indent in (box.indent, *[0.0] * (box.lines - 1))
-        ]
+        rows = [int((width - indent) / box.size) for indent in (box.indent, *[0.0] * (box.lines - 1))]
         return "転" * (rows[0] - 1), "転" * (sum(rows) + 1) if box.lines < MANY else ""
-    room = box.width
+    room = width
     if not box.wraps:
         after = render(box.after, language)
         room -= text_width(after, box.after_size or box.size, bold=box.after_bold)
-        room -= box.width_beside(language) if box.beside else 0.0
     letters = LETTERS[language]
     fits, cut = (text_of_width(box, language, room + more) for more in (-NEAR, NEAR))
     return fits, cut + letters[len(cut) % len(letters)]

@@ -60,6 +60,7 @@ class Box:
     after_bold: bool = False
     beside: TextLike = ""
     beside_size: float = 0.0
+    beside_bold: bool = False
     least_beside: float = 0.0
     name: str = "place"
 
@@ -85,7 +86,8 @@ class Box:
         return Cut(text, f"{lines} lines", f"{self.lines} of {self.width:.0f} px")
 
     def width_beside(self, language: str) -> float:
-        width = text_width(render(self.beside, language), self.beside_size or self.size)
+        size = self.beside_size or self.size
+        width = text_width(render(self.beside, language), size, bold=self.beside_bold)
         return max(width, self.least_beside)
 
 

@@ -1,6 +1,6 @@
 """Which texts of a panel are cut, on which screens and in which languages."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -44,26 +44,26 @@ class Finding(NamedTuple):
 
 def cut_notes(panel: Panel) -> Iterator[Note]:
     """A note for each text that is cut on a screen of the panel."""
-    by_text: dict[tuple[str, str], list[Finding]] = {}
+    needs: dict[tuple[str, str, str], dict[tuple[str, str], list[str]]] = {}
     for finding in findings(panel):
-        by_text.setdefault((finding.place, finding.cut.text), []).append(finding)
-    for (place, text), cuts in by_text.items():
-        languages = {finding.language for finding in cuts}
-        tags = f" ({', '.join(sorted(languages))})" if len(panel.readers_languages) > 1 else ""
-        yield Note(place, f'"{text}"{tags} {_needs(cuts)}')
+        cut, key = finding.cut, (finding.place, finding.cut.text, finding.language)
+        widths = cut.needs, f"the {finding.box.name} has {cut.has}"
+        needs.setdefault(key, {}).setdefault(widths, []).append(finding.size)
+    notes: dict[tuple[str, str, str], list[str]] = {}
+    for (place, text, language), widths_by_size in needs.items():
+        notes.setdefault((place, text, _said(widths_by_size)), []).append(language)
+    for (place, text, said), languages in notes.items():
+        tags = f" ({', '.join(languages)})" if len(panel.readers_languages) > 1 else ""
+        yield Note(place, f'"{text}"{tags} {said}')
 
 
-def _needs(cuts: Iterable[Finding]) -> str:
+def _said(widths: Mapping[tuple[str, str], Iterable[str]]) -> str:
     """What a text needs and has on each screen: "needs 96 px, the button has 80 at 800x480"."""
-    sizes: dict[tuple[str, str], list[str]] = {}
-    for finding in cuts:
-        named = sizes.setdefault(
-            (finding.cut.needs, f"the {finding.box.name} has {finding.cut.has}"), []
-        )
-        if finding.size not in named:
-            named.append(finding.size)
-    said = (f"needs {need}, {has} at {' and '.join(named)}" for (need, has), named in sizes.items())
-    return "; ".join(said)
+    parts = (
+        f"needs {need}, {has} at {' and '.join(dict.fromkeys(sizes))}"
+        for (need, has), sizes in widths.items()
+    )
+    return "; ".join(parts)
 
 
 def findings(panel: Panel) -> Iterator[Finding]:

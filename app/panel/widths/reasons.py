@@ -10,10 +10,9 @@ from app.panel.widgets.families import BaseWidget, KeyCommand
 from app.panel.widgets.joystick import Joystick
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.step import Step
-from app.panel.widgets.tiles import GAP_MM
 from app.panel.widths.boxes import Box, Cell
 from app.panel.widths.letters import text_width
-from app.panel.widths.texts import FACE_PAD, step_width
+from app.panel.widths.texts import FACE_PAD, beside_cancel, step_width
 from app.panel.widths.values import with_some_value
 
 ICON: Final = 15.0
@@ -53,12 +52,10 @@ def reason_texts(
     width, size, lines = inside or cell.width - FACE_PAD, cell.sizes.small, face_lines(cell)
     if isinstance(widget, Step):
         width, size, lines = step_width(cell), STEP_REASON, LEAST_LINES
-    elif isinstance(widget, Action):
-        width = (cell.width - GAP_MM * cell.screen.mm) * 2 / 3 - FACE_PAD
     others = len(widget.interlocks) - 1
     more: TextLike = say("more_reasons", number=others) if others > 0 else ""
     for place, name in enumerate(widget.interlocks):
-        yield Box(
+        box = Box(
             f"interlock[{place}]" if others else "interlock",
             sentence(interlocks[name]),
             width,
@@ -70,6 +67,7 @@ def reason_texts(
             after_bold=True,
             name="button",
         )
+        yield beside_cancel(box, cell) if isinstance(widget, Action) else box
 
 
 def face_lines(cell: Cell) -> int:

@@ -45,6 +45,7 @@ LEAST_LIMITS: Final = 3.0  # of what stands beside a label, in the size of its l
 MARKS: Final = 26.0  # of a value that is not normal
 TOP: Final = 0.6  # of its width: the title of a sequence
 SWITCH_GAP: Final = 12.0
+CANCEL_PAD: Final = 15.0  # with the borders
 FIELD_PAD: Final = 27.0  # of an input, with its borders
 PICKER: Final = 24.0  # the arrow of a choice
 NO_NAMES: Final = 620.0  # on a lower screen the name of a figure is only read aloud
@@ -79,11 +80,17 @@ def _key(widget: KeyCommand, cell: Cell) -> Iterator[Box]:
 
 
 def _action(widget: Action, cell: Cell) -> Iterator[Box]:
-    third = (cell.width - GAP_MM * cell.screen.mm) / 3
-    yield from face_texts(widget, 2 * third - FACE_PAD, cell)
+    for box in face_texts(widget, cell.width - FACE_PAD, cell):
+        yield beside_cancel(box, cell)
+
+
+def beside_cancel(box: Box, cell: Cell) -> Box:
+    """A text beside the button that cancels, which takes a third, or what its word needs."""
+    width = box.width - GAP_MM * cell.screen.mm - CANCEL_PAD
     size = cell.sizes.text if cell.width <= 380 else cell.sizes.label
-    width = third - BORDERS
-    yield Box("cancel", say("cancel"), width, size, bold=True, name="button")
+    third = (cell.width - GAP_MM * cell.screen.mm) / 3 - CANCEL_PAD
+    named = replace(box, width=width, beside=say("cancel"), beside_size=size, beside_bold=True)
+    return replace(named, least_beside=third)
 
 
 def _link(widget: PageLink, cell: Cell) -> Iterator[Box]:
@@ -135,7 +142,9 @@ def _gauge(widget: Gauge, cell: Cell) -> Iterator[Box]:
     if widget.orientation == "horizontal":
         return
     yield Box("label", widget.label, cell.width - MARKS, cell.sizes.small)
-    width = cell.width - (80.0 if cell.width >= 150 else 48.0) - 5
+    is_tall = cell.fit and cell.width >= 250
+    scale = 142.0 if is_tall else 80.0 if cell.width >= 150 else 48.0
+    width = cell.width - scale - 5
     size = cell.sizes.label if cell.width <= 170 else cell.sizes.value
     yield from _numbers(widget, width, size, cell)
 
@@ -178,7 +187,7 @@ def _pallet(widget: Pallet, cell: Cell) -> Iterator[Box]:
 def _select(widget: SelectInput, cell: Cell) -> Iterator[Box]:
     yield from _label(widget, cell)
     width = cell.width - FIELD_PAD - PICKER
-    for number, option in enumerate(widget.options):
+    for number, option in enumerate(widget.options or ()):
         yield Box(f"options[{number}].label", option.label, width, cell.sizes.label)
 
 
