@@ -150,8 +150,8 @@ def language(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def shown(browser: Browser, language: str) -> Iterator[Page]:
-    with browser.new_context(locale=language) as context:
+def shown(chromium: Browser, language: str) -> Iterator[Page]:
+    with chromium.new_context(locale=language) as context:
         yield context.new_page()
 
 

@@ -99,10 +99,10 @@ def test_a_choice_that_the_robot_no_longer_lists_is_refused(cell: Server, node: 
 
 
 def test_without_scripts_the_options_are_in_the_page(
-    cell: Server, node: RosNode, browser: Browser
+    cell: Server, node: RosNode, chromium: Browser
 ) -> None:
     lists(cell, node, "Dock", "Belt 1")
-    with browser.new_context(java_script_enabled=False) as plain:
+    with chromium.new_context(java_script_enabled=False) as plain:
         page = plain.new_page()
         page.goto(cell.url)
         page.get_by_label("Station").select_option("Dock")
