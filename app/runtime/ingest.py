@@ -79,7 +79,9 @@ class Ingest:
             robot.key(interlock.topic): [i for i in panel.interlocks if i.topic == interlock.topic]
             for interlock in panel.interlocks
         }
-        sources = (source for widget in panel.commands for source in widget.sources())
+        sources = [source for widget in panel.commands for source in widget.sources()]
+        choices = (select for selects in robot.selects.values() for select in selects)
+        sources += (source for select in choices for source in select.sources())
         self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
         permitting = self._interlocks.keys() | {
@@ -131,9 +133,9 @@ class Ingest:
 
     def late_reading(self, key: str, reading: Reading) -> Updates:
         """The update for a message that took more than one turn to decode."""
-        return Updates(
-            urgent=key in self._interlocks, values={key}, topics={key}, readings=[(key, reading)]
-        )
+        urgent, needed = key in self._interlocks, key in self._needed
+        readings = [(key, reading)]
+        return Updates(urgent, other=needed, values={key}, topics={key}, readings=readings)
 
     def _with_peer(self, sample: Sample) -> Sample:
         """A sample whose source is a peer, or not known: a router may have stamped it."""
