@@ -9,7 +9,7 @@ from app.alarms.entries import AlarmEntry
 from app.alarms.event_names import event_of, lasted
 from app.alarms.history import HistoryRow
 from app.alarms.instance import AlarmInstance, Leader, Transition
-from app.alarms.rows import state_of
+from app.alarms.rows import PANEL, state_of
 from app.alarms.states import State
 from app.alarms.status import AlarmStatus, Moment, TakenOut
 from app.i18n import Text, TextLike, text_in
@@ -30,6 +30,7 @@ def record_of(alarm: AlarmInstance, now: Moment) -> str:
         "suppressed_since": _wall(status.suppressed_since),
         "value": alarm.value if alarm.value is not None and abs(alarm.value) < 1e300 else None,
         "limit": alarm.limit,
+        "source": described.source or PANEL,
         "about": {
             "text": _as_json(alarm.text),
             "action": _as_json(alarm.action),

@@ -1,7 +1,7 @@
 """An alarm as pages, events and programs get it: JSON values, and texts where a person reads."""
 
 from collections.abc import Iterator, Mapping
-from typing import Final, Literal, TypedDict
+from typing import Final, Literal, TypedDict, get_args
 
 from app.alarms.instance import AlarmInstance, Leader
 from app.alarms.states import State
@@ -13,6 +13,7 @@ from app.panel.number_range import decimal_text
 RowState = Literal[
     "active", "returned", "latched", "shelved", "suppressed", "out_of_service", "unknown", "normal"
 ]
+LISTED_STATES: Final = tuple(state for state in get_args(RowState) if state != "normal")
 STATES: Final[Mapping[State, RowState]] = {
     State.NORMAL: "normal",
     State.UNACKNOWLEDGED: "active",
@@ -40,6 +41,7 @@ PRIORITY_WORDS: Final = (
     "alarm_priority_4",
 )
 DIGITS: Final = 6  # of a value
+PANEL: Final = "panel"  # the source of the panel's own alarms
 
 
 class TakenOutRow(TypedDict):
@@ -104,7 +106,7 @@ def row_of(alarm: AlarmInstance, now: Moment) -> AlarmRow:
     return AlarmRow(
         id=definition.id,
         robot=definition.robot,
-        source=described.source or "panel",
+        source=described.source or PANEL,
         group=described.group or "",
         priority=alarm.priority,
         priority_text=say(PRIORITY_WORDS[alarm.priority]),
@@ -132,7 +134,7 @@ def row_of(alarm: AlarmInstance, now: Moment) -> AlarmRow:
         out_of_service=_taken_out(status.out_of_service, now),
         acts=list(_acts(alarm)),
         follows=leader.id if leader else "",
-        follows_text=_follows(leader) if leader else "",
+        follows_text=follows_text(leader) if leader else "",
         order=_order(alarm),
     )
 
@@ -173,7 +175,8 @@ def _order(alarm: AlarmInstance) -> list[float]:
     return [int(alarm.status.override is not None), int(acknowledged), priority, raised]
 
 
-def _follows(leader: Leader) -> TextLike:
+def follows_text(leader: Leader) -> TextLike:
+    """How long after which alarm."""
     return say("alarms_follows_after", seconds=number(f"{leader.after_s:.1f}", "s"), name=leader.text)
 
 

@@ -9,7 +9,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.alarms.event_names import EVENT_NAMES
 from app.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow
-from app.alarms.records import text_of
+from app.alarms.records import leader_in, text_of
+from app.alarms.rows import follows_text
 from app.clock import iso_time
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
@@ -147,19 +148,22 @@ class AlarmAnswer(BaseModel):
 
 class TransitionAnswer(BaseModel):
     """A row of the history: `state` is the one after it, `act` the act that caused it, "" for none.
-    `lasted_s` is the time since the alarm was raised, and `clock_back_s` by how much the clock was set
-    back since the row before; 0 if it was not."""
+    `since` is when the alarm was raised and `lasted_s` the time since then; `clock_back_s` is by how
+    much the clock was set back since the row before, 0 if it was not. `follows` is the id of the alarm
+    of its group that it followed, "" for none. `source` is "" in rows of earlier versions."""
 
     seq: int
     at: AwareDatetime
     clock_back_s: float
     id: str
     robot: str
+    source: str
     event: Annotated[str, Field(description=f"one of {', '.join(EVENT_NAMES)}")]
     state: str
     acknowledged: bool
     known: bool
     occurrence: int
+    since: Annotated[str, Field(description='RFC 3339, "" if it was not raised')]
     lasted_s: float | None
     act: Annotated[str, Field(description=f'one of {", ".join(ALARM_ACTS)}, or ""')]
     who: str
@@ -169,6 +173,8 @@ class TransitionAnswer(BaseModel):
     priority: int
     value: float | None
     limit: float | None
+    follows: str
+    follows_text: str
 
 
 class AlarmsAnswer(BaseModel):
@@ -215,18 +221,20 @@ def finite(row: Mapping[str, Any]) -> dict[str, Any]:
 def transition(row: HistoryRow) -> dict[str, Any]:
     """A row of the history, with texts that are not rendered yet."""
     record = json.loads(row.record)
-    about = record.get("about", {})
+    about, leader, raised_at = record.get("about", {}), leader_in(row.record), record.get("raised_at")
     return {
         "seq": row.seq,
         "at": iso_time(row.at),
         "clock_back_s": row.clock_back_s,
         "id": row.id,
         "robot": row.robot,
+        "source": record.get("source", ""),
         "event": row.event,
         "state": row.state,
         "acknowledged": record.get("state", "") in ("normal", "acknowledged", "latched_acknowledged"),
         "known": record.get("unknown_since") is None,
         "occurrence": row.occurrence,
+        "since": "" if raised_at is None else iso_time(raised_at),
         "lasted_s": row.lasted_s,
         "act": row.act,
         "who": row.actor,
@@ -236,6 +244,8 @@ def transition(row: HistoryRow) -> dict[str, Any]:
         "priority": about.get("priority", 0),
         "value": record.get("value"),
         "limit": record.get("limit"),
+        "follows": leader.id if leader else "",
+        "follows_text": follows_text(leader) if leader else "",
     }
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import product
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from prometheus_client.core import (
@@ -12,6 +13,8 @@ from prometheus_client.core import (
 )
 from prometheus_client.registry import Collector
 
+from app.alarms.rows import LISTED_STATES
+from app.alarms.shown import PRIORITIES
 from app.runtime.alarms import Alarms
 from app.runtime.fleet import Fleet
 from app.web.metrics import Metrics
@@ -48,9 +51,9 @@ def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
     listed = GaugeMetricFamily(
         "kiosk_alarms", "Alarms that are not normal, or shelved", labels=["priority", "state"]
     )
-    counts = Counter((str(row["priority"]), row["state"]) for row in alarms.rows())
-    for (priority, state), count in sorted(counts.items()):
-        listed.add_metric([priority, state], count)
+    counts = Counter((row["priority"], row["state"]) for row in alarms.rows())
+    for priority, state in product(PRIORITIES, LISTED_STATES):
+        listed.add_metric([str(priority), state], counts[priority, state])
     yield listed
     yield CounterMetricFamily(
         "kiosk_alarms_raised", "How often alarms were raised", value=alarms.counts.raised

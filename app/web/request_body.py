@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.types import Message
 
 from app.errors import InputError, TooSlow
+from app.web.openapi_parts import FORM, JSON
 
 LONGEST: Final = 64 * 1024  # bytes of a body; bytes or characters of a message on a socket
 BODY_WITHIN_S: Final = 10.0
@@ -32,6 +33,20 @@ async def body_of(request: Request) -> bytes:
 def kind_of(request: Request) -> str:
     """The media type of the body, as its header says; "" without one."""
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+async def act_body_of(request: Request, most: int = FIELDS_MOST) -> tuple[bool, dict[str, Any]]:
+    """Whether the body of an act is a form, and its content: JSON, a form of at most so many fields, or
+    nothing at all. InputError for what is none."""
+    kind, content = kind_of(request), await body_of(request)
+    if kind == FORM:
+        return True, dict(form_of(content, most))
+    if kind not in (JSON, ""):
+        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
+    decoded = json_of(content or b"{}")
+    if not isinstance(decoded, dict):
+        raise InputError("the body must be an object")
+    return False, decoded
 
 
 def form_of(body: bytes, most: int = FIELDS_MOST) -> dict[str, str]:

@@ -130,6 +130,7 @@ def test_metrics_count_alarms_raises_and_times_to_acknowledge(cell: Server) -> N
     act(cell, "air_low", "acknowledge", occurrence=1)
     text = cell.http.get("/metrics").text
     assert 'kiosk_alarms{priority="1",state="active"} 1.0' in text
+    assert 'kiosk_alarms{priority="4",state="shelved"} 0.0' in text
     assert "kiosk_alarms_raised_total 2.0" in text
     assert "kiosk_alarm_acknowledge_seconds_count 1.0" in text
 
@@ -346,6 +347,11 @@ def test_an_alarm_that_follows_another_of_its_group_says_so(tmp_path: Path) -> N
         first, second = sorted(listed(server).values(), key=lambda alarm: alarm["follows"])
         assert (first["follows"], second["follows"]) == ("", first["id"])
         assert second["follows_text"].endswith(f"s after {first['text']}")
+        raises = history(server, alarm=second["id"])["history"]
+        assert [(row["follows"], row["follows_text"], row["since"]) for row in raises] == [
+            (first["id"], second["follows_text"], second["since"])
+        ]
+        assert history(server, alarm=first["id"])["history"][0]["follows"] == ""
         page = server.http.get("/alarms", headers={"accept": "text/html"}).text
         assert f'data-alarm="{first["id"]}"' in page
         assert page.count('data-first="true"') == 1

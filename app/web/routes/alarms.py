@@ -37,9 +37,9 @@ from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, PAGE, Described, described_body, errors, fields
+from app.web.openapi_parts import PAGE, Described, described_body, errors, fields
 from app.web.rendering.alarms_page import alarms_context, word
-from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.request_body import act_body_of, as_model
 from app.web.routes.press_forms import TAP_AGAIN_S
 from app.web.routes.presses import STATUS
 
@@ -135,7 +135,7 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     ),
 )
 async def acknowledge(request: Request, state: CurrentState) -> Response:
-    is_form, content = await _body(request)
+    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
     if is_form:
         shown = {k.removeprefix(OCCURRENCE): v for k, v in content.items() if k.startswith(OCCURRENCE)}
         body = as_model(AcknowledgeBody, {"alarms": shown, "id": content.get("id")})
@@ -158,23 +158,10 @@ async def acknowledge(request: Request, state: CurrentState) -> Response:
     openapi_extra=described_body(AlarmActBody, fields(**ACT_FORM_PARTS), required=False),
 )
 async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
-    is_form, content = await _body(request)
+    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
     filled = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
     body = as_model(AlarmActBody, filled if is_form else content)
     return await _answer(request, state, act, {alarm: body}, content if is_form else None)
-
-
-async def _body(request: Request) -> tuple[bool, dict[str, Any]]:
-    """Whether the body is a form, and its content: JSON, a form, or nothing at all."""
-    kind, content = kind_of(request), await body_of(request)
-    if kind == FORM:
-        return True, dict(form_of(content, FORM_FIELDS_MOST))
-    if kind not in (JSON, ""):
-        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
-    decoded = json_of(content or b"{}")
-    if not isinstance(decoded, dict):
-        raise InputError("the body must be an object")
-    return False, decoded
 
 
 async def _answer(

@@ -4,7 +4,7 @@ import asyncio
 import secrets
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Path, Query, Request
@@ -15,7 +15,7 @@ from app.commands.control_acts import TOO_OFTEN
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
-from app.errors import InputError, KioskError, NotFound
+from app.errors import KioskError, NotFound
 from app.i18n import TextLike, localized, say
 from app.interfaces.names import Qos
 from app.runtime.live_look import Look, LookedTopic
@@ -35,11 +35,11 @@ from app.web.diagnostics_answer import (
 )
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, PAGE, described_body, errors, fields
+from app.web.openapi_parts import JSON, PAGE, described_body, errors, fields
 from app.web.rendering.diagnostics_json import diagnostics_json, look_json
 from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
-from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.request_body import act_body_of, as_model
 from app.web.routes.presses import STATUS
 
 router = APIRouter()
@@ -112,7 +112,7 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
 )
 async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Response:
     session = _session(state, "")
-    is_form, content = await _body(request)
+    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
     body = as_model(DiagnosticActBody, {k: v for k, v in content.items() if k != "page" or not is_form})
     who, token = principal_with_new_token(request, state)
     act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
@@ -197,19 +197,6 @@ def _looked_topic(name: str, topic: SurveyedTopic, held: bool) -> LookedTopic:
         qos=Qos(topic.reliable, topic.latched, DEPTH),
         held=held and bool(topic.publishers),
     )
-
-
-async def _body(request: Request) -> tuple[bool, dict[str, Any]]:
-    """Whether the body is a form, and its content: JSON, a form, or nothing at all."""
-    kind, content = kind_of(request), await body_of(request)
-    if kind == FORM:
-        return True, dict(form_of(content, FORM_FIELDS_MOST))
-    if kind not in (JSON, ""):
-        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
-    decoded = json_of(content or b"{}")
-    if not isinstance(decoded, dict):
-        raise InputError("the body must be an object")
-    return False, decoded
 
 
 async def _bundle(state: AppState) -> Response:
