@@ -1,8 +1,7 @@
 """The alarms that pages show: the rows in their order, and how many there are of each kind."""
 
 import math
-from bisect import bisect_left, insort
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, TypedDict
@@ -10,6 +9,8 @@ from typing import Final, NamedTuple, TypedDict
 from app.alarms.instance import AlarmInstance
 from app.alarms.marks import AlarmMarks
 from app.alarms.rows import AlarmRow
+from app.alarms.selections import AlarmSelections
+from app.alarms.sorted_rows import SortedRows
 from app.i18n import TextLike
 
 MAX_ROWS: Final = 500  # that are listed; the others are counted
@@ -71,25 +72,18 @@ class PendingRow(NamedTuple):
 
 
 class ShownAlarms:
-    """The rows by their ids; a change costs no walk over all of them."""
+    """The rows of all alarms, and what else follows them."""
 
     def __init__(self, marks: AlarmMarks) -> None:
         self.marks = marks
-        self.rows: dict[str, AlarmRow] = {}
-        self._order: list[tuple[tuple[float, ...], str]] = []
-        self._counts: Counter[str] = Counter()
+        self.selections = AlarmSelections()
+        self._sorted = SortedRows()
         self._raised: deque[float] = deque(maxlen=FLOOD_RAISES + 1)
 
     def update(self, alarm_id: str, row: AlarmRow | None) -> None:
         """Shows a row in place of the alarm's last one; None for an alarm that is not listed."""
-        before = self.rows.pop(alarm_id, None)
-        if before is not None:
-            del self._order[bisect_left(self._order, _key(before))]
-            self._counts.subtract(_counted(before))
-        if row is not None:
-            self.rows[alarm_id] = row
-            insort(self._order, _key(row))
-            self._counts.update(_counted(row))
+        before = self._sorted.update(alarm_id, row)
+        self.selections.update(before, row)
         self.marks.update(before, row)
 
     def count_raise(self, now: float) -> None:
@@ -102,15 +96,19 @@ class ShownAlarms:
 
     def listed(self) -> Iterator[AlarmRow]:
         """All rows, the most urgent first."""
-        return (self.rows[alarm_id] for _, alarm_id in self._order)
+        return self._sorted.listed()
+
+    @property
+    def rows(self) -> Mapping[str, AlarmRow]:
+        """The rows by their ids."""
+        return self._sorted.by_id
 
     def view(self, now: float, fault: TextLike = "") -> AlarmsView:
         """The section at `now` (monotonic seconds)."""
         rows = {row["id"]: row for row in islice(self.listed(), MAX_ROWS)}
-        first = next(iter(rows.values()), None)
-        counts = self._counts
+        counts = self._sorted.counts
         return AlarmsView(
-            line=first if first and not (first["acknowledged"] or first["order"][0]) else None,
+            line=self._sorted.line,
             standing=counts["standing"],
             unacknowledged=counts["unacknowledged"],
             unknown=counts["unknown"],
@@ -143,20 +141,3 @@ def outdated(alarms: Mapping[str, AlarmInstance], rows: Mapping[str, AlarmRow], 
         and (alarm.entry.details, alarm.text) != (row["details"], row["text"])
     )
     return list(islice(changed, most))
-
-
-def _key(row: AlarmRow) -> tuple[tuple[float, ...], str]:
-    return tuple(row["order"]), row["id"]
-
-
-def _counted(row: AlarmRow) -> Iterator[str]:
-    """The names under which a row is counted."""
-    if row["order"][0]:
-        yield row["state"]
-        return
-    names = ["standing", *([] if row["acknowledged"] else ["unacknowledged"])]
-    for name in names:
-        yield name
-        yield f"{name} {row['priority']}"
-    if row["state"] == "unknown":
-        yield "unknown"

@@ -1,7 +1,7 @@
 """What active alarms say about the values of a robot, as displays show it."""
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 
 class AlarmedState(NamedTuple):
@@ -21,4 +21,17 @@ class AlarmedValues(NamedTuple):
     priorities: Mapping[tuple[str, str], int] = {}
 
 
+class AlarmSelection(NamedTuple):
+    """The alarms that a widget shows, the most urgent first: `rows` as `app/alarms/rows.py` has them,
+    and how many `more` there are. `line` is the newest unacknowledged one of the highest priority.
+    `standing` counts those that are not normal, `unacknowledged` is of these."""
+
+    line: Mapping[str, Any] | None = None
+    rows: tuple[Mapping[str, Any], ...] = ()
+    more: int = 0
+    standing: int = 0
+    unacknowledged: int = 0
+
+
 NO_ALARMED: Final = AlarmedValues()
+NO_SELECTION: Final = AlarmSelection()

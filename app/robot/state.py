@@ -22,7 +22,7 @@ from app.panel.model import Panel, RobotEntry
 from app.panel.used_options import selects_by_command
 from app.panel.widgets.parameter import GET
 from app.robot.alarm_action import AlarmAction
-from app.robot.alarmed import NO_ALARMED
+from app.robot.alarmed import NO_ALARMED, AlarmSelection
 from app.robot.camera_topic import CameraTopicState
 from app.robot.command_status import CommandStatuses
 from app.robot.definitions import Difference, difference
@@ -108,6 +108,7 @@ class RobotState:
         self.alarm_actions: tuple[AlarmAction, ...] = ()
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self.alarmed = NO_ALARMED
+        self.alarm_selections: Mapping[str, AlarmSelection] = {}  # by widget id
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its peers do not respond
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet

@@ -85,6 +85,7 @@ class Alarms:
         robot_alarms = RobotAlarms(self.engine, robot_id, robot, self.evaluate)
         self._robots.append(robot_alarms)
         robot.alarmed = self._shown.marks.of_robot(robot_id)
+        self._shown.selections.add_robot(robot_id, self._panel)
         return robot_alarms
 
     async def start(self, folder: Path, operators_log: Log) -> None:
@@ -261,7 +262,8 @@ class Alarms:
         for robot in self._robots:
             if topics := marked.get(robot.robot_id):
                 robot.show_marks(self._shown.marks.of_robot(robot.robot_id), topics)
-            robot.show(islice(self._shown.listed(), MAX_ROWS))
+            selections = self._shown.selections.of_robot(robot.robot_id)
+            robot.show(islice(self._shown.listed(), MAX_ROWS), selections)
         self._show_until(0)
 
     # Restart, and a new file.

@@ -12,7 +12,7 @@ from app.alarms.sources import link_state
 from app.i18n import say
 from app.permission.verdict import Verdict, locked
 from app.robot.alarm_action import AlarmAction
-from app.robot.alarmed import AlarmedValues
+from app.robot.alarmed import AlarmedValues, AlarmSelection
 from app.robot.state import RobotState
 from app.transport.robot_signals import Signal
 
@@ -56,8 +56,10 @@ class RobotAlarms:
         self._engine.entries_received(self.robot_id, alarm_id, entries, at, is_whole, earlier)
         self._evaluate()
 
-    def show(self, rows: Iterable[AlarmRow]) -> None:
-        """The rows of all robots' alarms have changed, the most urgent first."""
+    def show(self, rows: Iterable[AlarmRow], selections: Mapping[str, AlarmSelection]) -> None:
+        """The rows of all robots' alarms have changed, the most urgent first. `selections` are those
+        that widgets show."""
+        self._robot.alarm_selections = selections
         own = (row for row in rows if row["robot"] == self.robot_id and _stands(row))
         self._robot.alarm_actions = tuple(
             AlarmAction(panel_id(row["id"]), row["action"], row["picture"]) for row in own

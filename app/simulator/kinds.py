@@ -14,6 +14,7 @@ from app.panel.base import TopicQos
 from app.panel.constants import parent_type, resolve_names
 from app.panel.machine_state import MachineState
 from app.panel.response_text import response_paths
+from app.panel.widgets.alarm_views import AlarmView
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
@@ -286,6 +287,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Joints: _joints,
     Table: None,
     LogView: None,
+    AlarmView: None,
     Camera: _camera,
     Trend: _trend,
     PublishCommand: _published,

@@ -8,6 +8,7 @@ from typing import Any, Final, TypedDict
 
 from app.i18n import TextLike, joined, say
 from app.panel.machine_state import MachineState
+from app.panel.widgets.alarm_views import AlarmLineView, AlarmListView
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
@@ -32,6 +33,7 @@ from app.panel.widgets.trend import Trend
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
+from app.view.alarm_values import alarm_line, alarm_list
 from app.view.camera_values import camera
 from app.view.condition_values import conditions
 from app.view.display_values import indicator, readout, value
@@ -191,6 +193,8 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
     Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
     Table: lambda widget, robot, verdict, now: table(widget, robot, now),
+    AlarmListView: lambda widget, robot, verdict, now: alarm_list(widget, robot),
+    AlarmLineView: lambda widget, robot, verdict, now: alarm_line(widget, robot),
     Trend: lambda widget, robot, verdict, now: trend(widget, robot, now),
 }
 require_rows("attributes", ATTRIBUTES, BaseWidget)

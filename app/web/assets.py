@@ -23,9 +23,11 @@ from app.panel.widgets.kinds import KINDS
 LAYERS: Final = (
     "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
 )  # fmt: skip
-SHARED: Final = ("entries", "marks", "facts")  # by several kinds of widgets
+SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds of widgets
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
-OWN_PAGES: Final = ("log", "alarms", "alarm-history", "alarm-report", "diagnostics", "help")
+OWN_PAGES: Final = (
+    "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "diagnostics", "help",
+)  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {

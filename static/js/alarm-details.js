@@ -1,4 +1,5 @@
 // The details of an alarm with their buttons, and Acknowledge all shown: they follow the events.
+import { followLock, isLocked } from "./alarm-acts.js";
 import { closest, find, setText } from "./show.js";
 
 const TEXTS = ["text", "state_text", "since_text", "value_text", "limit_text", "details"];
@@ -19,6 +20,8 @@ addEventListener(
 );
 addEventListener("submit", ({ target }) => fill(closest(target, "form")), true);
 
+followLock(lockActs);
+
 /** @param {Map<string, Data>} shown */
 export function showDetails(shown) {
   rows = shown;
@@ -30,17 +33,16 @@ export function showDetails(shown) {
 }
 
 // An act that is no longer possible is locked in its place; one that has become possible appears.
-export function lockActs() {
-  const { lock, cut } = find(document, ".alarm-line").dataset;
-  const isLocked = lock !== "" || cut !== undefined;
+function lockActs() {
+  const { lock } = find(document, "form.alarm-line").dataset;
   const all = find(document, ".all-shown button");
-  all.disabled = isLocked || ![...rows.values()].some(mayAcknowledge);
+  all.disabled = isLocked() || ![...rows.values()].some(mayAcknowledge);
   const acts = rows.get(chosen)?.acts ?? [];
   for (const part of document.querySelectorAll("[data-act]:not([data-fixed])")) {
     const isPossible = acts.includes(part.dataset.act);
     if (isPossible) part.hidden = false;
     for (const button of part.querySelectorAll("button:not([popovertargetaction])"))
-      button.disabled = isLocked || !isPossible;
+      button.disabled = isLocked() || !isPossible;
     for (const needed of part.querySelectorAll("[data-needs-control]")) needed.hidden = lock === "";
   }
 }

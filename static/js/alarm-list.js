@@ -1,19 +1,7 @@
-// The list on the page of alarms: a row for each alarm, kept in the server's order.
-import { lockActs, showDetails } from "./alarm-details.js";
-import { copyOf, find, setText } from "./show.js";
-
-const TEXTS = [
-  "priority_text",
-  "state_text",
-  "since_text",
-  "text",
-  "group",
-  "follows_text",
-  "value_text",
-  "limit_text",
-];
-
-export { lockActs };
+// The list on the page of alarms: a row for each alarm, the most urgent first.
+import { showDetails } from "./alarm-details.js";
+import { showList } from "./alarm-rows.js";
+import { find } from "./show.js";
 
 /** @type {Map<string, Data>} */
 const rows = new Map();
@@ -27,17 +15,11 @@ export function showRows(alarms, isSnapshot) {
     if (row) rows.set(id, row);
     else rows.delete(id);
   }
-  const shown = new Map([...list.querySelectorAll("li")].map((item) => [item.dataset.alarm ?? "", item]));
-  for (const [id, item] of shown) if (!rows.has(id)) item.remove();
   const firsts = new Set([...rows.values()].map(({ follows }) => follows));
-  let next = list.firstElementChild;
-  for (const row of [...rows.values()].sort(compare)) {
-    const item = shown.get(row.id) ?? copyOf(find(document, "template#alarm-row"));
-    showRow(item, row);
+  const sorted = [...rows.values()].sort(compare);
+  showList(list, find(document, "template#alarm-row"), sorted, (item, row) => {
     item.dataset.first = String(firsts.has(row.id));
-    if (item === next) next = item.nextElementSibling;
-    else list.insertBefore(item, next);
-  }
+  });
   showDetails(rows);
 }
 
@@ -45,19 +27,4 @@ export function showRows(alarms, isSnapshot) {
 function compare({ order: left }, { order: right }) {
   const at = left.findIndex((/** @type {number} */ part, /** @type {number} */ i) => part !== right[i]);
   return at < 0 ? 0 : left[at] - right[at];
-}
-
-/** @param {HTMLElement} item @param {Data} row */
-function showRow(item, row) {
-  const link = find(item, "a");
-  if (item.dataset.alarm !== row.id) link.href += encodeURIComponent(row.id);
-  Object.assign(item.dataset, { alarm: row.id, priority: row.priority, state: row.state });
-  item.dataset.acknowledged = row.acknowledged;
-  find(item, ".of-priority").dataset.priority = row.priority;
-  showTexts(item, row);
-}
-
-/** @param {HTMLElement} root @param {Data} row */
-function showTexts(root, row) {
-  for (const name of TEXTS) setText(root.querySelector(`[data-text="${name}"]`), row[name]);
 }

@@ -151,6 +151,7 @@ def _check_context(
         pages=[page.id for page in panel.pages],
         pictures=panel.picture_files,
         alarms={alarm.id: alarm.has_action for alarm in panel.alarms},
+        alarm_groups=tuple(dict.fromkeys(str(a.group) for a in panel.alarms if a.group)),
     )
 
 

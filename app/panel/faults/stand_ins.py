@@ -21,7 +21,8 @@ TABLES: Final = ("interlock", "condition", "page", "frame", "robot", "alarm")
 class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
     are kinds of causes that can't be checked: the existing "interlock"s, "input"s, "control"s or
-    "alarm"s, the topics that the panel "listens" to, or the "action"s of conditions and alarms."""
+    "alarm"s, the topics that the panel "listens" to, the "action"s of conditions and alarms, or the
+    "group"s of alarms."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -64,7 +65,8 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
             case ("alarm", int(i), *_):
                 stand_in = _stand_in(tables["alarm"][i], str(i))
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}
-                rest.undecidable.update(("listens", "action", *_unnamed("alarm", tables["alarm"][i])))
+                unnamed = _unnamed("alarm", tables["alarm"][i])
+                rest.undecidable.update(("listens", "action", "group", *unnamed))
             case ("robot", int(r), *_):
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
                 rest.undecidable.update(_unnamed("robot", tables["robot"][r]))
@@ -79,6 +81,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
                     rest.undecidable.update(("interlock", "listens", "page", "robot", "alarm"))
+                    rest.undecidable.add("group")
     return rest
 
 

@@ -6,7 +6,7 @@ send. Tables of other rooms say how a kind is shown, permitted and sent.
 
 from abc import abstractmethod
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field
@@ -38,9 +38,8 @@ from app.panel.widgets.sent_message import SentMessage
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What a widget's check needs: the `inputs` of its page by id, the ids of all others, topic → type
-    of the subscriptions (`types`), the names of all `pictures`. `conditions` (interlocks too) and
-    `alarms` say whether each has an action. Faults of widgets in `faulty` are reported already."""
+    """What a widget's check needs: `inputs` of its page, the ids of all others, topic → type. Whether
+    `conditions`, interlocks and `alarms` have an action. Widgets in `faulty` have faults already."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
@@ -48,10 +47,11 @@ class CheckContext:
     interlocks: Collection[str]
     conditions: Mapping[str, bool]
     types: Mapping[str, str]
+    alarms: Mapping[str, bool]
+    alarm_groups: Collection[str]
     faulty: Collection[str] = ()
     pages: Collection[str] = ()
     pictures: Collection[str] = ()
-    alarms: Mapping[str, bool] = field(default_factory=dict)
 
 
 class TopicSource(NamedTuple):

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from app.errors import KindError
 from app.panel.widgets import tiles
+from app.panel.widgets.alarm_views import AlarmLineView, AlarmListView
 from app.panel.widgets.camera import Camera
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.displays import Indicator, Readout
@@ -33,7 +34,7 @@ from app.panel.widgets.table import Table
 from app.panel.widgets.tiles import Tile
 from app.panel.widgets.trend import Trend
 
-Stylesheet = Literal["entries", "marks", "facts", "own"]
+Stylesheet = Literal["entries", "marks", "facts", "alarm-rows", "own"]
 
 
 class WidgetKind(NamedTuple):
@@ -78,6 +79,10 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "camera": WidgetKind(Camera, tiles.CAMERA, styles=("own",), script=True),
     "log": WidgetKind(LogView, tiles.LOG, styles=("own",), script=True),
     "trend": WidgetKind(Trend, tiles.TREND, styles=("own",), script=True),
+    "alarm_list": WidgetKind(
+        AlarmListView, tiles.ALARM_LIST, styles=("alarm-rows", "own"), script=True
+    ),
+    "alarm_line": WidgetKind(AlarmLineView, tiles.ALARM_LINE, styles=("own",), script=True),
     "label": WidgetKind(TextLabel, tiles.LABEL, styles=(), script=False),
     "image": WidgetKind(Picture, tiles.DISPLAY, styles=(), script=False),
     "link": WidgetKind(PageLink, tiles.KEY, styles=(), script=False),

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Self
 
+from app.panel.widgets.alarm_views import AlarmListView
 from app.panel.widgets.conditions import Conditions
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.figure import Figure
@@ -53,6 +54,8 @@ ROW, LOW_ROW = 36.0, 30.0
 TABLE_WIDTH: Final = 280.0
 STEP_VALUE: Final = 116.0  # the value between the keys
 PAD_MM: Final = 60.0
+ALARM_LIST_FRAME, ALARM_ROW, ALARMS_WIDTH = 33.0, 62.0, 300.0
+ALARM_ROWS: Final = 2  # that are seen at least
 LOG_HEIGHT, LOG_WIDTH = 100.0, 300.0  # of some lines
 PICTURE_HEIGHT, PICTURE_WIDTH = 120.0, 160.0  # the least in which a picture is readable
 TREND_HEIGHT: Final = 150.0  # names and values of the pens, plot and time axis
@@ -146,6 +149,10 @@ def _log_height(_: LogView, screen: Screen) -> float:
     return screen.touch(10) + LABEL_HEIGHT + LOG_HEIGHT
 
 
+def _alarm_list_height(widget: AlarmListView, screen: Screen) -> float:
+    return ALARM_LIST_FRAME + min(widget.lines, ALARM_ROWS) * ALARM_ROW
+
+
 def _gauge_height(gauge: Gauge, screen: Screen) -> float:
     if gauge.orientation == "horizontal":
         return LYING_GAUGE
@@ -208,6 +215,8 @@ JOYSTICK: Final = Tile(
 )
 LABEL: Final = Tile(lambda widget, screen: LABEL_HEIGHT, lambda widget, screen: DISPLAY_WIDTH)
 LOG: Final = Tile(_log_height, lambda widget, screen: LOG_WIDTH, grows=True)
+ALARM_LIST: Final = Tile(_alarm_list_height, lambda widget, screen: ALARMS_WIDTH, grows=True)
+ALARM_LINE: Final = Tile(lambda widget, screen: screen.header, lambda widget, screen: ALARMS_WIDTH)
 CAMERA: Final = Tile(
     lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH, grows=True
 )

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from app.web.gallery.alarms import ALARMS
 from app.web.gallery.controls import ACTIONS, JOYSTICKS, KEYS, ROLES, STEPS, SWITCHES
 from app.web.gallery.displays import CAMERAS, LAMPS, LOGS, READOUTS
 from app.web.gallery.examples import Part
@@ -19,6 +20,7 @@ PARTS: Final = (
     Part("Figures", 3, FIGURES),
     Part("Pallets", 6, PALLETS),
     Part("Conditions", 3, CHECKS),
+    Part("Alarms", 2, ALARMS),
     Part("Sequences", 3, SEQUENCES),
     Part("Gauges", 6, GAUGES),
     Part("Joints", 3, JOINT_ROWS),

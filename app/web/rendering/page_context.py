@@ -153,7 +153,7 @@ def page_context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words={"embed": embed}
+        words={"embed": embed, "root": state.root, "may_act": of_client.has_control}
         | page_words(
             session, page, f"{state.root}/static/{state.assets.revision}/{PICTURES}", language
         ),

@@ -63,6 +63,7 @@ ALARM_WORDS: Final = (
     "alarm_acknowledge",
     "alarm_needs_control",
     "alarms_cut",
+    "alarms_first_out",
     "lost",
 )
 LINK_WORDS: Final = ("links", "link_state", "link_since", "link_locks")

@@ -18,7 +18,7 @@ from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
 from app.web.rendering.display_choice import CHOICES, Choice, DisplaySettings, choices, display_of
 from app.web.rendering.entry_words import UNREADABLE
-from app.web.rendering.page_words import TREND_WORDS, WORDS
+from app.web.rendering.page_words import ALARM_WORDS, TREND_WORDS, WORDS
 
 router = APIRouter(include_in_schema=False)
 
@@ -71,10 +71,12 @@ async def box() -> Response:
 
 def _words() -> dict[str, Any]:
     """The words of a page that its widgets use."""
-    return {word: say(word) for word in (*WORDS, *TREND_WORDS)} | {
+    return {word: say(word) for word in (*WORDS, *TREND_WORDS, *ALARM_WORDS)} | {
         **UNREADABLE,
         "base": "",
         "embed": "",
+        "root": "",
+        "may_act": True,
         "pictures": "/gallery",
         "asks": {},
         "stop_lost": "",

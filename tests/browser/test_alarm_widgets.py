@@ -1,0 +1,148 @@
+"""Alarms of a group on a page: a list and a line, whose buttons act as those of the frame."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_accessibility import violations
+from tests.browser.test_alarm_line import CONTROL, SIZES, axe_page, started
+from tests.support.browser.browsers import sized
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import DRAWN, HIDE, middle, place
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+from tests.web.test_alarms import LOW, PANEL, act, listed
+
+__all__ = ["axe_page"]
+
+WIDGETS: Final = """
+[[page.widget]]
+id = "air_list"
+kind = "alarm_list"
+label = "Alarms of the air"
+group = "Air"
+span = 6
+[[page.widget]]
+id = "all_list"
+kind = "alarm_list"
+label = "All alarms"
+span = 6
+lines = 1
+[[page.widget]]
+id = "air_line"
+kind = "alarm_line"
+label = "Newest alarm of the air"
+group = "Air"
+[[page.widget]]
+id = "high_line"
+kind = "alarm_line"
+label = "Newest high alarm"
+priorities = [1]
+[demo]
+"""
+AIR_LIST: Final = '[data-widget="air_list"]'
+ALL_LIST: Final = '[data-widget="all_list"]'
+AIR_LINE: Final = '[data-widget="air_line"]'
+HIGH_LINE: Final = '[data-widget="high_line"]'
+
+
+def cell_with(folder: Path, more: str = "") -> Server:
+    server = demo_server(folder, PANEL.replace("[demo]\n", WIDGETS) % LOW + more)
+    until(lambda: len(listed(server)) == 2, "the alarms are raised")
+    return server
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Server]:
+    """`air_latched` of high priority and no group, and `air_low` of medium priority are active."""
+    with cell_with(tmp_path) as server:
+        yield server
+
+
+def names(page: Page, widget: str) -> list[str | None]:
+    return [row.get_attribute("data-alarm") for row in page.locator(f"{widget} li").all()]
+
+
+def test_widgets_show_the_alarms_of_their_group_and_priorities(cell: Server, page: Page) -> None:
+    for scripts in (True, False):
+        html = cell.http.get("/").text
+        assert html.count('data-alarm="air_low"') == 2
+        if scripts:
+            started(page, cell.url)
+            expect(page.locator(AIR_LINE)).to_have_attribute("data-alarm", "air_low")
+            expect(page.locator(HIGH_LINE)).to_have_attribute("data-alarm", "air_latched")
+            assert names(page, AIR_LIST) == ["air_low"]
+            assert names(page, ALL_LIST) == ["air_latched"]
+            expect(page.locator(f"{ALL_LIST} .rest")).to_contain_text("1")
+
+
+def test_a_tap_in_the_list_acknowledges_that_alarm_then_resets_it(
+    cell: Server, touch_page: Page
+) -> None:
+    page = started(touch_page, cell.url)
+    button = page.locator(f"{AIR_LIST} .row-act")
+    button.tap()
+    until(lambda: listed(cell)["air_low"]["acknowledged"], "the alarm is acknowledged")
+    expect(button).to_be_hidden()
+    expect(page.locator(AIR_LINE)).to_have_attribute("data-alarm", "")
+    assert not listed(cell)["air_latched"]["acknowledged"]
+    page.locator(f"{HIGH_LINE} > button").tap()
+    expect(page.locator(HIGH_LINE)).to_have_attribute("data-alarm", "")
+    assert listed(cell)["air_latched"]["acknowledged"]
+
+
+def test_a_row_that_came_under_the_finger_is_not_acknowledged(cell: Server, touch_page: Page) -> None:
+    page = started(touch_page, cell.url)
+    touch = Touch(page)
+    with page.expect_response("**/acknowledge") as answer:
+        touch.send("touchStart", middle(page.locator(f"{ALL_LIST} .row-act")))
+        act(cell, "air_latched", "acknowledge", occurrence=1)
+        expect(page.locator(f'{ALL_LIST} [data-alarm="air_low"]')).to_be_visible()
+        touch.send("touchEnd")
+        page.locator(f"{ALL_LIST} .row-act").dispatch_event("click", {"detail": 1})
+    assert answer.value.url == f"{cell.url}/alarms/air_latched/acknowledge"
+    assert not listed(cell)["air_low"]["acknowledged"]
+
+
+def test_without_scripts_the_buttons_are_forms(cell: Server, chromium: Browser) -> None:
+    with chromium.new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        for widget, alarm in ((AIR_LIST, "air_low"), (HIGH_LINE, "air_latched")):
+            page.goto(cell.url)
+            page.wait_for_timeout(800)  # sooner it counts as a second tap
+            page.locator(f"{widget} button").click()
+            assert page.url.startswith(f"{cell.url}/pages/main")
+            assert listed(cell)[alarm]["acknowledged"]
+
+
+def test_widgets_are_locked_without_a_connection_and_without_control(
+    tmp_path: Path, own_page: Page, page: Page
+) -> None:
+    with cell_with(tmp_path, CONTROL) as cell:
+        started(own_page, cell.url)
+        started(page, cell.url)
+        for widget in (AIR_LIST, AIR_LINE):
+            expect(own_page.locator(f"{widget} button")).to_be_enabled()
+            expect(page.locator(f"{widget} button")).to_be_disabled()
+            expect(page.locator(f"{widget} .by-control")).to_be_visible()
+        own_page.evaluate(HIDE)
+        for widget in (AIR_LIST, AIR_LINE):
+            expect(own_page.locator(f"{widget} button")).to_be_disabled()
+            expect(own_page.locator(f"{widget} .by-loss")).to_be_visible()
+        own_page.evaluate(HIDE, False)
+        for widget in (AIR_LIST, AIR_LINE):
+            expect(own_page.locator(f"{widget} button")).to_be_enabled()
+
+
+def test_widgets_fit_every_screen_and_axe_finds_nothing(cell: Server, axe_page: Page) -> None:
+    started(axe_page, cell.url)
+    for width, height in SIZES:
+        sized(axe_page, width, height).evaluate(DRAWN)
+        for button in axe_page.locator(f"{AIR_LIST} .row-act, {AIR_LINE} > button").all():
+            size = place(button)
+            assert size["height"] >= 44
+            assert size["x"] + size["width"] <= width
+    assert violations(axe_page) == []
