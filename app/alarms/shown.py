@@ -1,7 +1,7 @@
 """The alarms that pages show: the rows in their order, and how many there are of each kind."""
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Final, NamedTuple, TypedDict
@@ -23,14 +23,15 @@ FLOOD_S: Final = 600.0
 class PriorityCount(TypedDict):
     standing: int
     unacknowledged: int
+    raised: int
 
 
 class AlarmsView(TypedDict):
     """The section `alarms` of a view. `line` is the newest unacknowledged alarm of the highest
     priority. `standing` counts the alarms that are not normal; `unacknowledged` and `unknown` are of
-    these. The shelved, suppressed and those out of service are counted apart. `rows` has the first
-    `MAX_ROWS` by their ids, and `more` is how many follow. `fault`: why they are not kept on the disk,
-    "" if they are."""
+    these. `raised` counts the raises since the server's start that are to be acknowledged. The shelved,
+    suppressed and those out of service are counted apart. `rows` has the first `MAX_ROWS` by their ids,
+    and `more` is how many follow. `fault`: why they are not kept on the disk, "" if they are."""
 
     line: AlarmRow | None
     standing: int
@@ -51,7 +52,9 @@ NO_ALARMS: Final = AlarmsView(
     standing=0,
     unacknowledged=0,
     unknown=0,
-    priorities={str(priority): PriorityCount(standing=0, unacknowledged=0) for priority in PRIORITIES},
+    priorities={
+        str(priority): PriorityCount(standing=0, unacknowledged=0, raised=0) for priority in PRIORITIES
+    },
     shelved=0,
     suppressed=0,
     out_of_service=0,
@@ -78,6 +81,7 @@ class ShownAlarms:
         self.marks = marks
         self.selections = AlarmSelections()
         self._sorted = SortedRows()
+        self._raised_to_acknowledge: Counter[int] = Counter()  # by priority
         self._raised: deque[float] = deque(maxlen=FLOOD_RAISES + 1)
 
     def update(self, alarm_id: str, row: AlarmRow | None) -> None:
@@ -86,9 +90,11 @@ class ShownAlarms:
         self.selections.update(before, row)
         self.marks.update(before, row)
 
-    def count_raise(self, now: float) -> None:
+    def count_raise(self, alarm: AlarmInstance, now: float) -> None:
         """An alarm was raised at `now` (monotonic seconds)."""
         self._raised.append(now)
+        if not (alarm.status.is_acknowledged or alarm.status.override):
+            self._raised_to_acknowledge[alarm.priority] += 1
 
     def flood_ends_at(self) -> float:
         """Until when there are more raises than an operator can follow; -inf if there are not."""
@@ -116,6 +122,7 @@ class ShownAlarms:
                 str(priority): PriorityCount(
                     standing=counts[f"standing {priority}"],
                     unacknowledged=counts[f"unacknowledged {priority}"],
+                    raised=self._raised_to_acknowledge[priority],
                 )
                 for priority in PRIORITIES
             },

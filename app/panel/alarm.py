@@ -255,11 +255,29 @@ ShiftStart = Annotated[str, AfterValidator(_check_start)]
 Shifts = Annotated[tuple[ShiftStart, ...], Field(strict=False, max_length=12), AfterValidator(_sorted)]
 
 
+def _check_each_once(values: tuple[int, ...]) -> tuple[int, ...]:
+    if not values:
+        raise ValueError("is empty: leave the key out")
+    for i, value in enumerate(values):
+        if value in values[:i]:
+            raise ValueError(f"has {format_value(value)} twice")
+    return values
+
+
+Priorities = Annotated[tuple[Priority, ...], Field(strict=False), AfterValidator(_check_each_once)]
+Minutes = Annotated[int, Field(ge=1, le=480)]
+SilenceTimes = Annotated[
+    tuple[Minutes, ...], Field(strict=False, max_length=4), AfterValidator(_check_each_once)
+]
+
+
 class AlarmRules(Description):
     """The table `[alarms]`. `panel`: the panel raises alarms of its own. `low_screens`: what shows
     alarms on pages of low screens. Alarms of a group that are raised within `first_out_s` of the first
     follow it. `shifts` are times of day at which shifts begin. The oldest entries of the history are
-    removed after `days`, or when the file is larger than `size_mb` megabytes."""
+    removed after `days`, or when the file is larger than `size_mb` megabytes. With `sound` browsers
+    sound alarms of `sound_priorities` that are not acknowledged, unless one is silenced for one of
+    `silence_minutes`."""
 
     panel: bool = True
     disk_free_mb: Annotated[float, Field(ge=1, le=1_000_000, allow_inf_nan=False)] = 500.0
@@ -268,3 +286,6 @@ class AlarmRules(Description):
     shifts: Shifts = ("06:00", "14:00", "22:00")
     days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
     size_mb: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 64.0
+    sound: bool = False
+    sound_priorities: Priorities = (1, 2, 3)
+    silence_minutes: SilenceTimes = (5, 15, 60)

@@ -185,7 +185,7 @@ class Alarms:
         for transition in transitions:
             alarm = self.engine.alarms[transition.id]
             if self.counts.count(transition):
-                self._shown.count_raise(transition.at.monotonic)
+                self._shown.count_raise(alarm, transition.at.monotonic)
             row = history_row(alarm, transition)
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
             if not is_kept(alarm.definition):

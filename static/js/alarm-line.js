@@ -18,7 +18,7 @@ export class LineView {
   /** @param {HTMLElement} line @param {import("./source.js").Source} source */
   constructor(line, source) {
     this.#line = line;
-    this.#button = find(line, "button");
+    this.#button = find(line, "button[type=submit]");
     this.#occurrence = line.querySelector("input[name=occurrence]") ?? this.#button;
     this.#source = source;
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
@@ -95,11 +95,17 @@ export class AlarmLine {
   #isSnapshot = true; // the next section is whole: the first of a stream
   /** @type {(alarms: Data, isSnapshot: boolean) => void} */
   #showRows = () => {}; // of a page without the list
+  #source;
+  /** @type {{ update(alarms: Data, server: string): void, lost(): void } | null} */
+  #sound = null; // of a panel without sound
 
   /** @param {import("./source.js").Source} source */
   constructor(source) {
     if (document.querySelector(".alarm-list ol.alarms"))
       source.load(import("./alarm-list.js"), ({ showRows }) => (this.#showRows = showRows));
+    if (this.#line.dataset.sound)
+      source.load(import("./alarm-sound.js"), ({ update, lost }) => (this.#sound = { update, lost }));
+    this.#source = source;
     this.#view = new LineView(this.#line, source);
     this.#line.addEventListener("submit", (event) => event.preventDefault());
   }
@@ -112,6 +118,7 @@ export class AlarmLine {
     if (badge) badge.dataset.priority = this.#line.dataset.priority;
     this.#showRows(alarms, this.#isSnapshot);
     this.#isSnapshot = false;
+    this.#sound?.update(alarms, (this.#source.seen ?? "").split("-")[0]);
   }
 
   /** @param {string} role */
@@ -122,5 +129,6 @@ export class AlarmLine {
   lost() {
     this.#isSnapshot = true;
     setLock({ isCut: true });
+    this.#sound?.lost();
   }
 }

@@ -237,6 +237,7 @@ SHOWS_AT: Final[Mapping[str, str]] = {
     'interfaces = ["msgs"]': 'type = "cell_msgs/msg/Jog"',
     'pictures = "msgs"': 'src = "plan.svg"',
     'action = "Switch on the fan"': 'alarms = ["oven"]',
+    'group = "Oven"': 'group = ["Oven"]',
     'dialect = "rmw_zenoh"': "domain = 7",
     'ack_command = "tell"': 'ack_input = "note"',
     'role = "reset"': 'colour = "blue"',

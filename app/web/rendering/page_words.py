@@ -4,7 +4,7 @@ import time
 from functools import partial
 from typing import Any, Final, TypedDict
 
-from app.i18n import Text, joined, say
+from app.i18n import Text, joined, number, say
 from app.panel.layout import Page
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
@@ -64,6 +64,10 @@ ALARM_WORDS: Final = (
     "alarm_needs_control",
     "alarms_cut",
     "alarms_first_out",
+    "alarm_sound_silence",
+    "alarm_sound_silenced",
+    "alarm_sound_blocked",
+    "alarm_sound_on",
     "lost",
 )
 LINK_WORDS: Final = ("links", "link_state", "link_since", "link_locks")
@@ -85,6 +89,7 @@ def page_words(session: RobotSession, page: Page, pictures: str, language: str) 
     own |= {"asks": asks_of(session, page)}
     own |= {"stop_lost": joined((say("server_lost"), session.panel.stop_hint))}
     own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
+    own |= {"minutes": lambda minutes: say("alarms_minutes", count=number(str(minutes)))}
     named = (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS, *ALARM_WORDS)
     plain = {word: say(word) for word in named}
     return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
