@@ -21,6 +21,7 @@ PARTS = {
     "screens",
     "sway",
     "units",
+    "broker",
 }
 
 

@@ -2,6 +2,7 @@
 service. Values that don't change; each function returns the next status."""
 
 import math
+import time
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final, NamedTuple
@@ -19,6 +20,10 @@ class Moment(NamedTuple):
 
     monotonic: float
     wall: float
+
+
+def now() -> Moment:
+    return Moment(time.monotonic(), time.time())
 
 
 class Override(StrEnum):

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from app.i18n import PanelText
 from app.interfaces.validation import format_value
+from app.panel.alarm_mqtt import MqttRules
 from app.panel.base import (
     Description,
     File,
@@ -289,3 +290,4 @@ class AlarmRules(Description):
     sound: bool = False
     sound_priorities: Priorities = (1, 2, 3)
     silence_minutes: SilenceTimes = (5, 15, 60)
+    mqtt: MqttRules | None = None

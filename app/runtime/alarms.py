@@ -22,11 +22,12 @@ from app.alarms.own import is_kept
 from app.alarms.records import history_row, record_of
 from app.alarms.rows import AlarmRow, row_of
 from app.alarms.shown import MAX_ROWS, NO_ALARMS, AlarmsView, PendingRow, ShownAlarms, outdated
-from app.alarms.status import Moment
+from app.alarms.status import now
 from app.audit.press_record import Log
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.runtime.alarm_mqtt import AlarmMqtt
 from app.runtime.own_alarms import OwnAlarms
 from app.runtime.robot_alarms import RobotAlarms
 
@@ -40,10 +41,6 @@ ROW_S: Final = 0.001  # the pause is so much longer for each: in a flood, presse
 # A change is shown when it is on the disk, or after this time: no slow disk hides an alarm.
 SHOWN_WITHIN_S: Final = 0.5
 LOAD_TIMEOUT_S: Final = 5.0  # the panel starts without earlier alarms if the disk takes longer
-
-
-def now() -> Moment:
-    return Moment(time.monotonic(), time.time())
 
 
 class Alarms:
@@ -79,6 +76,7 @@ class Alarms:
         self._waiters: list[tuple[int, asyncio.Future[None]]] = []
         self._stopped = False
         self._own: OwnAlarms | None = None
+        self.mqtt = AlarmMqtt(panel.alarm_rules.mqtt, panel.language)
 
     def add_robot(self, robot_id: str, robot: RobotState) -> RobotAlarms:
         self.engine.add_robot(robot_id, robot)
@@ -96,6 +94,7 @@ class Alarms:
             rules = self._panel.alarm_rules
             self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate)
             self._own.start()
+        self.mqtt.start()
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)
         self._disk = AlarmDisk(folder, self._panel.alarm_rules, events)
         self.history = HistoryReader(folder / NAME)
@@ -118,6 +117,7 @@ class Alarms:
         for timer in (self._show_timer, self._slow_timer, self._due_timer):
             if timer is not None:
                 timer.cancel()
+        await asyncio.to_thread(self.mqtt.stop)
         self.history.close()
         if self._disk is not None:
             await self._disk.stop()
@@ -187,6 +187,7 @@ class Alarms:
             if self.counts.count(transition):
                 self._shown.count_raise(alarm, transition.at.monotonic)
             row = history_row(alarm, transition)
+            self.mqtt.put(row)
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
             if not is_kept(alarm.definition):
                 self._shown.update(transition.id, shown)
@@ -258,6 +259,7 @@ class Alarms:
         self._show_timer, self._view, self._shown_at = None, None, time.monotonic()
         self._pause_s = SHOW_EVERY_S + ROW_S * self._changed_rows
         self._changed_rows = 0
+        self.mqtt.put_standing(self._shown.listed())
         marked = self._shown.marks.take_changes()
         for robot in self._robots:
             if topics := marked.get(robot.robot_id):

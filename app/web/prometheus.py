@@ -15,6 +15,7 @@ from prometheus_client.registry import Collector
 
 from app.alarms.rows import LISTED_STATES
 from app.alarms.shown import PRIORITIES
+from app.runtime.alarm_mqtt import AlarmMqtt
 from app.runtime.alarms import Alarms
 from app.runtime.fleet import Fleet
 from app.web.metrics import Metrics
@@ -45,6 +46,8 @@ class _Of(Collector):
         if metrics.fleet is not None:
             yield from _of_fleet(metrics.fleet)
             yield from _of_alarms(metrics.fleet.alarms)
+            if metrics.fleet.alarms.mqtt.address:
+                yield from _of_mqtt(metrics.fleet.alarms.mqtt)
 
 
 def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
@@ -63,6 +66,18 @@ def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
         "From the raise of an alarm to its acknowledgement",
         count_value=alarms.counts.acknowledged,
         sum_value=alarms.counts.acknowledge_s,
+    )
+
+
+def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:
+    yield GaugeMetricFamily(
+        "kiosk_alarms_mqtt_connected", "1 while the broker has a connection", value=mqtt.is_connected
+    )
+    yield CounterMetricFamily(
+        "kiosk_alarms_mqtt_published", "Transitions that the broker has", value=mqtt.published
+    )
+    yield CounterMetricFamily(
+        "kiosk_alarms_mqtt_dropped", "Transitions that found no room", value=mqtt.dropped
     )
 
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from app import clock
 from app.alarms.history import read_history
+from app.alarms.transition_json import finite, transition
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
@@ -28,9 +29,7 @@ from app.web.alarm_answers import (
     AlarmReceipts,
     AlarmsAnswer,
     HistoryAnswer,
-    finite,
     receipt_json,
-    transition,
 )
 from app.web.alarm_runs import AlarmRun, AlarmRuns
 from app.web.app_state import AppState, CurrentState
