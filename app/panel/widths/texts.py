@@ -54,8 +54,9 @@ MANY: Final = 99  # lines of a text that makes its place higher
 
 
 def texts(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
-    """The texts of a widget in their places."""
-    yield from find_row(TEXTS, widget)(widget, cell)
+    """The texts of a widget in their places; a label may be only read aloud."""
+    boxes = find_row(TEXTS, widget)(widget, cell)
+    yield from (box for box in boxes if widget.show_label or box.part != "label")
 
 
 def face_texts(widget: KeyCommand, inside: float, cell: Cell, size: float = 0.0) -> Iterator[Box]:
