@@ -63,6 +63,7 @@ from app.web.routes import (
     parameters,
     press_socket,
     presses,
+    recordings,
     static,
     trends,
 )
@@ -133,7 +134,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    further = (diagnostics, help, static, health, display, description)
+    further = (diagnostics, recordings, help, static, health, display, description)
     for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, *further):
         app.include_router(routes.router)
     if dev:

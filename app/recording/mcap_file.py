@@ -3,9 +3,10 @@
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -44,27 +45,15 @@ class Channel:
     definition: str
 
 
-class McapFile:
-    """An MCAP file that is being written, until `finish` or `abandon`. Methods raise OSError.
+class McapStream:
+    """A recording that is written into a stream."""
 
-    Until it is finished it has another suffix, and a lock that the system releases with the process.
-    """
-
-    def __init__(self, folder: Path, name: str, about: Mapping[str, str]) -> None:
-        self._folder, self._path = folder, folder / f"{name}{UNFINISHED}"
-        self._final_path = folder / f"{name}{SUFFIX}"
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        self._stream = os.fdopen(os.open(self._path, flags, 0o600), "wb")
+    def __init__(self, stream: IO[bytes], about: Mapping[str, str]) -> None:
         self._channels: dict[str, int] = {}
-        try:
-            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
-            self._writer.start(PROFILE)
-            if about:
-                self._writer.add_metadata("recording", dict(about))
-        except BaseException:
-            self.abandon()
-            raise
+        self._writer = Writer(stream, compression=CompressionType.ZSTD)
+        self._writer.start(PROFILE)
+        if about:
+            self._writer.add_metadata("recording", dict(about))
 
     def add(self, channel: Channel, payload: bytes, received: int, sent: int) -> None:
         """Adds a message in CDR; times are nanoseconds since the epoch."""
@@ -106,9 +95,37 @@ class McapFile:
         """Adds a metadata record."""
         self._writer.add_metadata(name, dict(about))
 
+    def end(self) -> None:
+        """Completes the recording; the stream stays open."""
+        self._writer.finish()
+
+    def _channel(self, topic: str, register: Callable[[], int]) -> int:
+        if topic not in self._channels:
+            self._channels[topic] = register()
+        return self._channels[topic]
+
+
+class McapFile(McapStream):
+    """An MCAP file that is being written, until `finish` or `abandon`. Methods raise OSError.
+
+    Until it is finished it has another suffix, and a lock that the system releases with the process.
+    """
+
+    def __init__(self, folder: Path, name: str, about: Mapping[str, str]) -> None:
+        self._folder, self._path = folder, folder / f"{name}{UNFINISHED}"
+        self._final_path = folder / f"{name}{SUFFIX}"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        self._stream = os.fdopen(os.open(self._path, flags, 0o600), "wb")
+        try:
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            super().__init__(self._stream, about)
+        except BaseException:
+            self.abandon()
+            raise
+
     def finish(self) -> Path:
         """Completes the file, syncs it and gives it its final name, which is returned."""
-        self._writer.finish()
+        self.end()
         self._stream.flush()
         os.fsync(self._stream.fileno())
         self._path.rename(self._final_path)
@@ -122,10 +139,16 @@ class McapFile:
         with suppress(OSError):
             self._path.unlink()
 
-    def _channel(self, topic: str, register: Callable[[], int]) -> int:
-        if topic not in self._channels:
-            self._channels[topic] = register()
-        return self._channels[topic]
+
+def packed(messages: Iterable[tuple[Channel, bytes, int, int]], about: Mapping[str, str]) -> bytes:
+    """A recording of messages in CDR, each with its channel and its times as `McapStream.add` has
+    them."""
+    stream = BytesIO()
+    recording = McapStream(stream, about)
+    for message in messages:
+        recording.add(*message)
+    recording.end()
+    return stream.getvalue()
 
 
 def recover(folder: Path, unfinished: Path) -> Path | None:

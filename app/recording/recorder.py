@@ -12,12 +12,13 @@ from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.rules import RecordRules
 from app.recording.bounded_folder import recording_name
-from app.recording.mcap_file import Channel
-from app.recording.ring_buffer import RingBuffer, to_buffered
+from app.recording.mcap_file import Channel, packed
+from app.recording.ring_buffer import RingBuffer, times_of, to_buffered
 from app.recording.writer import Recording, Recordings
 from app.robot.state import RobotState, Sample
 
 RECHECK_S: Final = 1.0
+LAST_S: Final = 60.0  # of the download of the last minute
 MAX_WAIT_S: Final = 600.0  # how long a recording waits for the receipt of a press
 
 
@@ -49,7 +50,8 @@ class Recorder:
             for topic in (types if rules.topics is None else rules.topics)
             for key in robot.possible_keys(topic)
         }
-        self._ring = RingBuffer(rules.before_s, recordings.ring_bytes)
+        self._ring = RingBuffer(max(rules.before_s, LAST_S), recordings.ring_bytes)
+        self._packing = asyncio.Lock()  # one at a time: each holds its samples
         self._recording: Recording | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._pending_presses: dict[str, str] = {}  # press → who
@@ -83,6 +85,18 @@ class Recorder:
         self._write_press(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),
                    outcome=receipt.outcome, reason=render(receipt.reason), at=receipt.at)  # fmt: skip
 
+    async def last_minute(self) -> bytes:
+        """What was received in the last `LAST_S` seconds, as an MCAP file; less where it is more than
+        the ring takes."""
+        async with self._packing:
+            recent = self._ring.recent(time.monotonic(), LAST_S)
+            samples = [(buffered.key, buffered.sample) for buffered in recent]
+            messages = (
+                (self._channels[key], bytes(sample.payload), *times_of(sample))
+                for key, sample in samples
+            )
+            return await asyncio.to_thread(packed, messages, self._metadata)
+
     def stop(self) -> None:
         """Ends the current recording."""
         if self._timer is not None:
@@ -100,7 +114,7 @@ class Recorder:
         self._close()
         name = recording_name(time.time(), self._robot_id, widget)
         self._recording = self._recordings.begin(name, self._channels, self._metadata)
-        for buffered in self._ring.recent(time.monotonic()):
+        for buffered in self._ring.recent(time.monotonic(), self._rules.before_s):
             self._recording.add(buffered)
 
     def _write_press(self, **press: Any) -> None:

@@ -1,5 +1,6 @@
 """The latest samples, limited by age and bytes."""
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,6 +21,12 @@ class Buffered:
     key: str
     sample: Sample
     size: int
+
+
+def times_of(sample: Sample) -> tuple[int, int]:
+    """When a sample was received and sent, in nanoseconds since the epoch."""
+    received = round(sample.wall * 1e9)
+    return received, received if sample.sent is None else round(sample.sent * 1e6) * 1000
 
 
 def to_buffered(key: str, sample: Sample) -> Buffered:
@@ -46,10 +53,11 @@ class RingBuffer:
             self.size += buffered.size
         self._drop_old(buffered.sample.at)
 
-    def recent(self, now: float) -> Iterator[Buffered]:
-        """The samples that are at most `max_age_s` old at `now` (monotonic seconds), oldest first."""
+    def recent(self, now: float, most_s: float = math.inf) -> Iterator[Buffered]:
+        """The samples that are at most `max_age_s`, and `most_s`, old at `now` (monotonic seconds),
+        oldest first."""
         self._drop_old(now)
-        yield from self._samples
+        yield from (buffered for buffered in self._samples if now - buffered.sample.at <= most_s)
 
     def _drop_old(self, now: float) -> None:
         while self._samples and (

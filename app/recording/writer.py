@@ -13,7 +13,7 @@ from app.errors import LogError, os_error_text
 from app.i18n import TextLike, say
 from app.recording.bounded_folder import RecordingFolder
 from app.recording.mcap_file import Channel, McapFile
-from app.recording.ring_buffer import OVERHEAD_BYTES, Buffered
+from app.recording.ring_buffer import OVERHEAD_BYTES, Buffered, times_of
 
 log = logging.getLogger("kiosk.recording")
 
@@ -191,9 +191,7 @@ class Recording:
     def _write_sample(self, buffered: Buffered) -> None:
         if self._file is not None:
             sample = buffered.sample
-            received = round(sample.wall * 1e9)
-            sent = received if sample.sent is None else round(sample.sent * 1e6) * 1000
-            self._file.add(self._channels[buffered.key], bytes(sample.payload), received, sent)
+            self._file.add(self._channels[buffered.key], bytes(sample.payload), *times_of(sample))
 
     def _write_press(self, press: Mapping[str, Any], at: int) -> None:
         if self._file is not None:

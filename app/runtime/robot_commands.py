@@ -36,6 +36,7 @@ class RobotCommands:
     ) -> None:
         panel, interfaces, robot, link = context.panel, context.interfaces, context.robot, context.link
         changed = context.signals.changed.emit
+        self.recorder = recorder
         self.calls = ServiceCalls(interfaces, robot, link, changed)
         self.actions = GoalTracker(interfaces, robot, link, changed)
         self.confirmations = Confirmations(robot, changed)

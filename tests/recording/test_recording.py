@@ -60,6 +60,14 @@ def test_ring_keeps_samples_within_its_age() -> None:
     assert ring.size == 0
 
 
+def test_what_is_older_than_asked_for_stays_in_the_ring() -> None:
+    ring = RingBuffer(60.0, MB)
+    for at in (0.0, 30.0, 55.0):
+        ring.add(to_buffered("heard", sample(at)))
+    assert [buffered.sample.at for buffered in ring.recent(60.0, 10.0)] == [55.0]
+    assert [buffered.sample.at for buffered in ring.recent(60.0)] == [0.0, 30.0, 55.0]
+
+
 def test_a_ring_holds_no_more_bytes_than_it_may_in_a_flood() -> None:
     ring = RingBuffer(10.0, 64 * MB)
     for number in range(20_000):  # ten seconds of 10 MB at 2 kHz
