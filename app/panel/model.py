@@ -197,7 +197,7 @@ class Panel(Description):
         inhibited = {widget for alarm in self.alarms for widget in alarm.inhibits}
         groups: dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]] = {}
         for widget in self.commands:
-            alike = isinstance(widget, PublishPress) and not (widget.confirm or widget.one_at_a_time)
+            alike = isinstance(widget, PublishPress) and not widget.shows_more
             if alike and isinstance(widget, PublishPress) and widget.id not in inhibited:
                 key = widget.interlocks, widget.role == "stop"
                 groups[key] = (*groups.get(key, ()), widget)

@@ -22,6 +22,7 @@ from app.panel.widgets.families import BaseWidget, Display, Input, PublishComman
 from app.panel.widgets.figure import Figure, TargetField
 from app.panel.widgets.gauge import Gauge, SetpointField
 from app.panel.widgets.joints import Joints
+from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.pallet import Pallet
@@ -232,6 +233,13 @@ def _pressed(command: PublishPress, interfaces: Interfaces) -> Iterator[Need]:
         template=resolve_names(command.template, Type(command.type), interfaces),
         confirm=command.confirm,
     )
+    yield from _lamp(command)
+
+
+def _lamp(command: ServerCommand | PublishPress) -> Iterator[Need]:
+    if isinstance(command, LampCommand) and command.lamp is not None:
+        values = tuple(state.value for state in command.lamp.states)
+        yield replace(_of_field(command.lamp), values=values)
 
 
 def _stepped(widget: Step, interfaces: Interfaces) -> Iterator[Need]:
@@ -255,6 +263,7 @@ def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
 
 def _call(call: Call, _: Interfaces) -> Iterator[Need]:
     yield Served(service=call.service, type=call.type, success=call.success, message=call.message)
+    yield from _lamp(call)
 
 
 def _action(action: Action, _: Interfaces) -> Iterator[Need]:

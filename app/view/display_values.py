@@ -13,6 +13,7 @@ from app.panel.base import HasTopic, TopicQos
 from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, LampState, Readout, WrittenNumber
 from app.panel.widgets.families import Display
+from app.panel.widgets.key_lamp import KeyLamp
 from app.permission.conditions import ABSENCES
 from app.permission.mismatches import topic_mismatch
 from app.printable import readable
@@ -155,7 +156,9 @@ def shown_time(widget: WrittenNumber, style: str, value: Any, wall: float) -> tu
     return (NOTHING, math.inf) if seconds is None else time_text(style, seconds, wall)
 
 
-def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
+def indicator(
+    widget: Indicator | KeyLamp, robot: RobotState, now: float
+) -> tuple[dict[str, Any], float]:
     """Attributes of a lamp: `state`, `text`, `shape`, `colour` and `note`; and when they change.
 
     What is not known now has a shape and a text of its own, and never a colour.

@@ -18,6 +18,7 @@ from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
+from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric
@@ -81,6 +82,9 @@ def attributes_of(
         priority = robot.alarmed.priorities.get((widget.topic, widget.field))
         if priority is not None:
             attributes = {**attributes, "alarmed": str(priority or "")}
+    if isinstance(widget, LampCommand) and widget.lamp is not None:
+        lamp, lamp_until = indicator(widget.lamp, robot, now)
+        attributes, until = {**attributes, **lamp}, min(until, lamp_until)
     return attributes, until
 
 

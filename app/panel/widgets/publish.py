@@ -13,6 +13,7 @@ from app.panel.constants import mismatch_at
 from app.panel.field_paths import FieldPath
 from app.panel.template import NOW, fill, placeholders
 from app.panel.widgets.families import CheckContext, PublishCommand
+from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.templated import TemplateCommand
 
 
@@ -43,6 +44,11 @@ class PublishPress(TemplateCommand, PublishCommand):
     @property
     def one_at_a_time(self) -> bool:
         return self.one_shot
+
+    @property
+    def shows_more(self) -> bool:
+        """Whether more of it is shown than its lock."""
+        return self.confirm is not None or self.one_at_a_time or any(self.sources())
 
     @property
     def action_text(self) -> str:
@@ -76,7 +82,7 @@ class SinglePublish(PublishPress):
             yield Fault(f"{place}.one_shot", message)
 
 
-class Publish(SinglePublish):
+class Publish(SinglePublish, LampCommand):
     kind: Literal["publish"]
 
 

@@ -15,6 +15,7 @@ from app.panel.base import ActionType, AnyText, Seconds, ServiceType, Span, Topi
 from app.panel.field_paths import MessageField
 from app.panel.response_text import response_fields
 from app.panel.widgets.families import CheckContext
+from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.templated import TemplateCommand
 
 NUMBER_TYPES: Final = r"u?int(8|16|32|64)|float(32|64)|byte|char"
@@ -39,7 +40,7 @@ class ServerCommand(TemplateCommand):
         yield self.server_role, self.server_name
 
 
-class Call(ServerCommand):
+class Call(ServerCommand, LampCommand):
     """A service call. `success` and `message` are fields of the response; by default a bool and a
     string of these names. `answer` is shown with `{field}` filled in."""
 
