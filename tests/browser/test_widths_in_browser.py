@@ -131,7 +131,14 @@ SPOTS: Final = {
     **{f"{kind} label": (".named > label", "") for kind in ("number", "slider")},
     **{f"{kind} label": (":scope > label", "") for kind in ("select", "text", "toggle")},
 }
-NOT_HERE: Final = ("label label", "table states", "conditions label", "sequence steps", "trend label")
+NOT_HERE: Final = (
+    "label label",
+    "table states",
+    "conditions label",
+    "parameter label",
+    "sequence steps",
+    "trend label",
+)
 
 
 @pytest.fixture(scope="module", params=PANELS, ids=["shipped", "example"])
