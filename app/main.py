@@ -63,6 +63,7 @@ from app.web.routes import (
     parameters,
     press_socket,
     presses,
+    recipes,
     recordings,
     static,
     trends,
@@ -88,6 +89,7 @@ ROBOT_ROUTES: Final = (
     log_lines,
     lock_help,
     trends,
+    recipes,
 )
 ALARM_ROUTES: Final = (alarms, alarm_history, alarm_report)
 READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown

@@ -28,6 +28,7 @@ ROOMS = (
     "audit",
     "trends",
     "alarms",
+    "recipes",
     "view",
     "commands",
     "recording",

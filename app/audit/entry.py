@@ -24,6 +24,7 @@ Kind = Literal[
     "control",
     "alarm",
     "diagnostics",
+    "recipe",
     "removed",
     "resumed",
 ]

@@ -7,9 +7,10 @@ returned when its entry is on the disk. The same id again is the same act.
 """
 
 import asyncio
+import hashlib
 import logging
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
@@ -25,7 +26,9 @@ from app.permission.verdict import PERMITTED, Verdict
 from app.robot.command_status import OutcomeCode
 from app.ros_logging import RobotLog
 
+LONGEST_KEPT: Final = 500  # characters of a value of an earlier act
 NO_VALUES: Final[Mapping[str, Any]] = {}
+Finish = Callable[[], Awaitable[Text | None]]
 
 
 class ActRequest(NamedTuple):
@@ -58,10 +61,14 @@ class ActGuard(Protocol):
 @dataclass(frozen=True, slots=True)
 class Applied:
     """The result of `Act.apply`. `refusal`: why it changed nothing. `waits`: it is accepted, and its
-    effect is yet to come."""
+    effect is yet to come. `finish` ends what takes time, such as a write to the disk, and returns why
+    it failed, None if it did not; the entry is made after it. `note` is what the receipt says of an act
+    that was applied."""
 
     refusal: Text | None = None
     waits: bool = False
+    finish: Finish | None = None
+    note: TextLike = ""
 
 
 Subject = TypeVar("Subject")
@@ -161,7 +168,7 @@ class ActRunner(Generic[Subject]):
             raise NotFound(f'there is no act "{request.act:.40}": there is {", ".join(self._acts)}')
         if made := self._made.get(act_id):
             earlier, task = made
-            if not _same_act(earlier, request):
+            if not _same_act(earlier, _kept(request)):
                 return _refused(request, act_id, "press_id_reused", say("press_id_reused", id=act_id))
         else:
             task = self._begin(request, act_id)
@@ -184,30 +191,41 @@ class ActRunner(Generic[Subject]):
 
     def _begin(self, request: ActRequest, act_id: str) -> "asyncio.Task[ActReceipt]":
         """Applies the act at once; the task returned ends when its entry is written."""
-        receipt, entry = self._applied(request, act_id)
-        if not receipt.done:
-            self._log.warning(
-                "%s: %s by %s: refused: %s", self._kind, request.act, request.who, receipt.reason
-            )
-        task = asyncio.ensure_future(self._logged(request, receipt, entry))
-        self._made[act_id] = request, task
+        receipt, entry, finish = self._applied(request, act_id)
+        task = asyncio.ensure_future(self._ended(request, receipt, entry, finish))
+        self._made[act_id] = _kept(request), task
         while len(self._made) > RECEIPTS_KEPT:
             self._made.popitem(last=False)
         return task
 
-    def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike]:
-        """The receipt, and the sentence of the log."""
+    def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike, Finish | None]:
+        """The receipt, the sentence of the log, and what ends the act."""
         act = self._acts[request.act]
         verdict = act.permission(self._context.guard, request)
         if not verdict.permitted:
             reason = verdict.reason or ""
-            return _refused(request, act_id, verdict.code, reason), reason
+            return _refused(request, act_id, verdict.code, reason), reason, None
         applied = act.apply(self._subject, request)
         self._context.changed()
         if refusal := applied.refusal:
-            return _refused(request, act_id, refusal.code, refusal), refusal
+            return _refused(request, act_id, refusal.code, refusal), refusal, None
         outcome: OutcomeCode = "accepted" if applied.waits else "succeeded"
-        return ActReceipt(act_id, request.act, outcome, "", "", _now(), ""), act.entry(applied)
+        receipt = ActReceipt(act_id, request.act, outcome, "", applied.note, _now(), "")
+        return receipt, act.entry(applied), applied.finish
+
+    async def _ended(
+        self, request: ActRequest, receipt: ActReceipt, entry: TextLike, finish: Finish | None
+    ) -> ActReceipt:
+        """The receipt of an act that is over and logged."""
+        if finish is not None and (failure := await finish()):
+            receipt, entry = _refused(request, receipt.id, failure.code, failure, "log"), failure
+        if finish is not None:
+            self._context.changed()
+        if not receipt.done:
+            self._log.warning(
+                "%s: %s by %s: refused: %s", self._kind, request.act, request.who, receipt.reason
+            )
+        return await self._logged(request, receipt, entry)
 
     async def _logged(self, request: ActRequest, receipt: ActReceipt, entry: TextLike) -> ActReceipt:
         origin = origin_of(request.who)
@@ -228,6 +246,17 @@ def same_principal(who: Principal, other: Principal | None) -> bool:
     if other is None or who.client.id != other.client.id:
         return False
     return bool(who.client.id) or who.client.address == other.client.address
+
+
+def _kept(request: ActRequest) -> ActRequest:
+    """The request as it is kept to recognize a repetition: of a long text its hash."""
+    values = {
+        name: hashlib.sha256(value.encode("utf-8", "surrogatepass")).hexdigest()
+        if isinstance(value, str) and len(value) > LONGEST_KEPT
+        else value
+        for name, value in request.values.items()
+    }
+    return request._replace(values=values)
 
 
 def _same_act(earlier: ActRequest, request: ActRequest) -> bool:

@@ -10,6 +10,7 @@ from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations, Unconfirmed, equal
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press import Press, PressHandle
+from app.commands.recipe_loads import RecipeLoader, service_of
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.errors import InputError, NotFound
@@ -24,6 +25,7 @@ from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
 from app.panel.widgets.publish import Confirm, Publish, PublishPress
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
@@ -64,6 +66,7 @@ class Trackers(NamedTuple):
     actions: GoalTracker
     confirmations: Confirmations
     parameters: ParameterSync
+    recipes: RecipeLoader
 
 
 class Dispatcher:
@@ -93,12 +96,14 @@ class Dispatcher:
         self.actions = trackers.actions
         self._confirmations = trackers.confirmations
         self._parameters = trackers.parameters
+        self._recipes = trackers.recipes
         self._monotonic = monotonic
         # By kind or family of widgets: how to dispatch it, how to check an entry.
         self.dispatches: Mapping[type[Any], Dispatch] = {
             PublishPress: Dispatch(self._publish, self._check_message),
             Call: Dispatch(self._call, self._check_call),
             Switch: Dispatch(self._switch, self._check_switch),
+            RecipeLoad: Dispatch(self._load, self._check_load),
             Action: Dispatch(self._start, lambda widget, _: self.actions.full(widget.action)),
             Parameter: Dispatch(
                 self._set, lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}")
@@ -110,6 +115,7 @@ class Dispatcher:
             Parameter: self._parameters.check_value,
             Step: self._check_step,
             Switch: lambda widget, value: widget.check_value(value),
+            RecipeLoad: lambda widget, value: trackers.recipes.chosen(widget, value, self._checked),
         }
         require_rows("dispatch", self.dispatches, PressCommand)
         require_rows("check of its entries", self.checks, EntryWidget)
@@ -232,6 +238,18 @@ class Dispatcher:
             return self._check_message(command, sent)
         return self._check_call(command, sent)
 
+    async def _load(self, widget: RecipeLoad, prepared: PreparedPress) -> Outcome:
+        def send(part: Publish | Call, fields: dict[str, Any], handle: PressHandle) -> Any:
+            sent = PreparedPress(prepared.values, fields, handle)
+            return self._publish(part, sent) if isinstance(part, Publish) else self._call(part, sent)
+
+        return await self._recipes.load(widget, prepared, send)
+
+    def _check_load(self, widget: RecipeLoad, fields: dict[str, Any]) -> TextLike:
+        if widget.parts and isinstance(part := widget.parts[0], Publish):
+            return self._check_message(part, self._recipes.message(widget, fields["value"]))
+        return self._calls.full(service_of(widget))
+
     async def _start(self, widget: Action, prepared: PreparedPress) -> Outcome:
         return await self.actions.start(widget, prepared.fields, prepared.handle)
 
@@ -268,8 +286,11 @@ class Dispatcher:
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
-            values[name] = find_row(self.checks, field)(field, inputs[name])
+            values[name] = self._checked(field, inputs[name])
         return values
+
+    def _checked(self, field: Any, value: Any) -> Any:
+        return find_row(self.checks, field)(field, value)
 
 
 def _sent_by(fields: Mapping[str, Any]) -> dict[str, Any]:

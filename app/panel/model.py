@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Final, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field
 
@@ -30,11 +30,13 @@ from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
 from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
+from app.panel.recipe import RecipeSet
 from app.panel.rules import BrandRules, ControlRules, DiagnosticRules, EmbedRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.source import Source
 from app.panel.stories import StoryName
 from app.panel.texts import panel_texts
+from app.panel.uniform_buttons import UniformButtons, uniform_buttons
 from app.panel.widgets.families import (
     BaseWidget,
     Command,
@@ -44,10 +46,12 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.log_view import LogView
-from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, EVENTS_QOS, Parameter
+from app.panel.widgets.parts import parts_of
+from app.panel.widgets.publish import Confirm
+from app.panel.widgets.recipe_load import RecipeLoad, loads_of
 from app.panel.widgets.service_action import Action
-from app.panel.widgets.switch import confirms_of, parts_of
+from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
 from app.pictures import picture_files
 
@@ -66,9 +70,6 @@ class RobotEntry(Description):
 
 
 Kind = TypeVar("Kind", bound=BaseWidget)
-
-# rmw_qos_profile_parameter_events, with a durability: the subscription waits for no publisher.
-EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 
 class Panel(Description):
@@ -110,6 +111,7 @@ class Panel(Description):
     own_conditions: Annotated[tuple[NamedCondition, ...], Field(strict=False)] = Field(
         (), alias="condition"
     )
+    recipes: Annotated[tuple[RecipeSet, ...], Field(strict=False)] = Field((), alias="recipe")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     revision: Annotated[str, Field(exclude=True)] = ""  # of the file: other pages are out of date
 
@@ -146,9 +148,15 @@ class Panel(Description):
         for page in self.pages:
             yield from page.widgets
         yield from self.frame_widgets
+        yield from self.recipe_loads
+
+    @cached_property
+    def recipe_loads(self) -> tuple[RecipeLoad, ...]:
+        """The commands that load a recipe, of each set; they are on the page of recipes."""
+        return loads_of(self.recipes, (widget for page in self.pages for widget in page.widgets))
 
     def senders(self) -> Iterator[Command]:
-        """The commands that send something: those of a switch in its place."""
+        """The commands that send something: its parts in its place."""
         return (part for command in self.commands for part in parts_of(command))
 
     def widget(self, widget_id: str, kind: type[Kind]) -> Kind:
@@ -163,7 +171,7 @@ class Panel(Description):
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
         frame = {widget.id for widget in self.frame_widgets}
         pages = {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
-        return pages | {FRAME_ONLY: frozenset(frame)}
+        return pages | {FRAME_ONLY: frozenset(frame) | {load.id for load in self.recipe_loads}}
 
     @property
     def has_alarms(self) -> bool:
@@ -178,30 +186,20 @@ class Panel(Description):
     @property
     def has_rail(self) -> bool:
         """Whether tabs or buttons of the frame stand at the side of its pages."""
-        return len(self.pages) > 1 or bool(self.frame.widgets)
+        return len(self.pages) > 1 or bool(self.frame.widgets or self.recipes)
 
     @cached_property
-    def commands(self) -> tuple[Command, ...]:
-        """The widgets that can be pressed or held."""
+    def commands(self) -> tuple[Command, ...]:  # the widgets that can be pressed or held
         return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
-    def stops(self) -> tuple[Command, ...]:
-        """The widgets that stop the machine."""
+    def stops(self) -> tuple[Command, ...]:  # those that stop the machine
         return tuple(widget for widget in self.commands if is_stop(widget))
 
     @cached_property
-    def uniform_buttons(self) -> Mapping[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]:
-        """Buttons that publish and that no alarm locks, by their interlocks and whether they stop: many
-        are judged as one, as these and the graph decide their lock, which is all that is shown."""
-        inhibited = {widget for alarm in self.alarms for widget in alarm.inhibits}
-        groups: dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]] = {}
-        for widget in self.commands:
-            alike = isinstance(widget, PublishPress) and not widget.shows_more
-            if alike and isinstance(widget, PublishPress) and widget.id not in inhibited:
-                key = widget.interlocks, widget.role == "stop"
-                groups[key] = (*groups.get(key, ()), widget)
-        return groups
+    def uniform_buttons(self) -> UniformButtons:
+        """Buttons that are judged as one."""
+        return uniform_buttons(self.commands, self.alarms)
 
     @cached_property
     def displays(self) -> tuple[DisplayWidget, ...]:
@@ -272,7 +270,8 @@ class Panel(Description):
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
     def parameters(self) -> Iterator[Parameter]:
-        return (w for w in self.widgets() if isinstance(w, Parameter))
+        yield from (w for w in self.widgets() if isinstance(w, Parameter))
+        yield from (parameter for load in self.recipe_loads for parameter in load.reads)
 
     def logs(self) -> dict[str, int]:
         """Topic → number of lines to keep, of all logs that the panel shows."""

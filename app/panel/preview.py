@@ -29,6 +29,10 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
     for w, widget in enumerate(panel.frame.widgets):
         if isinstance(widget, Command):
             yield Remark(f"frame.widget[{w}]", "\n".join(_preview_lines(widget, interfaces, {})))
+    for r, load in enumerate(panel.recipe_loads):
+        comments = {field.id: field.comment for field in load.fields}
+        comments[NOW] = "the time of sending"
+        yield Remark(f"recipe[{r}]", "\n".join(_preview_lines(load, interfaces, comments)))
 
 
 def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BaseModel, Field
 from app.panel.base import Description, Id, Seconds, TopicName, TopicQos, Type, non_empty
 from app.panel.field_paths import FieldPath
 from app.panel.number_format import Factor
+from app.panel.recipe import RecipeSet
 from app.panel.widgets.displays import FORMAT_OR_TIME, LampState
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.numbers import Unit
@@ -35,5 +36,5 @@ class Source(Description):
 def reads_source(model: type[BaseModel]) -> bool:
     """Whether a table of this description may name a source: it reads a topic."""
     keys = model.model_fields
-    publishes = issubclass(model, PublishCommand)
+    publishes = issubclass(model, PublishCommand | RecipeSet)
     return "topic" in keys and "type" in keys and not publishes and model is not Source

@@ -21,6 +21,7 @@ from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
@@ -34,7 +35,7 @@ from app.permission.conditions import (
     value_verdict,
 )
 from app.permission.mismatches import topic_mismatch
-from app.permission.servers import call_blocked, set_blocked
+from app.permission.servers import call_blocked, parameters_offered, set_blocked
 from app.permission.verdict import PERMITTED, Verdict, locked
 from app.robot.command_status import IDLE
 from app.robot.keyed_values import kept_s
@@ -208,11 +209,22 @@ def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
     return verdict
 
 
+def recipe_blocked(load: RecipeLoad, robot: RobotState, now: float) -> Verdict | None:
+    """Why no recipe may be loaded: what it is sent by can't be used, or a load is not over."""
+    for part in load.parts:
+        if (blocked := command_blocked(part, robot, now)) is not None:
+            return blocked
+    if load.set.node is not None and (mismatch := parameters_offered(load.set.node, robot)):
+        return mismatch
+    return locked("press_in_progress") if robot.command_status.get(load.id, IDLE).busy else None
+
+
 # What may lock a command, beside the link and its interlocks: a check for each family of widgets.
 COMMAND_CHECKS: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
     PublishCommand: lambda command, robot, _: publish_blocked(command, robot),
     Step: step_blocked,
     Switch: lambda switch, robot, now: command_blocked(switch.parts[0], robot, now),
+    RecipeLoad: recipe_blocked,
     ServerCommand: call_blocked,
     Parameter: lambda parameter, robot, _: set_blocked(parameter, robot),
 }

@@ -93,6 +93,7 @@ async def open_fleet(
             if trends is not None:
                 await trends.start()
             await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)), oplog)
+            await fleet.recipes.start(settings.data_folder(mode_of(settings, panel)))
             await fleet.start()
             if states is not None:
                 states.start()
@@ -105,6 +106,7 @@ async def open_fleet(
                 await states.stop()
             await fleet.stop()
             await fleet.alarms.stop()
+            await fleet.recipes.stop()
             if trends is not None:
                 await trends.stop()
             if recordings is not None:

@@ -17,6 +17,7 @@ from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.runtime.alarms import Alarms
+from app.runtime.recipes import Recipes
 from app.runtime.robot_access import ROBOT_ACCESS
 from app.runtime.robot_session import RobotSession
 from app.runtime.wiring import ServerParts, wire_session
@@ -49,6 +50,7 @@ class Fleet:
         self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
         self.alarms = Alarms(panel)
+        self.recipes = Recipes(panel)
         self.states: Path | None = None  # the file of the machine's states
         server = ServerParts(
             panel,
@@ -60,6 +62,7 @@ class Fleet:
             root_path,
             self.alarms,
             doctor or NoDoctor(),
+            self.recipes,
         )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]

@@ -14,6 +14,7 @@ from app.commands.parameters.sync import ParameterSync
 from app.commands.press_guard import PressGuard
 from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
+from app.commands.recipe_loads import Books, RecipeLoader
 from app.commands.service_calls import ServiceCalls
 from app.robot.sample_handlers import SampleHandlers
 from app.transport.peer import Peer, RobotContext
@@ -33,6 +34,7 @@ class RobotCommands:
         press_guard: PressGuard,
         press_log: PressLog,
         recorder: "Recorder | None",
+        books: Books,
     ) -> None:
         panel, interfaces, robot, link = context.panel, context.interfaces, context.robot, context.link
         changed = context.signals.changed.emit
@@ -51,7 +53,13 @@ class RobotCommands:
             interfaces,
             robot,
             link,
-            Trackers(self.calls, self.actions, self.confirmations, self.parameters),
+            Trackers(
+                self.calls,
+                self.actions,
+                self.confirmations,
+                self.parameters,
+                RecipeLoader(interfaces, robot, self.parameters, books, changed),
+            ),
             flushed=peer.flushed,
         )
         arrivals = PendingSamples(context.signals.judging.emit, lambda: link.has_immediate)

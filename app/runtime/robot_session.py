@@ -19,6 +19,7 @@ from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
 from app.commands.press_guard import PressGuard
 from app.commands.presses import Presses
+from app.commands.recipe_acts import RecipeBooks
 from app.errors import LinkError
 from app.i18n import TextLike
 from app.interfaces import Interfaces
@@ -64,6 +65,7 @@ class RobotSession:
     control: ControlAuthority
     control_acts: ActRunner[ControlAuthority]
     alarm_acts: ActRunner[AlarmEngine]
+    recipe_acts: ActRunner[RecipeBooks]
     diagnostic_acts: ActRunner[Doctor]
     press_guard: PressGuard
     press_log: PressLog

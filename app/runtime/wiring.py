@@ -14,6 +14,7 @@ from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
+from app.commands.recipe_acts import RECIPE_ACTS
 from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
@@ -29,6 +30,7 @@ from app.runtime.frames import Frames
 from app.runtime.graph_survey import GraphSurvey
 from app.runtime.ingest import Ingest
 from app.runtime.live_look import LiveLooks
+from app.runtime.recipes import Recipes
 from app.runtime.renewal import Renewal
 from app.runtime.robot_alarms import RobotAlarms
 from app.runtime.robot_commands import RobotCommands
@@ -64,6 +66,7 @@ class ServerParts:
     root_path: str = ""
     alarms: Alarms | None = None
     doctor: Doctor = field(default_factory=NoDoctor)
+    recipes: Recipes | None = None
 
 
 def wire_session(
@@ -87,6 +90,8 @@ def wire_session(
     )
     alarms = server.alarms or Alarms(panel)
     robot_alarms = alarms.add_robot(entry.id if entry else "", robot)
+    recipes = server.recipes or Recipes(panel)
+    recipes.add_listener(signals.changed.emit)
     sources = ViewSources(
         control,
         operators_log,
@@ -95,6 +100,7 @@ def wire_session(
         server.simulated,
         alarms.view,
         robot_alarms.inhibited,
+        recipes.revisions,
     )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
@@ -111,7 +117,7 @@ def wire_session(
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
-    commands = RobotCommands(context, peer, press_guard, press_log, recorder)
+    commands = RobotCommands(context, peer, press_guard, press_log, recorder, recipes)
     published_alarms = PublishedAlarms(
         panel,
         entry.id if entry else "",
@@ -135,6 +141,7 @@ def wire_session(
         control=control,
         control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
         alarm_acts=ActRunner("alarm", ALARM_ACTS, alarms.engine, act_context),
+        recipe_acts=ActRunner("recipe", RECIPE_ACTS, recipes, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
         press_guard=press_guard,
         press_log=press_log,

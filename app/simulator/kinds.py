@@ -5,12 +5,11 @@ A kind without a row has that of its family. A display with keys `min`, `max`, `
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from app.i18n import render
 from app.interfaces import Interfaces, Type
-from app.panel.base import TopicQos
 from app.panel.constants import parent_type, resolve_names
 from app.panel.machine_state import MachineState
 from app.panel.response_text import response_paths
@@ -27,7 +26,8 @@ from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.publish import PublishPress
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call, ServerCommand
 from app.panel.widgets.static import Static
@@ -35,68 +35,7 @@ from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
-
-DEFAULT_QOS: Final = TopicQos()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """A field that the panel shows. `low` and `high` are limits of the number in the message, `values`
-    the values that the widget distinguishes. Times `scale` plus `offset` the number has the `unit`."""
-
-    topic: str
-    type: str
-    field: str
-    label: str = ""
-    unit: str = ""
-    scale: float = 1.0
-    offset: float = 0.0
-    low: float | None = None
-    high: float | None = None
-    values: tuple[Any, ...] = ()
-    max_age_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Published:
-    """A topic that the panel publishes; the robot confirms a press of `template` by `confirm`."""
-
-    topic: str
-    type: str
-    qos: TopicQos = DEFAULT_QOS
-    template: Mapping[str, Any] | None = None
-    confirm: Confirm | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Served:
-    """A service that the panel calls; `success` and `message` are paths in its response."""
-
-    service: str
-    type: str
-    success: str | None = None
-    message: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Acted:
-    """An action that the panel sends goals to; its feedback's field `progress` has these `ends`."""
-
-    action: str
-    type: str
-    progress: str | None = None
-    ends: tuple[float, float] = (0.0, 100.0)
-    shown: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Declared:
-    """A parameter of a node."""
-
-    widget: Parameter
-
-
-Need = Shown | Published | Served | Acted | Declared
+from app.simulator.needs import Acted, Declared, Need, Published, Served, Shown
 
 
 def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
@@ -254,6 +193,14 @@ def _switched(switch: Switch, interfaces: Interfaces) -> Iterator[Need]:
     yield replace(_of_field(switch.reported), values=(switch.off_value, switch.on_value))
 
 
+def _recipe(load: RecipeLoad, interfaces: Interfaces) -> Iterator[Need]:
+    for part in load.parts:
+        yield from needs_of(part, interfaces)
+    yield from (Declared(widget=parameter) for parameter in load.reads)
+    for source in load.sources():
+        yield from (Shown(topic=source.topic, type=source.type, field=path) for path in source.fields)
+
+
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
     if command.server_role == "SS":
         yield Served(service=command.server_name, type=command.type)
@@ -303,6 +250,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     PublishPress: _pressed,
     Step: _stepped,
     Switch: _switched,
+    RecipeLoad: _recipe,
     ServerCommand: _server,
     Call: _call,
     Action: _action,

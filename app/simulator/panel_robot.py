@@ -18,7 +18,8 @@ from app.panel.used_names import played_names
 from app.simulator.answers import DONE, feedback_at, good_response
 from app.simulator.declared import declared_by
 from app.simulator.goals import ActionServer, CountAction, SimulatedAction
-from app.simulator.kinds import Acted, Declared, Need, Published, Served, Shown, needs_of
+from app.simulator.kinds import needs_of
+from app.simulator.needs import Acted, Declared, Need, Published, Served, Shown
 from app.simulator.palletizing.cell import SPEED_MM_S
 from app.simulator.palletizing.played import PlayedPalletizing
 from app.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from app.interfaces.definitions import attribute_name
 from app.panel.template import NOW, fill, placeholders
 from app.panel.values import same_value
-from app.simulator.kinds import Published
+from app.simulator.needs import Published
 
 CLOSE: Final = 1e-6  # a float32 comes back as the nearest one
 PLACEHOLDER: Final = re.compile(r"\{\{|\}\}|\{(\w+)\}")

@@ -8,7 +8,7 @@ from app.interfaces import Interfaces
 from app.interfaces.field_path import Key, field_call, field_paths, path_steps
 from app.panel.demo import NO_ENTRY
 from app.panel.model import Panel
-from app.simulator.kinds import Shown
+from app.simulator.needs import Shown
 from app.simulator.values.fields import FieldSignal, PanelFields
 from app.simulator.values.functions import put_result
 from app.simulator.values.known_types import Moment

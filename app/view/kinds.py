@@ -25,6 +25,7 @@ from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
@@ -45,6 +46,7 @@ from app.view.log_values import log
 from app.view.machine_values import machine_state
 from app.view.pallet_values import pallet
 from app.view.parameter_values import parameter
+from app.view.recipe_values import recipe
 from app.view.result_age import result_age
 from app.view.select_values import select
 from app.view.sequence_values import sequence
@@ -173,6 +175,12 @@ def _switched(widget: Switch, robot: RobotState, verdict: Verdict, now: float) -
     return pressed | reported, min(ages, until)
 
 
+def _recipe(widget: RecipeLoad, robot: RobotState, verdict: Verdict, now: float) -> AttributesUntil:
+    pressed, ages = _pressed(widget, robot, verdict, now)
+    reported, until = recipe(widget, robot, now)
+    return pressed | reported, min(ages, until)
+
+
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: lambda widget, robot, verdict, now: ({}, math.inf),
     Input: lambda widget, robot, verdict, now: ({}, math.inf),
@@ -182,6 +190,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     PublishPress: _published,
     Step: _stepped,
     Switch: _switched,
+    RecipeLoad: _recipe,
     HoldCommand: _held,
     Parameter: _parameter,
     Display: lambda widget, robot, verdict, now: value(widget, robot, now),

@@ -77,6 +77,7 @@ class ViewSources:
     simulated: bool = False
     alarms: Callable[[], AlarmsView] = no_alarms
     inhibited: Callable[[], Mapping[str, Verdict]] = dict
+    recipes: Callable[[], Mapping[str, int]] = dict
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -92,6 +93,7 @@ class ViewSources:
             control_until=self.control.until,
             alarms=self.alarms(),
             inhibited=self.inhibited(),
+            recipes=self.recipes(),
         )
 
 

@@ -78,6 +78,7 @@ SECTIONS: Final = (
         "control", whole, "sections/control.html", lambda control: control["required"], place="header"
     ),
     Section("alarms", _alarms, "sections/alarms.html", lambda _: True),
+    Section("recipes", whole),
 )
 
 

@@ -44,7 +44,8 @@ class Notice(TypedDict):
 
 class View(TypedDict):
     """Everything that can change on a page; `widgets` has the attributes of each widget by its id,
-    `robots` the lamp of each robot if the panel has several."""
+    `robots` the lamp of each robot if the panel has several, `recipes` the revision of each set of
+    recipes."""
 
     link: dict[str, LinkStatus]
     interlocks: dict[str, Enabled]
@@ -54,6 +55,7 @@ class View(TypedDict):
     robots: dict[str, Lamp]
     control: ControlView
     alarms: AlarmsView
+    recipes: dict[str, int]
 
 
 class ViewWithDeadlines(NamedTuple):
@@ -94,6 +96,7 @@ class ViewContext(NamedTuple):
     control_until: float = math.inf
     alarms: AlarmsView = NO_ALARMS
     inhibited: Mapping[str, Verdict] = {}
+    recipes: Mapping[str, int] = {}
 
 
 ALONE: Final = ViewContext()  # one robot, its log is written, and control is not required
@@ -126,6 +129,7 @@ def build_view(
         robots=dict(context.robots),
         control=context.control,
         alarms=context.alarms,
+        recipes=dict(context.recipes),
     )
     untils = {w.id: widgets[w.id][1] for w in panel.displays}
     others = (at for name, (_, at) in widgets.items() if name not in untils)

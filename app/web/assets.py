@@ -26,7 +26,7 @@ LAYERS: Final = (
 SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds of widgets
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
 OWN_PAGES: Final = (
-    "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "diagnostics", "help",
+    "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "diagnostics", "recipes", "help",
 )  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it

@@ -1,6 +1,6 @@
 """A page that is none of the panel's own, such as the operator's log, in the frame of the panel."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from fastapi import Request
@@ -8,6 +8,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from app.i18n import Text
 from app.panel.layout import FRAME_ONLY, Page
+from app.panel.widgets.families import BaseWidget
 from app.web.app_state import AppState
 from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
@@ -20,7 +21,8 @@ class FramedPage(NamedTuple):
     """`robot` is the id of the robot whose frame is around the page, "" for the first. `alarms_page` is
     the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
     for another page. `is_help`: it is the page of help. `vary` names the request header by which the
-    address has another content."""
+    address has another content. `recipes_page` is the path and query of the page of recipes, `entries`
+    is what is entered on it."""
 
     template: str
     title: Text
@@ -29,6 +31,8 @@ class FramedPage(NamedTuple):
     diagnostics_query: str | None = None
     is_help: bool = False
     vary: str = ""
+    recipes_page: str | None = None
+    entries: Sequence[BaseWidget] = ()
 
 
 def framed_page(
@@ -44,12 +48,13 @@ def framed_page(
         request,
         state,
         session,
-        Page.model_construct(None, id=FRAME_ONLY, title=page.title, own=(), groups=()),
+        Page.model_construct(None, id=FRAME_ONLY, title=page.title, own=tuple(page.entries), groups=()),
         who,
         REFRESH_S,
         alarms_page=page.alarms_page,
         diagnostics_query=page.diagnostics_query,
         is_help=page.is_help,
+        recipes_page=page.recipes_page,
     )
     html = state.templates.render(page.template, language_of(request), **frame, **context)
     headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})

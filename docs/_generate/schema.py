@@ -37,6 +37,8 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "node": ("node name", TOPIC.pattern),
     "type": ("message type", MESSAGE_TYPE.pattern),
     "switch.type": ("message or service type", ""),
+    "recipe.type": ("message or service type", ""),
+    "recipe.fields": ("id of an input", ""),
     "call.type": ("service type", SERVICE_TYPE.pattern),
     "action.type": ("action type", ACTION_TYPE.pattern),
     "parameter.type": ("", ""),
@@ -135,7 +137,7 @@ def _refs(node: Any) -> Iterator[str]:
 def _with_source(name: str, table: Schema) -> None:
     """A table that reads a topic may name a source in place of the topic and its type."""
     properties = table["properties"]
-    if name in (SOURCE, *PUBLISHED) or not {"topic", "type"} <= {*properties}:
+    if name in (SOURCE, "recipe", *PUBLISHED) or not {"topic", "type"} <= {*properties}:
         return
     properties[SOURCE] = {"type": "string", "title": "id of a source"}
     needed = [key for key in table.get("required", ()) if key in ("topic", "type", "states")]

@@ -9,7 +9,7 @@ ABOUT: Final = {
     "ZENOH": ("The Zenoh configuration file, in Zenoh's own syntax.", "`zenoh.json5`, the shipped one"),
     "MODE": ("`demo` or `live`. Overrides `mode` of the panel file.", "as the panel file says"),
     "DATA": (
-        "The folder for the operator's log, trends and recordings.",
+        "The folder for the operator's log, alarms, recipes, trends and recordings.",
         "`$XDG_STATE_HOME/operator-panel`, else `~/.local/state/operator-panel`; "
         "in demo mode its subfolder `demo`",
     ),

@@ -1,5 +1,6 @@
 // The page of diagnostics: fetched again while it is seen, and put into the page that is there: texts and
 // attributes, in place. Nothing is asked for while the last answer is still awaited.
+import { updateInPlace } from "./in-place.js";
 import { closest, find } from "./show.js";
 
 const CONTENT_MS = 2000;
@@ -56,62 +57,12 @@ async function fetched(address) {
   return new DOMParser().parseFromString(`<div>${await answer.text()}</div>`, "text/html").body.firstElementChild;
 }
 
-// The children of an element become those of another: rows are found by their data-row, others by their place.
+// What the page has set itself stays: what is typed, the pause, and its messages, which are newer. A look that is
+// paused is in no answer.
 /** @param {Element} old @param {Element} fresh */
 function update(old, fresh) {
-  const rows = new Map([...old.children].map((child) => [keyOf(child), child]));
-  const places = telling(old).filter((node) => !keyOf(node));
-  /** @type {ChildNode | null} */
-  let place = tellingFrom(old.firstChild);
-  const kept = new Set();
-  for (const wanted of telling(fresh)) {
-    const key = keyOf(wanted);
-    const present = key ? rows.get(key) : places.shift();
-    const node = present && present.nodeName === wanted.nodeName ? present : document.importNode(wanted, true);
-    if (node === present) updateNode(node, wanted);
-    if (node !== place) old.insertBefore(node, place);
-    kept.add(node);
-    place = tellingFrom(node.nextSibling);
-  }
-  // A look that is paused is in no answer.
-  for (const node of telling(old)) {
-    if (!kept.has(node) && !(isPaused() && node instanceof Element && node.matches(".look"))) node.remove();
-  }
-}
-
-/** @param {Node} node @param {Node} wanted */
-function updateNode(node, wanted) {
-  if (node instanceof Element && wanted instanceof Element) {
-    updateAttributes(node, wanted);
-    update(node, wanted);
-  } else if (node.nodeValue !== wanted.nodeValue) node.nodeValue = wanted.nodeValue;
-}
-
-// The children without the white space between elements.
-/** @param {Element} parent @returns {ChildNode[]} */
-function telling(parent) {
-  return [...parent.childNodes].filter(isTelling);
-}
-
-/** @param {ChildNode | null} node @returns {ChildNode | null} */
-function tellingFrom(node) {
-  return node && !isTelling(node) ? tellingFrom(node.nextSibling) : node;
-}
-
-/** @param {Node} node */
-function isTelling(node) {
-  return node instanceof Element || Boolean(node.nodeValue?.trim());
-}
-
-/** @param {Node} node */
-function keyOf(node) {
-  return node instanceof Element ? (node.getAttribute("data-row") ?? "") : "";
-}
-
-// What the page has set itself stays: what is typed, the pause, and its messages, which are newer.
-/** @param {Element} old @param {Element} fresh */
-function updateAttributes(old, fresh) {
-  if (old.matches("input, button.pause")) return;
-  for (const { name, value } of fresh.attributes) if (old.getAttribute(name) !== value) old.setAttribute(name, value);
-  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name)) old.removeAttribute(name);
+  updateInPlace(old, fresh, {
+    skips: (element) => element.matches("input, button.pause"),
+    stays: (element) => isPaused() && element.matches(".look"),
+  });
 }

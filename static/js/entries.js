@@ -105,6 +105,7 @@ export function followEntries() {
     changed.add(target);
     if (target instanceof Element && target.matches("[data-entry]")) touched.add(target);
   });
+  if (document.querySelector("[data-recipes]")) return; // these values are those of a recipe
   const keep = () => import("./kept-entries.js").catch(() => {});
   if (hasKept()) keep();
   else addEventListener("input", keep, { once: true });

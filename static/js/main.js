@@ -24,6 +24,7 @@ class Screen {
   #presser;
   #control = { show: noop, lost: noop, beat: noop }; // a page without the bar does not require control
   #alarms = { show: noop, control: noop, lost: noop }; // of a panel without alarms
+  #recipes = { showRecipes: noop }; // of another page
 
   constructor() {
     /** @type {Handlers} */
@@ -35,6 +36,7 @@ class Screen {
         this.#alarms.control(state.role);
       },
       alarms: (alarms) => this.#alarms.show(alarms),
+      recipes: (revisions) => this.#recipes.showRecipes(revisions),
     };
     // The sections of a snapshot, by the server's table. Each is an event by itself when it changes.
     const sections = Object.fromEntries(this.#data.sections.map((name) => [name, shown[name]]));
@@ -75,6 +77,8 @@ class Screen {
     }
     if (document.querySelector(".alarm-line"))
       source.load(import("./alarm-line.js"), ({ AlarmLine }) => (this.#alarms = new AlarmLine(source)));
+    if (document.querySelector("[data-recipes]"))
+      source.load(import("./recipes.js"), (recipes) => (this.#recipes = recipes));
     if (document.querySelector(".group-tab")) source.load(import("./tabs.js"), noop);
     source.load(import("./full-text.js"), noop);
     if (document.querySelector("template:is(#keypad, #keyboard)")) loadTouchEntry(this.#data.keyboard);

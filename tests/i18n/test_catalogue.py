@@ -39,6 +39,9 @@ PREFIXES = (
     "log_outcome_",
     "log_page_control_",
     "log_page_alarm_",
+    "log_page_recipe_",
+    "recipes_",
+    "recipes_act_",
     "log_page_diagnostics_",
     "state_",
 )  # of codes that are put together

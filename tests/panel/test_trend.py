@@ -9,7 +9,8 @@ from app.panel.checks.notes import find_notes
 from app.panel.checks.panel import find_faults
 from app.panel.model import Panel
 from app.panel.widgets.trend import MAX_BYTES, Trend, history_bytes, memory_of, trends_of
-from app.simulator.kinds import Shown, needs_of
+from app.simulator.kinds import needs_of
+from app.simulator.needs import Shown
 from tests.support.builders import INTERFACES, Table, panel_of
 
 PEN: Final[Table] = {"topic": "/speed", "type": "std_msgs/msg/Float64", "label": "Speed"}

@@ -10,6 +10,7 @@ import pytest
 
 from app.panel import Panel, load_panel
 from app.panel.widgets.families import Display
+from app.panel.widgets.parameter import Parameter
 from tests.support.holds import PATIENT
 from tests.support.parts import ROOT, TESTS, Process, Server, free_port, until, zenoh_file
 
@@ -41,7 +42,7 @@ def not_live(panel: Panel, robot: Server) -> list[str]:
     ids = [
         widget.id for widget in panel.widgets() if isinstance(widget, Display) and widget.topic != HEARD
     ]
-    ids += [parameter.id for parameter in panel.parameters()]
+    ids += [widget.id for widget in panel.widgets() if isinstance(widget, Parameter)]
     return [name for name in ids if shown[name]["state"] != "live"]
 
 

@@ -17,7 +17,8 @@ from app.permission.conditions import permits
 from app.robot.parameter_state import EMPTY_VALUE
 from app.simulator.in_process import robots_of
 from app.simulator.interlocks import APART_S
-from app.simulator.kinds import Published, Shown, needs_of
+from app.simulator.kinds import needs_of
+from app.simulator.needs import Published, Shown
 from app.simulator.panel_robot import PanelRobot
 from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S

@@ -15,6 +15,7 @@ from app.commands.press_guard import PressGuard
 from app.commands.press_judge import PendingSamples, PressJudge
 from app.commands.presses import Presses
 from app.commands.receipts import Receipt
+from app.commands.recipe_loads import RecipeLoader
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
 from app.dialect import bridge_dialect
@@ -30,6 +31,7 @@ from app.permission.clients import anonymous
 from app.permission.control_authority import ControlAuthority
 from app.permission.principal import Principal
 from app.robot.state import RobotState, Sample
+from app.runtime.recipes import Recipes
 from app.view.publisher import ViewPublisher
 from app.view.view import build_view
 
@@ -168,6 +170,7 @@ def sending_of(
 ) -> Dispatcher:
     """A dispatcher, with defaults for the parts that a test does not provide."""
     calls = calls or ServiceCalls(INTERFACES, robot, transport, lambda: None)
+    parameters = ParameterSync(panel, INTERFACES, robot, transport, calls, lambda: None)
     return Dispatcher(
         panel,
         INTERFACES,
@@ -177,7 +180,8 @@ def sending_of(
             calls,
             GoalTracker(INTERFACES, robot, transport, lambda: None),
             confirmations or Confirmations(robot, lambda: None),
-            ParameterSync(panel, INTERFACES, robot, transport, calls, lambda: None),
+            parameters,
+            RecipeLoader(INTERFACES, robot, parameters, Recipes(panel), lambda: None),
         ),
         monotonic,
         **more,

@@ -8,13 +8,13 @@ from typing import Any
 from app.panel.widgets.parameter import Parameter
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Node:
     """A node; `task` queries it while its services are available.
 
     `event_values` are values from events during a query. `query_needed` is set when the node has to be
     queried again, `query_now` when that must not wait for the pause between two queries. `answered_at`
-    (monotonic seconds) is the time of its last response.
+    (monotonic seconds) is the time of its last response, `asked_at` that of the request for it.
     """
 
     name: str
@@ -23,6 +23,7 @@ class Node:
     query_now: asyncio.Event = field(default_factory=asyncio.Event)
     event_values: dict[str, Any] = field(default_factory=dict)
     answered_at: float = -math.inf
+    asked_at: float = -math.inf
     task: "asyncio.Task[None] | None" = None
 
     def request_query(self) -> None:

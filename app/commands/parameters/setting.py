@@ -2,12 +2,13 @@
 Pure."""
 
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
 from app.clock import format_time
 from app.commands.service_calls import MAX_VALUE_CHARS, Request, with_reply
-from app.i18n import say
+from app.i18n import joined, say
 from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.widgets.parameter import SET, Parameter, Value
 from app.printable import printable, without_terminal_codes
@@ -36,3 +37,35 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
     text = printable(plain_text(reason, MAX_VALUE_CHARS, without_terminal_codes)) if reason else ""
     return Outcome("rejected", with_reply(say("call_rejected", time=now), text))
+
+
+def set_all_request(
+    interfaces: Interfaces, widget: str, values: Sequence[tuple[Parameter, Value]], timeout_s: float
+) -> Request:
+    """The request that sets several parameters of one node."""
+    service, type_name = SET
+    each = [{"name": p.parameter, "value": encode_value(p, value)} for p, value in values]
+    payload = interfaces.encode(interfaces.service_types(type_name)[0], {"parameters": each})
+    parameters = [parameter for parameter, _ in values]
+    paths = [f"results[{i}].{key}" for i in range(len(each) + 1) for key in ("successful", "reason")]
+    name, read = f"{parameters[0].node}/{service}", partial(_answers, parameters)
+    return Request(widget, name, type_name, payload, timeout_s, tuple(paths), read)
+
+
+def _answers(parameters: Sequence[Parameter], response: Fields) -> Outcome:
+    """The outcome in a response for several parameters: rejected if the node has not taken one."""
+    now, count = format_time(time.time()), len(parameters)
+    taken = [response.get(f"results[{i}].successful") for i in range(count + 1)]
+    if None in taken[:count] or taken[count] is not None:
+        return Outcome("unknown", say("call_response_unreadable", wanted=SET[1]))
+    if all(taken[:count]):
+        return Outcome("succeeded", say("with_stop", said=say("call_succeeded", time=now)))
+    refused = []
+    for i, parameter in enumerate(parameters):
+        if not taken[i]:
+            reason = response.get(f"results[{i}].reason")
+            why = (
+                printable(plain_text(reason, MAX_VALUE_CHARS, without_terminal_codes)) if reason else ""
+            )
+            refused.append(say("recipe_field_refused", label=parameter.label, why=why or "?"))
+    return Outcome("rejected", say("recipe_fields_refused", fields=joined(refused, "between_names")))

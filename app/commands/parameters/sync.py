@@ -9,7 +9,7 @@ a peer or node that was lost in the meantime are ignored.
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final, Literal
@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 from app.commands.parameters.client import NoResponse, ParameterClient
 from app.commands.parameters.known import KnownParameters
 from app.commands.parameters.node import Node, within
-from app.commands.parameters.setting import set_request
+from app.commands.parameters.setting import set_all_request, set_request
 from app.commands.parameters.values import check_value
 from app.commands.press import PressHandle
 from app.commands.service_calls import ServiceCalls
@@ -191,6 +191,7 @@ class ParameterSync:
 
     async def _query(self, node: Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
+        asked_at = time.monotonic()
         try:
             reading = self._services.read(node.name, names, partial(self._silent, node))
             descriptors, values = await reading
@@ -201,7 +202,7 @@ class ParameterSync:
             self._known.mark_unreadable(node.widgets, time.time())
             self._changed()
             return "partly"
-        node.answered_at = time.monotonic()
+        node.answered_at, node.asked_at = time.monotonic(), asked_at
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.event_values  # newer than the query
         for widget in node.widgets:
@@ -244,6 +245,38 @@ class ParameterSync:
         answer = await self._calls.send_request(request, replace(handle, correct=correct))
         node.request_query()
         return answer
+
+    async def set_all(
+        self,
+        widget: str,
+        values: Sequence[tuple[Parameter, Value]],
+        timeout_s: float,
+        handle: PressHandle,
+    ) -> Outcome:
+        """Sets parameters of one node by one service call, for the widget with this id, then queries
+        the node, whatever the outcome."""
+        request = set_all_request(self._interfaces, widget, values, timeout_s)
+        nodes = {self._nodes[parameter.node] for parameter, _ in values}
+
+        def correct(answer: Outcome) -> None:
+            self._query_now(nodes)
+            handle.correct(answer)
+
+        answer = await self._calls.send_request(request, replace(handle, correct=correct))
+        self._query_now(nodes)
+        return answer
+
+    def query(self, names: Iterable[str]) -> None:
+        """Queries the nodes with these names now."""
+        self._query_now(self._nodes[name] for name in names)
+
+    def _query_now(self, nodes: Iterable[Node]) -> None:
+        for node in nodes:
+            node.request_query()
+
+    def are_read_since(self, names: Iterable[str], since: float) -> bool:
+        """Whether the nodes have answered a query that was made after `since` (monotonic seconds)."""
+        return all(self._nodes[name].asked_at >= since for name in names)
 
     def _silent(self, node: Node) -> None:
         self._known.mark_silent(node.name, node.widgets)

@@ -11,6 +11,7 @@ from app.panel.checks.languages import language_faults
 from app.panel.checks.look import brand_faults, grow_faults, help_faults, label_faults
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
+from app.panel.checks.recipes import recipe_faults
 from app.panel.checks.robots import duplicate_ids, robot_faults
 from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
@@ -32,8 +33,8 @@ from app.panel.widgets.families import (
 )
 from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
+from app.panel.widgets.parts import parts_of
 from app.panel.widgets.publish import Confirm, PublishPress
-from app.panel.widgets.switch import parts_of
 from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
 
 
@@ -60,7 +61,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
         *alarm_faults(panel, interfaces, with_faults),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
-    missed |= {"input", "control"} if missed - {"interlock", "condition", "alarm"} else set()
+    missed |= {"input", "control"} if missed - {"interlock", "condition", "alarm", "recipe"} else set()
     faults = [fault for fault in faults if fault.cause.partition(" ")[0] not in missed]
     yield from faults
     yield from _topic_conflicts(panel, [fault.place for fault in faults])
@@ -116,6 +117,7 @@ def _widgets_with_places(panel: Panel) -> Iterator[tuple[str, BaseWidget]]:
     yield from ((f"frame.widget[{w}]", widget) for w, widget in enumerate(panel.frame.widgets))
     if panel.state:
         yield "state", panel.state.display
+    yield from ((f"recipe[{r}]", load) for r, load in enumerate(panel.recipe_loads))
 
 
 def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
@@ -172,6 +174,7 @@ def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]
     yield from _frame_faults(panel, checking, faulty)
     if panel.state:
         yield from panel.state.display.faults("state", checking)
+    yield from recipe_faults(panel.recipes, panel.recipe_loads, checking)
 
 
 def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str]) -> Iterator[Fault]:
@@ -228,6 +231,11 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
             already = f'"{widget.id}" is already the id of {places[widget.id]}'
             yield Fault(f"frame.widget[{w}].id", already)
         places.setdefault(widget.id, f"frame.widget[{w}]")
+    for r, recipes in enumerate(panel.recipes):
+        if recipes.id in places:
+            message = f'"{recipes.id}" is already the id of {places[recipes.id]}'
+            yield Fault(f"recipe[{r}].id", message)
+        places.setdefault(recipes.id, f"recipe[{r}]")
 
 
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:

@@ -118,6 +118,13 @@ class Numeric(SteppedWidget, Input):
         sent = converted.apply(value)
         return round(sent) if whole else float(sent)
 
+    def entered_value(self, sent: float) -> float:
+        """The value whose `sent_value` this is: what the robot has, in the operator's unit."""
+        if not self.is_converted:
+            return sent
+        scale, offset = self._conversion
+        return float((Fraction(repr(sent)) - Fraction(offset)) / Fraction(scale)) if scale else sent
+
     @property
     def html_attributes(self) -> dict[str, str]:
         """Limits and step as HTML attributes."""

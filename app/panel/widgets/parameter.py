@@ -14,7 +14,7 @@ from app.i18n.values import numbers, with_unit
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import PARAMETER_EVENTS
 from app.interfaces.validation import format_value
-from app.panel.base import SaidLabel, Seconds, Span, catalogue_default, is_absolute_name
+from app.panel.base import SaidLabel, Seconds, Span, TopicQos, catalogue_default, is_absolute_name
 from app.panel.number_range import Range, decimal_text, step_fault
 from app.panel.values import join_list, number_text, quote_element, same_value
 from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand
@@ -27,6 +27,8 @@ Value = Scalar | tuple[Scalar, ...]
 
 EVENTS: Final = PARAMETER_EVENTS
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
+# rmw_qos_profile_parameter_events, with a durability: the subscription waits for no publisher.
+EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 # The node's parameter services that are used, with their types.
 GET: Final = ("get_parameters", "rcl_interfaces/srv/GetParameters")

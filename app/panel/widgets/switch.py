@@ -21,11 +21,11 @@ from app.panel.widgets.families import (
     CheckContext,
     Command,
     EntryWidget,
-    PressCommand,
     TopicField,
     TopicSource,
 )
 from app.panel.widgets.inputs import BOOL_TEXTS
+from app.panel.widgets.parts import PartedCommand
 from app.panel.widgets.publish import Confirm, Publish, PublishPress, confirm_faults
 from app.panel.widgets.sent_message import SentMessage
 from app.panel.widgets.service_action import Call
@@ -40,7 +40,7 @@ class SwitchReport(TopicField):
     """The field by which the robot reports whether it is on."""
 
 
-class Switch(EntryWidget, PressCommand):
+class Switch(EntryWidget, PartedCommand):
     """Shows whether something is on, as the robot reports it, and switches it: by a message to `topic`,
     or by a call of `service`. A press waits for the report, at most `confirm_s`.
 
@@ -208,11 +208,6 @@ class Switch(EntryWidget, PressCommand):
             else:
                 at = names.get(key, key) + dot + rest
             yield Fault(f"{place}.{at}", fault.message, cause=fault.cause)
-
-
-def parts_of(command: Command) -> tuple[Command, ...]:
-    """The commands by which a command sends: itself, or those of a switch."""
-    return command.parts if isinstance(command, Switch) else (command,)
 
 
 def confirms_of(command: Command) -> Iterator[Confirm]:

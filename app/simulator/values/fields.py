@@ -13,7 +13,7 @@ from app.panel.condition import Condition
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.model import Panel
 from app.simulator.interlocks import offset_of, permitting
-from app.simulator.kinds import Shown
+from app.simulator.needs import Shown
 from app.simulator.values.guesses import UNITS, Span, guessed, moving, span_of
 from app.simulator.values.known_types import KNOWN, Moment
 from app.simulator.values.messages import Message, field_constants

@@ -16,7 +16,8 @@ from app.printable import printable
 
 OUTCOMES: Final = (
     "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
-    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "began", "resumed", "removed",
+    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "recipe", "began", "resumed",
+    "removed",
 )  # fmt: skip
 NAMES: Final = ("browser", "browser_local", "browser_more", "browser_unknown", "others", "unknown")
 

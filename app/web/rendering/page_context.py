@@ -60,6 +60,7 @@ class PageContext(TypedDict):
     is_alarms: bool
     is_diagnostics: bool
     is_help: bool
+    is_recipes: bool
     inside: Markup | None
     base: str
     robot: str
@@ -96,10 +97,12 @@ def page_context(
     alarms_page: str | None = None,
     diagnostics_query: str | None = None,
     is_help: bool = False,
+    recipes_page: str | None = None,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
     `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
-    query of the page of diagnostics, for that page; `is_help`: it is the page of help.
+    query of the page of diagnostics, for that page; `is_help`: it is the page of help;
+    `recipes_page` as `alarms_page`, for recipes.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = _faded(session.presses.receipt(request.query_params.get("receipt", "")))
@@ -114,12 +117,16 @@ def page_context(
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
-    is_log = page.id == FRAME_ONLY and not (is_alarms or is_diagnostics or is_help)
+    is_recipes = recipes_page is not None
+    is_other = is_alarms or is_diagnostics or is_help or is_recipes
+    is_log = page.id == FRAME_ONLY and not is_other
     back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
     if is_diagnostics:
         back = f"{state.root}/diagnostics?{diagnostics_query}"
     if is_help:
         back = f"{state.root}/help"
+    if is_recipes:
+        back = f"{session.base}/{recipes_page}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -140,6 +147,7 @@ def page_context(
         is_alarms=is_alarms,
         is_diagnostics=is_diagnostics,
         is_help=is_help,
+        is_recipes=is_recipes,
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

@@ -43,6 +43,7 @@ WORDS: Final = (
     "cleaning_end",
     "diagnostics_title",
     "help",
+    "recipes_title",
 )
 TREND_WORDS: Final = (
     "trend_earlier",

@@ -49,7 +49,8 @@ AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
 FORM_FIELDS_MOST: Final = 600
 OWN_PAGE: Final = re.compile(
-    r"(/robots/[a-z0-9_]+)?/(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics|help)(\?[!-~]*)?"
+    r"(/robots/[a-z0-9_]+)?/"
+    r"(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics|help|recipes/[a-z0-9_]+)(\?[!-~]*)?"
 )
 OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
 TOO_OFTEN: Final = say("control_too_often")

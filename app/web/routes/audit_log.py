@@ -14,6 +14,7 @@ from app.audit import Entry, Filter, OperatorLog, Row
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.commands.recipe_acts import RECIPE_ACTS
 from app.errors import NotFound
 from app.i18n import Text, TextLike, number, say
 from app.panel.widgets.families import Command, EntryWidget
@@ -44,8 +45,10 @@ CONTROL_ACTIONS: Final = (
     *(f"control_{act}" for act in CONTROL_ACTS),
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
+RECIPE_ACTIONS: Final = tuple(f"recipe_{act}" for act in RECIPE_ACTS)
 ALARM_ACTIONS: Final = tuple(f"alarm_{act}" for act in ALARM_ACTS)
 DIAGNOSTIC_ACTIONS: Final = tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS)
+ACTIONS: Final = (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS, *RECIPE_ACTIONS)
 
 
 class Wanted(BaseModel):
@@ -126,7 +129,9 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         entered={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         robots={str(robot.name): robot.name for robot in panel.robots},
-        acts={a: word(a) for a in (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS)},
+        acts={
+            a: word(a) for a in (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS, *RECIPE_ACTIONS)
+        },
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
         count=word("head", count=number(f"{head.count:,d}")) if head else "",

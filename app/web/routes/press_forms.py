@@ -15,6 +15,7 @@ from app.errors import InputError
 from app.i18n import say
 from app.panel.layout import Page
 from app.panel.widgets.families import PressCommand
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
@@ -157,5 +158,19 @@ def _moment(fields: dict[str, str], name: str) -> float | None:
 def page_after(session: RobotSession, widget: str, receipt_id: str, shown_on: str = "") -> str:
     """The path of a widget's page, with a receipt if there is one; `shown_on` is the page's id where
     it was pressed, "" if unknown."""
-    page = f"{session.base}/pages/{_page_of(session, widget, shown_on).id}"
-    return f"{page}?receipt={quote(receipt_id)}" if receipt_id else page
+    loads = {load.id: load for load in session.panel.recipe_loads}
+    if widget in loads:
+        page = f"{session.base}/recipes/{widget}"
+        recipe = recipe_of(session, loads[widget], receipt_id)
+        page += f"?recipe={quote(recipe)}" if recipe else ""
+    else:
+        page = f"{session.base}/pages/{_page_of(session, widget, shown_on).id}"
+    receipt = f"{'&' if '?' in page else '?'}receipt={quote(receipt_id)}" if receipt_id else ""
+    return page + receipt
+
+
+def recipe_of(session: RobotSession, load: RecipeLoad, receipt_id: str) -> str:
+    """The id of the recipe of a press; "" if it is not known."""
+    receipt = session.presses.receipt(receipt_id)
+    value = receipt.inputs.get(load.id, "") if receipt else ""
+    return str(value).rpartition("@")[0]

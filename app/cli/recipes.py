@@ -1,0 +1,136 @@
+"""`operator-panel recipes list|export|import`: the recipes in the data folder, without a browser.
+
+Exit status: 0 done, 1 a row or a recipe is refused, 2 the panel file, the set or the data folder can't
+be used.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from app.audit.data_dir import DataDir
+from app.cli.arguments import add_settings, environment
+from app.cli.output import OutputError, add_force, check_absent, draft_of
+from app.cli.parser import Parser
+from app.errors import KioskError
+from app.i18n import render
+from app.panel import load_panel
+from app.recipes.book import Author, RecipeBook
+from app.recipes.csv_text import MOST_BYTES, csv_text, read_rows
+from app.recipes.folder import FOLDER, RecipeDiskError, RecipeFolder
+from app.settings import Settings
+
+PROG: Final = "python -m app.cli recipes"
+BY: Final = "operator-panel recipes"
+
+
+class NoSuchSet(KioskError):
+    """The panel has no such set."""
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    options = make_parser(prog).parse_args(arguments)
+    try:
+        data, books = _books(options)
+        status: int = options.run(options, data, books)
+    except OutputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except (KioskError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return status
+
+
+def _books(options: Any) -> tuple[Path, dict[str, RecipeBook]]:
+    """The data folder, and the recipes of each set."""
+    settings = Settings.from_environment({**os.environ, **environment(options)})
+    panel = load_panel(settings.panel)
+    data = settings.data_folder(settings.mode or panel.mode)
+    books = {}
+    for load in panel.recipe_loads:
+        books[load.id] = RecipeBook(load, RecipeFolder(data / FOLDER / load.id))
+        books[load.id].fill(books[load.id].folder.read())
+    return data, books
+
+
+def _book(options: Any, books: dict[str, RecipeBook]) -> RecipeBook:
+    if options.set not in books:
+        there = ", ".join(books) or "no [[recipe]]"
+        raise NoSuchSet(f'this panel has no set of recipes "{options.set}"; there is {there}')
+    return books[options.set]
+
+
+def _list(_: Any, data: Path, books: dict[str, RecipeBook]) -> int:
+    for name, book in books.items():
+        print(f"{name}: {len(book.recipes)} in {data / FOLDER / name}")
+        for recipe in book.recipes:
+            print(f"  {recipe.id}  {recipe.name}  version {recipe.now.number}, {_at(recipe.now.at)}")
+        for broken in book.broken:
+            print(f"  {broken.id}  can't be read: {render(broken.reason)}")
+    return 1 if any(book.broken for book in books.values()) else 0
+
+
+def _export(options: Any, _: Path, books: dict[str, RecipeBook]) -> int:
+    book = _book(options, books)
+    text = csv_text(book.load.fields, book.recipes, {r.id: _at(r.now.at) for r in book.recipes})
+    if options.output is None:
+        print(text.removeprefix("\ufeff"), end="")
+        return 0
+    check_absent(options.output, options.force)
+    with draft_of(options.output, options.force) as draft:
+        draft.write_text(text, encoding="utf-8", newline="")
+    print(f"{options.output}: {len(book.recipes)} recipes")
+    return 0
+
+
+def _import(options: Any, data: Path, books: dict[str, RecipeBook]) -> int:
+    book, folder = _book(options, books), DataDir(data)
+    content = options.file.read_bytes()[: MOST_BYTES + 1]
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise KioskError(f"{options.file} is not UTF-8") from None
+    if len(content) > MOST_BYTES:
+        raise KioskError(f"{options.file} has more than {MOST_BYTES} bytes")
+    folder.claim()  # a server that runs keeps its recipes in memory
+    try:
+        book.fill(book.folder.read())
+        change = book.take_rows(Author(BY, time.time()), read_rows(text, book.load.fields))
+        for row in change.bad:
+            print(f"{options.file}:{row.line}: {render(row.reason)}", file=sys.stderr)
+        for recipe in change.puts:
+            book.folder.write(recipe)
+    except RecipeDiskError as error:
+        print(render(error.reason), file=sys.stderr)
+        return 2
+    finally:
+        folder.release()
+    counts = f"{change.created} new, {change.changed} changed, {change.same} the same"
+    print(f"{counts}, {len(change.bad)} refused")
+    return 1 if change.bad else 0
+
+
+def _at(wall: float) -> str:
+    return datetime.fromtimestamp(wall, UTC).isoformat("T", "seconds")
+
+
+def make_parser(prog: str) -> Parser:
+    parser = Parser(prog=prog, description="The recipes that a panel keeps.")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    listed = commands.add_parser("list", help="list the recipes of each set")
+    exported = commands.add_parser("export", help="write a set as CSV")
+    imported = commands.add_parser("import", help="take recipes from a CSV file")
+    for command in (exported, imported):
+        command.add_argument("set", metavar="SET", help="the id of a [[recipe]]")
+    imported.add_argument("file", type=Path, metavar="FILE", help="a CSV file, as export writes it")
+    exported.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: print it")
+    add_force(exported)
+    for command, run in ((listed, _list), (exported, _export), (imported, _import)):
+        add_settings(command)
+        command.set_defaults(run=run)
+    return parser

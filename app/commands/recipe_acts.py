@@ -1,0 +1,159 @@
+"""Acts on recipes: the rows of create, copy, save, rename, restore, delete and import.
+
+`ActRequest.object` is "<set>/<recipe>", of acts on the whole set "<set>/". `values` has the `version`
+that the screen showed, and what the act needs. Who may do them is their permission: control, as for
+other acts. Loading a recipe is a press.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from app.commands.acts import Act, ActRequest, Applied, Finish, server_and_control_permit
+from app.errors import InputError
+from app.i18n import Text, TextLike, joined, number, say
+from app.recipes.book import Author, Change, ImportChange, RecipeBook
+from app.recipes.csv_text import read_rows
+from app.recipes.field_text import differences_text
+
+MOST_BAD: Final = 5  # rows that a sentence names
+
+
+class RecipeBooks(Protocol):
+    """The recipes of all sets."""
+
+    def book(self, set_id: str) -> RecipeBook | None: ...
+
+    def wall(self) -> float:
+        """Seconds since the epoch."""
+
+    def write(self, book: RecipeBook, author: Author, change: Change) -> Finish:
+        """Begins to write a change; the function returned waits for its end."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecipeChange(Applied):
+    """What an act changed: the set's label, the recipe's name, and the old and new values as text."""
+
+    set: TextLike = ""
+    name: TextLike = ""
+    changes: TextLike = ""
+
+
+Plan = Callable[[RecipeBook, Author, str, Mapping[str, Any]], Change | Text]
+
+
+def _changes(plan: Plan) -> Callable[[RecipeBooks, ActRequest], RecipeChange]:
+    """`Act.apply` from what plans a change of one set."""
+
+    def apply(books: RecipeBooks, request: ActRequest) -> RecipeChange:
+        set_id, _, recipe_id = request.object.partition("/")
+        book = books.book(set_id)
+        if book is None:
+            return RecipeChange(say("recipe_gone"))
+        author = Author(str(request.who), books.wall())
+        change = plan(book, author, recipe_id, request.values)
+        if isinstance(change, Text):
+            return RecipeChange(change)
+        note = _import_text(change) if isinstance(change, ImportChange) else None
+        if note and isinstance(change, ImportChange) and change.bad and not change.puts:
+            return RecipeChange(note)
+        return RecipeChange(
+            finish=books.write(book, author, change) if change.ids else None,
+            note=note or "",
+            set=book.load.label,
+            name=change.name,
+            changes=note or _changed_text(book, change),
+        )
+
+    return apply
+
+
+def _changed_text(book: RecipeBook, change: Change) -> TextLike:
+    renamed = [d for d in change.differences if d.field == "name"]
+    if renamed:
+        return say("recipe_change", label=say("recipe_name"), old=renamed[0].old, new=renamed[0].new)
+    return differences_text(book.load.fields, change.differences) or say("recipe_no_change")
+
+
+def _import_text(change: ImportChange) -> Text:
+    created, changed, same = (number(str(n)) for n in (change.created, change.changed, change.same))
+    said = say("recipe_imported", created=created, changed=changed, same=same)
+    if not change.bad:
+        return said
+    rows = [say("recipe_bad_row", line=row.line, why=row.reason) for row in change.bad[:MOST_BAD]]
+    if len(change.bad) > MOST_BAD:
+        rows.append(say("recipe_more_bad_rows", number=len(change.bad) - MOST_BAD))
+    refused = say("recipe_rows_refused", number=len(change.bad), rows=joined(rows, "between_sentences"))
+    return say("between_sentences", first=said, last=refused)
+
+
+def _version(values: Mapping[str, Any], name: str = "version") -> int:
+    version = values.get(name)
+    if not isinstance(version, int) or isinstance(version, bool):
+        raise InputError(f"{name} must be the number of a version, as the screen showed it")
+    return version
+
+
+def _name(values: Mapping[str, Any]) -> str:
+    name = values.get("name")
+    if not isinstance(name, str):
+        raise InputError("name must be the name of a recipe")
+    return name
+
+
+def _values(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    fields = values.get("values")
+    if not isinstance(fields, Mapping):
+        raise InputError("values must have the value of each field")
+    return fields
+
+
+def _import(book: RecipeBook, author: Author, _: str, values: Mapping[str, Any]) -> Change | Text:
+    text = values.get("csv")
+    if not isinstance(text, str):
+        raise InputError("csv must be the text of a file")
+    return book.take_rows(author, read_rows(text, book.load.fields))
+
+
+def _entry(code: str) -> Callable[[RecipeChange], Text]:
+    return lambda change: say(code, set=change.set, name=change.name, changes=change.changes)
+
+
+def _row(plan: Plan, code: str) -> Act[RecipeBooks, RecipeChange]:
+    return Act(server_and_control_permit, _changes(plan), _entry(code))
+
+
+RECIPE_ACTS: Final[Mapping[str, Act[RecipeBooks, RecipeChange]]] = {
+    "create": _row(
+        lambda book, author, _, values: book.create(author, _name(values), _values(values)),
+        "log_done_recipe_create",
+    ),
+    "copy": _row(
+        lambda book, author, recipe, values: book.copy(author, recipe, _version(values), _name(values)),
+        "log_done_recipe_create",
+    ),
+    "save": _row(
+        lambda book, author, recipe, values: book.save(
+            author, recipe, _version(values), _values(values)
+        ),
+        "log_done_recipe_save",
+    ),
+    "rename": _row(
+        lambda book, author, recipe, values: book.rename(
+            author, recipe, _version(values), _name(values)
+        ),
+        "log_done_recipe_rename",
+    ),
+    "restore": _row(
+        lambda book, author, recipe, values: book.restore(
+            author, recipe, _version(values), _version(values, "to")
+        ),
+        "log_done_recipe_restore",
+    ),
+    "delete": _row(
+        lambda book, author, recipe, values: book.delete(author, recipe, _version(values)),
+        "log_done_recipe_delete",
+    ),
+    "import": _row(_import, "log_done_recipe_import"),
+}

@@ -1,0 +1,65 @@
+"""The table `[[recipe]]` of a panel file: inputs whose values are kept together under a name."""
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from app.panel.base import (
+    Description,
+    Id,
+    Interlocks,
+    Label,
+    Seconds,
+    TopicName,
+    TopicQos,
+    Type,
+    non_empty,
+)
+from app.panel.field_paths import FieldPath, MessageField
+from app.panel.widgets.parameter import NodeName
+
+MAX_FIELDS: Final = 60
+
+ParameterKind = Literal["bool", "integer", "double", "string"]
+Name = Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
+Names = Annotated[dict[Id, Name], Field(max_length=MAX_FIELDS)]
+Paths = Annotated[dict[Id, FieldPath], Field(max_length=MAX_FIELDS)]
+Kinds = Annotated[dict[Id, ParameterKind], Field(max_length=MAX_FIELDS)]
+
+
+class RecipeReadback(Description):
+    """By what the robot reports the values that it has: a topic, or parameters of a node."""
+
+    topic: TopicName | None = None
+    node: NodeName | None = None
+    type: Type | None = None
+    qos: TopicQos = TopicQos()
+    max_age_s: Seconds | None = None
+    fields: Paths = Field(default_factory=dict)
+    parameters: Names = Field(default_factory=dict)
+    parameter_types: Kinds = Field(default_factory=dict)
+
+
+class RecipeSet(Description):
+    """A set of recipes: all have values of the same inputs. A recipe is loaded by a message to `topic`,
+    a call of `service`, or parameters of `node`."""
+
+    id: Id
+    label: Label
+    fields: Annotated[
+        tuple[Id, ...], Field(strict=False, max_length=MAX_FIELDS), AfterValidator(non_empty)
+    ]
+    interlocks: Interlocks = Field(default=(), alias="interlock")
+    topic: TopicName | None = None
+    service: TopicName | None = None
+    node: NodeName | None = None
+    type: str = ""
+    qos: TopicQos = TopicQos()
+    message: dict[str, Any] | None = None
+    request: dict[str, Any] | None = None
+    success: MessageField | None = None
+    parameters: Names = Field(default_factory=dict)
+    parameter_types: Kinds = Field(default_factory=dict)
+    timeout_s: Seconds = 5.0
+    confirm_s: Seconds = 3.0
+    readback: RecipeReadback | None = None

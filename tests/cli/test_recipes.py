@@ -1,0 +1,64 @@
+"""`operator-panel recipes`: the recipes in a data folder, listed, exported and imported."""
+
+from pathlib import Path
+
+import pytest
+
+from app.audit.data_dir import DataDir
+from app.cli.recipes import main
+from app.recipes.folder import FOLDER, RecipeFolder
+from app.recipes.recipe import new_recipe
+from tests.recipes.panels import CARTON, PANEL
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> list[str]:
+    """The panel file and the data folder, which has one recipe and a broken file."""
+    (tmp_path / "cell.toml").write_text(PANEL)
+    data = tmp_path / "data"
+    folder = RecipeFolder(data / FOLDER / "boxes")
+    folder.write(new_recipe("carton", "created", 1_700_000_000.0, "Ann", "Carton", CARTON))
+    (folder.path / "broken.toml").write_text("?")
+    return [str(tmp_path / "cell.toml"), "--data", str(data)]
+
+
+def test_recipes_are_listed_with_what_can_not_be_read(
+    options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", *options]) == 1
+    said = capsys.readouterr().out
+    assert "carton  Carton  version 1, 2023-11-14T22:13:20+00:00" in said
+    assert "broken  can't be read" in said
+
+
+def test_what_is_exported_is_imported(
+    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "boxes.csv"
+    assert main(["export", "boxes", *options, "-o", str(file)]) == 0
+    assert main(["export", "boxes", *options, "-o", str(file)]) == 1  # it exists
+    text = file.read_text(encoding="utf-8-sig")
+    assert main(["export", "boxes", *options]) == 0
+    assert "Carton,400,80,vacuum,false," in capsys.readouterr().out
+    bad = text.splitlines()[1].replace("Carton,400", "Tray,1")
+    file.write_text(text.replace("Carton,400", "Carton,450") + bad)
+    assert main(["import", "boxes", str(file), *options]) == 1
+    said = capsys.readouterr()
+    assert "0 new, 1 changed, 0 the same, 1 refused" in said.out
+    assert f"{file}:3: Length is 1" in said.err
+    assert main(["list", *options]) == 1
+    assert "version 2" in capsys.readouterr().out
+
+
+def test_a_set_that_is_not_there_and_a_folder_in_use(
+    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "trays", *options]) == 2
+    assert 'no set of recipes "trays"; there is boxes' in capsys.readouterr().err
+    file = tmp_path / "boxes.csv"
+    file.write_text("name\n")
+    server = DataDir(tmp_path / "data")
+    server.claim()
+    assert main(["import", "boxes", str(file), *options]) == 2
+    server.release()
+    assert "in use" in capsys.readouterr().err

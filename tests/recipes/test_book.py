@@ -1,0 +1,226 @@
+"""Changes of recipes: checked against what their author saw, and counted when they are on the disk."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.i18n import Text, render
+from app.recipes.book import Author, Change, RecipeBook
+from app.recipes.csv_text import csv_text, read_rows
+from app.recipes.folder import RecipeFolder
+from app.recipes.recipe import MAX_RECIPES, MAX_VERSIONS, Recipe, id_for
+from tests.recipes.panels import CARTON, TRAY, load_of
+
+ANN, BOB = Author("Ann", 1_700_000_000.0), Author("Bob", 1_700_000_060.0)
+
+
+@pytest.fixture
+def book(tmp_path: Path) -> RecipeBook:
+    return RecipeBook(load_of(tmp_path), RecipeFolder(tmp_path / "boxes"))
+
+
+def write(book: RecipeBook, change: Change | Text, author: Author = ANN) -> Change:
+    """Puts a change on the disk."""
+    assert isinstance(change, Change), render(change)
+    writing = book.begin(author, change)
+    writing.run()
+    book.end(writing)
+    return change
+
+
+def refused(change: Change | Text) -> str:
+    assert isinstance(change, Text), change
+    return change.code
+
+
+def made(book: RecipeBook, name: str = "Carton 400 × 300", values: Any = CARTON) -> Recipe:
+    return write(book, book.create(ANN, name, values)).puts[0]
+
+
+def again(book: RecipeBook) -> RecipeBook:
+    """The same recipes, read from the disk."""
+    other = RecipeBook(book.load, book.folder)
+    other.fill(book.folder.read())
+    return other
+
+
+def test_a_recipe_is_read_back_as_it_was_written(book: RecipeBook) -> None:
+    carton = made(book, 'Karton "400" \\ 箱')
+    write(book, book.save(BOB, carton.id, 1, TRAY))
+    for known in (book, again(book)):
+        recipe = known.recipes[0]
+        assert (recipe.name, recipe.values, recipe.now.number) == ('Karton "400" \\ 箱', TRAY, 2)
+        assert [(v.by, v.act) for v in recipe.versions] == [("Ann", "created"), ("Bob", "saved")]
+        assert recipe.now.at == BOB.at
+
+
+def test_the_second_of_two_who_edit_one_recipe_is_told_who_was_first(book: RecipeBook) -> None:
+    carton = made(book)
+    write(book, book.save(BOB, carton.id, 1, TRAY), BOB)
+    change = book.save(ANN, carton.id, 1, {**CARTON, "length": 500})
+    assert refused(change) == "recipe_changed_since"
+    assert isinstance(change, Text)
+    assert "was changed by Bob at" in render(change)
+    for act in (book.delete(ANN, carton.id, 1), book.rename(ANN, carton.id, 1, "Other")):
+        assert refused(act) == "recipe_changed_since"
+    assert book.recipes[0].values == TRAY
+
+
+def test_a_change_counts_when_it_is_on_the_disk(book: RecipeBook) -> None:
+    carton = made(book)
+    change = book.save(ANN, carton.id, 1, TRAY)
+    assert isinstance(change, Change)
+    writing = book.begin(ANN, change)
+    assert book.recipes[0].values == CARTON
+    assert refused(book.save(BOB, carton.id, 1, TRAY)) == "recipe_being_written"
+    writing.run()
+    book.end(writing)
+    assert book.recipes[0].values == TRAY
+
+
+def test_a_disk_that_refuses_changes_nothing(book: RecipeBook) -> None:
+    book.folder.path.write_text("a file where the folder should be")
+    change = book.create(ANN, "Carton", CARTON)
+    assert isinstance(change, Change)
+    writing = book.begin(ANN, change)
+    with pytest.raises(Exception, match="Not saved"):
+        writing.run()
+    book.end(writing)
+    assert book.recipes == []
+    book.folder.path.unlink()
+    assert made(book, "Carton").id == "carton"
+
+
+@pytest.mark.parametrize(
+    ("values", "code"),
+    [
+        ({**CARTON, "length": 700}, "input_outside_limits"),
+        ({**CARTON, "length": "400"}, "input_not_a_number"),
+        ({**CARTON, "gripper": "hook"}, "input_not_an_option"),
+        ({**CARTON, "note": "x" * 11}, "input_text_too_long"),
+        ({k: v for k, v in CARTON.items() if k != "fast"}, "recipe_field_missing"),
+    ],
+)
+def test_values_are_checked_by_their_inputs(
+    book: RecipeBook, values: dict[str, Any], code: str
+) -> None:
+    assert refused(book.create(ANN, "Carton", values)) == code
+    carton = made(book)
+    assert refused(book.save(ANN, carton.id, 1, values)) == code
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("", "recipe_name_empty"),
+        ("  ", "recipe_name_empty"),
+        ("x" * 61, "recipe_name_too_long"),
+        ("a\x00b", "recipe_name_unprintable"),
+        ("carton 400  × 300", "recipe_name_taken"),
+    ],
+)
+def test_names_that_can_not_be_given(book: RecipeBook, name: str, code: str) -> None:
+    made(book)
+    assert refused(book.create(ANN, name, CARTON)) == code
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("Carton 400 × 300", "carton_400_x_300"),
+        ("../../etc/passwd", "etc_passwd"),
+        ("/", "recipe"),
+        ("箱", "recipe"),
+        ("Höhe", "hohe"),
+        ("..", "recipe"),
+    ],
+)
+def test_no_path_is_made_of_a_name(name: str, made: str) -> None:
+    assert id_for(name, ()) == made
+    assert id_for(name, [made]) == f"{made}_2"
+
+
+def test_history_is_bounded_and_a_version_of_it_is_restored(book: RecipeBook) -> None:
+    carton = made(book)
+    for n in range(1, MAX_VERSIONS + 5):
+        write(book, book.save(ANN, carton.id, n, {**CARTON, "length": 300 + n}))
+    recipe = again(book).recipes[0]
+    assert len(recipe.versions) == MAX_VERSIONS
+    assert refused(book.restore(ANN, carton.id, recipe.now.number, 1)) == "recipe_version_gone"
+    change = write(book, book.restore(ANN, carton.id, recipe.now.number, recipe.now.number - 3))
+    assert [(d.field, d.new) for d in change.differences] == [("length", 300 + MAX_VERSIONS + 1)]
+    assert book.recipes[0].now.act == "restored"
+
+
+def test_a_set_has_a_limit(book: RecipeBook) -> None:
+    for n in range(MAX_RECIPES):
+        made(book, f"Recipe {n}")
+    assert refused(book.create(ANN, "One more", CARTON)) == "recipe_too_many"
+
+
+def test_a_deleted_recipe_leaves_its_file_in_the_folder_of_deleted_ones(book: RecipeBook) -> None:
+    carton = made(book)
+    write(book, book.delete(ANN, carton.id, 1))
+    assert book.recipes == again(book).recipes == []
+    assert [file.name.split(".")[0] for file in (book.folder.path / "deleted").iterdir()] == [carton.id]
+
+
+def test_a_csv_changes_recipes_by_their_names_and_refuses_bad_rows(book: RecipeBook) -> None:
+    made(book)
+    made(book, "Tray", TRAY)
+    text = csv_text(book.load.fields, book.recipes, {})
+    head, carton, tray = text.removeprefix("\ufeff").splitlines()
+    assert head.startswith("name,length,speed,gripper,fast,note,version")
+    bad = carton.replace("Carton 400 × 300", "Too long").replace(",400,", ",4000,")
+    new = tray.replace("Tray", "=New")
+    text = "\n".join([head, carton.replace(",400,", ",450,"), tray, bad, new, "Short,1"])
+    change = book.take_rows(BOB, read_rows(text, book.load.fields))
+    write(book, change, BOB)
+    assert (change.changed, change.same, change.created) == (1, 1, 1)
+    assert [row.line for row in change.bad] == [4, 6]
+    assert "must be 300 to 600 mm" in render(change.bad[0].reason)
+    known = {recipe.name: recipe for recipe in again(book).recipes}
+    assert {name: r.values["length"] for name, r in known.items()} == {
+        "Carton 400 × 300": 450,
+        "Tray": 600,
+        "=New": 600,
+    }
+    assert known["Carton 400 × 300"].now.by == "Bob"
+
+
+def test_what_is_exported_is_imported_as_it_was(book: RecipeBook) -> None:
+    made(book, "'+quoted", {**CARTON, "note": '-5,"x"'})
+    made(book, "@formula", {**TRAY, "speed": 33.25})
+    text = csv_text(book.load.fields, book.recipes, {})
+    change = book.take_rows(ANN, read_rows(text, book.load.fields))
+    assert [render(row.reason) for row in change.bad] == []
+    assert (change.same, change.changed, change.created) == (2, 0, 0)
+
+
+def test_a_spreadsheet_may_separate_by_semicolons(book: RecipeBook) -> None:
+    made(book)
+    text = csv_text(book.load.fields, book.recipes, {}).replace(",", ";").replace("400;80", "450;80")
+    change = book.take_rows(ANN, read_rows(text, book.load.fields))
+    assert (change.bad, change.changed) == ((), 1)
+    comma = text.replace("450;80", '450;"80,5"')
+    refusal = book.take_rows(ANN, read_rows(comma, book.load.fields)).bad[0]
+    assert "Speed" in render(refusal.reason)
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", "recipe_csv_column_missing"),
+        ("name,length\n", "recipe_csv_column_missing"),
+        ("name,length,speed,gripper,fast,note,colour\n", "recipe_csv_column_unknown"),
+        ("name,name,length,speed,gripper,fast,note\n", "recipe_csv_column_twice"),
+        ('name,length,speed,gripper,fast,note\n"a,1', "recipe_csv_unreadable"),
+    ],
+)
+def test_a_file_that_is_no_such_csv_is_refused_as_a_whole(
+    book: RecipeBook, text: str, code: str
+) -> None:
+    change = book.take_rows(ANN, read_rows(text, book.load.fields))
+    assert change.puts == ()
+    assert [row.reason.code for row in change.bad if isinstance(row.reason, Text)] == [code]
