@@ -21,9 +21,10 @@ PANELS: Final = {
     "shipped": SHIPPED,
     "plan": ROOT / "docs/examples/plan/panel.toml",
     "lab-gripper": ROOT / "docs/examples/lab-gripper/panel.toml",
+    "mobile-robot": ROOT / "docs/examples/mobile-robot/panel.toml",
     "welding-cell": ROOT / "docs/examples/welding-cell/panel.toml",
 }
-PICTURED: Final = ("lab-gripper", "welding-cell")  # of the guide to panel files
+PICTURED: Final = ("lab-gripper", "mobile-robot", "welding-cell")  # of the guide to panel files
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
 ALL: Final = ROOT / "build/screenshots"
 IMAGES: Final = ROOT / "docs/images"
@@ -99,7 +100,7 @@ def take_for_guide(browser: Browser, url: str, name: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.goto(url)
     page.wait_for_timeout(1000 * SETTLED_S)
-    page.screenshot(path=IMAGES / f"{name}.png")
+    picture(page, f"{name}.png")
     page.close()
 
 
