@@ -35,15 +35,20 @@ class PressGuard:
         expires_s: float,
         instance_ids: Callable[[], Collection[str]],
         inhibited: Callable[[], Mapping[str, Verdict]] = dict,
+        shared: Collection[str] = (),
+        publisher_by_id: Callable[[str], ViewPublisher | None] = lambda _: None,
     ) -> None:
-        """`instance_ids`: those of the views of all robots. A press with another robot's is refused.
-        `inhibited` returns the locks by alarms, by the widgets' ids."""
+        """`instance_ids`: those of the views of all robots. A press with another robot's is refused,
+        unless its widget is on the pages of all (`shared`). `inhibited` returns the locks by alarms, by
+        the widgets' ids."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
         self._expires_s = expires_s
         self._instance_ids = instance_ids
         self._inhibited = inhibited
+        self._shared = shared
+        self._publisher_by_id = publisher_by_id
         self._ended = False
 
     def close(self) -> None:
@@ -54,7 +59,7 @@ class PressGuard:
         """Accepts a press or hold that has arrived: its client is present. InputError for an invalid
         `seen`."""
         if press.seen:
-            self._check(press.seen)
+            self._check(press.seen, self._publisher_of(press))
         self._control.touch(press.principal)
 
     def conditions(self, who: Principal) -> ServerConditions:
@@ -66,10 +71,11 @@ class PressGuard:
         """Why the view that the operator saw is stale, "" if it is not. It is not if the press has
         neither `seen` nor `at`."""
         instance_id, _, version = press.seen.partition("-")
-        if instance_id and instance_id != self._publisher.instance_id:
+        publisher = self._publisher_of(press)
+        if instance_id and instance_id != publisher.instance_id:
             is_other = instance_id in self._instance_ids()
             return say("press_seen_on_another_robot" if is_other else "press_seen_before_restart")
-        if instance_id and int(version) < self._publisher.lock_changed_at(press.widget.id):
+        if instance_id and int(version) < publisher.lock_changed_at(press.widget.id):
             return say("press_state_changed")
         return "" if press.at is None else self.late(press.at)
 
@@ -94,10 +100,16 @@ class PressGuard:
             return say("press_expired", seconds=number(f"{age:.1f}"))
         return say("press_clock_ahead") if age < -MAX_AHEAD_S else ""
 
-    def _check(self, seen: str) -> None:
+    def _publisher_of(self, press: Press[Command]) -> ViewPublisher:
+        """The publisher of the page that the operator saw, which may be another robot's."""
+        if press.widget.id in self._shared:
+            return self._publisher_by_id(press.seen.partition("-")[0]) or self._publisher
+        return self._publisher
+
+    def _check(self, seen: str, publisher: ViewPublisher) -> None:
         instance_id, _, version = seen.partition("-")
         if not _is_event_id(seen):
             raise InputError(f'seen: "{seen:.60}" is not the id of an event')
-        if instance_id == self._publisher.instance_id and int(version) > self._publisher.version:
-            newest = self._publisher.id
+        if instance_id == publisher.instance_id and int(version) > publisher.version:
+            newest = publisher.id
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")

@@ -15,6 +15,7 @@ from app.diagnose.screen import DRM, check_screens
 from app.errors import PanelError
 from app.i18n import ENGLISH
 from app.panel import Panel, load_panel
+from app.panel.robot_panels import panel_of
 from app.settings import Settings
 from app.survey.model import GraphSnapshot
 
@@ -71,7 +72,7 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
         await check_connection(report, "", settings.zenoh, ())
     else:
         for entry in panel.robots or (None,):
-            robot = PanelRobot(panel, entry)
+            robot = PanelRobot(panel_of(panel, entry.id if entry else None), entry)
             graph = await check_robot(report, robot, settings.zenoh, options.listen_s)
             if graph is not None:
                 diagnosis.graphs[robot.id] = graph

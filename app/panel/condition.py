@@ -130,6 +130,8 @@ class Condition(Description):
 
 
 class NamedCondition(Condition):
-    """A condition that widgets name by its id: it locks nothing."""
+    """A condition that widgets name by its id: it locks nothing. `robot` is the one that publishes it,
+    by default that of the widget that names it."""
 
     id: Id
+    robot: Id | None = None

@@ -40,6 +40,7 @@ class Group(Description):
 
     title: Label | None = None
     note: Label | None = None
+    robot: Id | None = None
     columns: Annotated[int, Field(ge=1, le=COLUMNS)] | None = None
     span: Span = COLUMNS
     widgets: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
@@ -108,12 +109,14 @@ def _places(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]
 
 
 class Page(Description):
-    """A page of the panel; with `fit` it never scrolls. With a `template` (Jinja) that one places the
-    widgets; `styles` is appended to the panel's stylesheet."""
+    """A page of the panel; with `fit` it never scrolls. An `overview` has a tile for each robot. With a
+    `template` (Jinja) that one places the widgets; `styles` is appended to the panel's stylesheet."""
 
     id: Id
     title: Label
     icon: Icon | None = None
+    robot: Id | None = None
+    overview: bool = False
     fit: bool = False
     template: File | None = None
     styles: File | None = None
@@ -132,6 +135,13 @@ class Page(Description):
             return self.groups
         # Its widgets are checked already: checking them again would take 15 ms of the first request.
         return (Group.model_construct(widget=self.own), *self.groups)
+
+    def robots(self) -> Iterator[tuple[str, BaseWidget, str | None]]:
+        """(place, widget, robot) of every widget: the robot is its own, its group's or the page's."""
+        of_group = {f"group[{g}]": group.robot for g, group in enumerate(self.groups)}
+        for place, widget in self.placed():
+            around = of_group.get(place.partition(".")[0]) or self.robot
+            yield place, widget, widget.robot or around
 
     def placed(self) -> Placed:
         """(place in the page's table, widget) of every widget: ("group[0].widget[2]", …)."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pydantic import ValidationError
 
@@ -22,7 +22,14 @@ from app.panel.source import NAME
 from app.panel.widgets.families import BaseWidget
 
 if TYPE_CHECKING:
+    from app.panel.same_widgets import WithCopies
     from app.panel.source_tables import Expanded
+
+NOT_WRITTEN: Final = (
+    "revision",
+    "copies",
+    "of_others",
+)  # fields of a panel that are no keys of its file
 
 
 def load_panel(path: Path) -> Panel:
@@ -62,21 +69,27 @@ def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
 
 
 def _load(file: TomlFile) -> Panel:
-    written = {key: value for key, value in file.tables.items() if key != "revision"}
+    written = {key: value for key, value in file.tables.items() if key not in NOT_WRITTEN}
     if faults := _source_faults(written, file):
         raise PanelError(str(file.path), _sorted_faults(faults, file))
     with_sources = _with_sources(written) if NAME in written else None
     if with_sources and with_sources.faults:
         raise PanelError(str(file.path), _sorted_faults(with_sources.faults, file))
     tables = with_sources.tables if with_sources else written
-    faults = [] if written == file.tables else [Fault("revision", "unknown key")]
+    copies = _with_copies(tables)
+    if copies and copies.faults:
+        raise PanelError(str(file.path), _sorted_faults(copies.faults, file))
+    tables = copies.tables if copies else tables
+    faults = [Fault(key, "unknown key") for key in NOT_WRITTEN if key in file.tables]
+    own = {"revision": file.revision, "copies": frozenset(copies.origins if copies else ())}
     try:
-        panel = Panel.model_validate(tables | {"revision": file.revision}, context=_context(file))
+        panel = Panel.model_validate(tables | own, context=_context(file))
     except ValidationError as error:
-        faults += _shape_faults(error, tables, _context(file))
+        faults += _shape_faults(error, tables | own, _context(file))
     else:
         faults += _type_faults(panel)
     if faults:
+        faults = list(copies.own_faults(faults)) if copies else faults
         moved = {with_sources.at_origin(f): None for f in faults} if with_sources else faults
         raise PanelError(str(file.path), _sorted_faults(moved, file))
     return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
@@ -105,6 +118,13 @@ def _with_sources(tables: dict[str, Any]) -> "Expanded":
     from app.panel.source_tables import expanded
 
     return expanded(tables)
+
+
+def _with_copies(tables: dict[str, Any]) -> "WithCopies | None":
+    """None where no widget is on several pages."""
+    from app.panel.same_widgets import names_same, with_copies
+
+    return with_copies(tables) if names_same(tables) else None
 
 
 def _context(file: TomlFile) -> FileContext:

@@ -1,40 +1,18 @@
-"""The descriptions of a panel and its pages. docs/reference/panel-file.md describes each key."""
+"""A panel: its keys, and what follows from them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import TypeVar
 
-from pydantic import AfterValidator, Field
-
-from app.dialect.dialect import DEFAULT_DIALECT, DOMAIN_MOST, DialectName
 from app.errors import NotFound
-from app.i18n import ENGLISH
 from app.i18n.catalogue import files
-from app.panel.alarm import Alarm, AlarmRules
-from app.panel.base import (
-    Description,
-    Endpoint,
-    Folder,
-    Id,
-    Label,
-    PictureFolder,
-    SaidLabel,
-    TopicQos,
-    catalogue_default,
-    parse_namespace,
-)
+from app.panel.base import TopicQos
 from app.panel.condition import Condition, NamedCondition
-from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
-from app.panel.language_choice import Language, Languages
-from app.panel.layout import FRAME_ONLY, Frame, Hand, Page, Screens, TextSize, Theme
-from app.panel.machine_state import StateRules
-from app.panel.recipe import RecipeSet
-from app.panel.rules import BrandRules, ControlRules, DiagnosticRules, EmbedRules, LogRules, RecordRules
-from app.panel.screen import Keyboard, ScreenRules
-from app.panel.source import Source
-from app.panel.stories import StoryName
+from app.panel.layout import FRAME_ONLY, Page
+from app.panel.panel_keys import PanelKeys
+from app.panel.robot_entry import RobotEntry as RobotEntry
 from app.panel.texts import panel_texts
 from app.panel.uniform_buttons import UniformButtons, uniform_buttons
 from app.panel.widgets.families import (
@@ -55,66 +33,10 @@ from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
 from app.pictures import picture_files
 
-Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST)]
-
-
-class RobotEntry(Description):
-    """One of several robots; `connect` are its endpoints, by default the Zenoh configuration's."""
-
-    id: Id
-    name: Label
-    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
-    connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
-    dialect: DialectName = DEFAULT_DIALECT
-    domain: Domain = 0
-
-
 Kind = TypeVar("Kind", bound=BaseWidget)
 
 
-class Panel(Description):
-    title: Label
-    mode: Literal["demo", "live"] = "live"
-    language: Language = ENGLISH
-    languages: Languages = ()
-    distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
-    interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
-    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
-    dialect: DialectName = DEFAULT_DIALECT
-    domain: Domain = 0
-    stop_hint: SaidLabel = catalogue_default("stop_hint")
-    press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
-    display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
-    mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
-    theme: Theme = "light"
-    text_size: TextSize = "normal"
-    hand: Hand = "right"
-    screens: Screens = ()
-    pictures: PictureFolder | None = None
-    keyboard: Keyboard = "auto"
-    screen: ScreenRules = ScreenRules()
-    brand: BrandRules | None = None
-    frame: Frame = Frame.model_validate({})
-    state: StateRules | None = None
-    control: ControlRules = ControlRules(required=False)
-    embed: EmbedRules = EmbedRules()
-    record: RecordRules | None = None
-    robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
-    log: LogRules = LogRules()
-    diagnostics: DiagnosticRules = DiagnosticRules()
-    demo_story: StoryName | None = None
-    demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
-    alarm_rules: AlarmRules = Field(AlarmRules(), alias="alarms")
-    alarms: Annotated[tuple[Alarm, ...], Field(strict=False)] = Field((), alias="alarm")
-    sources: Annotated[tuple[Source, ...], Field(strict=False)] = Field((), alias="source")
-    interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
-    own_conditions: Annotated[tuple[NamedCondition, ...], Field(strict=False)] = Field(
-        (), alias="condition"
-    )
-    recipes: Annotated[tuple[RecipeSet, ...], Field(strict=False)] = Field((), alias="recipe")
-    pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
-    revision: Annotated[str, Field(exclude=True)] = ""  # of the file: other pages are out of date
-
+class Panel(PanelKeys):
     @cached_property
     def readers_languages(self) -> tuple[str, ...]:
         """The languages that a reader can choose: the file's; else those with a catalogue or texts."""
@@ -145,10 +67,16 @@ class Panel(Description):
         return (*self.frame.widgets, *([self.state.display] if self.state else []))
 
     def widgets(self) -> Iterator[BaseWidget]:
-        for page in self.pages:
-            yield from page.widgets
+        """Each once."""
+        for p, page in enumerate(self.pages):
+            if not self.copies:
+                yield from page.widgets
+                continue
+            placed = ((f"page[{p}].{place}", widget) for place, widget in page.placed())
+            yield from (widget for place, widget in placed if place not in self.copies)
         yield from self.frame_widgets
         yield from self.recipe_loads
+        yield from (robot.figure for robot in self.robots if robot.figure)
 
     @cached_property
     def recipe_loads(self) -> tuple[RecipeLoad, ...]:
@@ -170,7 +98,13 @@ class Panel(Description):
     def widgets_by_page(self) -> dict[str, frozenset[str]]:
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
         frame = {widget.id for widget in self.frame_widgets}
-        pages = {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
+        tiles = {robot.tile_id for robot in self.robots}
+        pages = {
+            page.id: frozenset(
+                frame | {w.id for w in page.widgets} | (tiles if page.overview else set())
+            )
+            for page in self.pages
+        }
         return pages | {FRAME_ONLY: frozenset(frame) | {load.id for load in self.recipe_loads}}
 
     @property
@@ -213,6 +147,11 @@ class Panel(Description):
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
     @property
+    def every_interlock(self) -> tuple[Interlock, ...]:
+        """Those of other robots too, in the panel of one robot."""
+        return (*self.interlocks, *(c for c in self.of_others if isinstance(c, Interlock)))
+
+    @property
     def named_conditions(self) -> tuple[NamedCondition, ...]:
         """Those with an id, interlocks first."""
         return (*self.interlocks, *self.own_conditions)
@@ -224,7 +163,7 @@ class Panel(Description):
 
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """The interlocks that must permit a press, in the widget's order."""
-        known = {interlock.id: interlock for interlock in self.interlocks}
+        known = {interlock.id: interlock for interlock in self.every_interlock}
         return tuple(known[name] for name in widget.interlocks)
 
     def subscriptions(self) -> dict[str, str]:

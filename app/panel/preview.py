@@ -23,7 +23,7 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
         comments = {w.id: w.comment for w in page.widgets if isinstance(w, Input)}
         comments[NOW] = "the time of sending"
         for place, widget in page.placed():
-            if isinstance(widget, Command):
+            if isinstance(widget, Command) and f"page[{p}].{place}" not in panel.copies:
                 lines = _preview_lines(widget, interfaces, comments)
                 yield Remark(f"page[{p}].{place}", "\n".join(lines))
     for w, widget in enumerate(panel.frame.widgets):

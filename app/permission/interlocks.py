@@ -93,7 +93,12 @@ def interlock_verdict(
 ) -> Verdict:
     """Whether an interlock permits: its topic has the type and QoS, a publisher where that is required,
     and a value that is fresh and meets its comparisons. `link` is the link's verdict at `now` if it is
-    known already."""
+    known already. An interlock of another robot is judged by that robot's link and values."""
+    publishing = robot.named(interlock.robot)
+    if publishing is None:
+        return locked("link_connecting")
+    if publishing is not robot:
+        return _of_another(publishing, interlock_verdict(interlock, publishing, now))
     link = link or link_verdict(robot, now)
     if not link.permitted:
         return link
@@ -105,6 +110,13 @@ def interlock_verdict(
     if verdict.code in BY_VALUE and not has_key(interlock.field):
         return _with_publishers(verdict, interlock, robot)
     return verdict
+
+
+def _of_another(robot: RobotState, verdict: Verdict) -> Verdict:
+    """The verdict with the name of the robot whose link locks."""
+    if verdict.code not in LINK_CODES or verdict.reason is None:
+        return verdict
+    return replace(verdict, reason=say("ready_robot", name=robot.title, state=verdict.reason))
 
 
 def state_of(condition: NamedCondition, robot: RobotState, now: float, link: Verdict) -> ConditionState:

@@ -76,6 +76,8 @@ class RobotState:
         self.dialect, self.traits = dialect, traits
         self.title: TextLike = entry.name if entry else ""
         self.name = str(self.title)  # for the server's log
+        self.id = entry.id if entry else None
+        self.fleet: Mapping[str, RobotState] = {}  # all robots of the panel, by their ids
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up, self.endpoints = False, endpoints
         self.settled_at = math.inf  # monotonic seconds: then a new peer has set up its routes
@@ -92,8 +94,9 @@ class RobotState:
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
         self.nodes_are_read = False  # True: its nodes are queried, so what a server is will be known
-        self.conditions = {condition.id: condition for condition in panel.named_conditions}
         self.selects = selects_by_command(panel)
+        conditions = (*panel.named_conditions, *panel.of_others)
+        self.conditions = {condition.id: condition for condition in conditions}
         self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
         self.silent_publishers = SilentPublishers(self._condition_keys, traits)
         self.topic_publishers = TopicPublishers()
@@ -146,6 +149,10 @@ class RobotState:
                 timed=[panel.state.field] if panel.state and panel.state.topic == topic else (),
             )
             yield key, made
+
+    def named(self, robot_id: str | None) -> "RobotState | None":
+        """The robot with this id, this one for None; None while the server has not begun it yet."""
+        return self if robot_id in (None, self.id) else self.fleet.get(str(robot_id))
 
     def key(self, topic: str) -> str:
         """The key of a topic or service of this robot, see `key_of`."""

@@ -5,24 +5,32 @@ shows the link status of the other robots.
 """
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.alarms.rows import AlarmRow
 from app.audit.press_record import Log
 from app.commands.diagnostic_acts import Doctor, NoDoctor
+from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
+from app.panel.robot_panels import widget_robots
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.runtime.alarms import Alarms
 from app.runtime.recipes import Recipes
 from app.runtime.robot_access import ROBOT_ACCESS
+from app.runtime.robot_interlocks import connect_robots
 from app.runtime.robot_session import RobotSession
 from app.runtime.wiring import ServerParts, wire_session
 from app.transport.zenoh_config import Config
+from app.view.kinds import Attributes
 from app.view.link_status import Lamp
+from app.view.overview import most_urgent, tile
+from app.view.publisher import ViewPublisher
+from app.view.shared_widgets import NO_SHARED, SharedWidgets
 
 if TYPE_CHECKING:
     from app.recording import Recordings
@@ -47,6 +55,10 @@ class Fleet:
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
+        self._widget_robots = widget_robots(panel)
+        self._has_overview = any(page.overview for page in panel.pages)
+        self._alarm_rows: Mapping[str, AlarmRow] = {}
+        self._most_urgent: Mapping[str, AlarmRow] = {}
         self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
         self.alarms = Alarms(panel)
@@ -69,6 +81,9 @@ class Fleet:
             self._sessions[entry.id if entry else None] = wire_session(
                 server, config_of(entry), access, entry=entry, others=self
             )
+        connect_robots(self._sessions)
+        for session in self.sessions if self._widget_robots or self._has_overview else ():
+            session.refresher.show_shared()
 
     async def start(self) -> None:
         """Starts all sessions. Does not wait for the robots."""
@@ -121,6 +136,21 @@ class Fleet:
         """The session of the robot with this id; the first for another id, and for a robot without."""
         return self._sessions.get(robot_id, self.first)
 
+    def session_for(self, session: RobotSession, widget: str) -> RobotSession:
+        """The session of a widget on a page of `session`: that of the widget's own robot if it has
+        one."""
+        return self._sessions[robot] if (robot := self._widget_robots.get(widget)) else session
+
+    def sharing(self, session: RobotSession) -> list[RobotSession]:
+        """The sessions of other robots with widgets on the pages of `session`."""
+        names = dict.fromkeys(self._widget_robots.values())
+        return [other for name in names if (other := self._sessions[name]) is not session]
+
+    def receipt(self, session: RobotSession, press_id: str) -> Receipt | None:
+        """The receipt of a press on a page of `session`; None for unknown ids."""
+        receipts = (each.presses.receipt(press_id) for each in (session, *self.sharing(session)))
+        return next((receipt for receipt in receipts if receipt), None)
+
     # The protocol `refresh.OtherRobots`, for each robot's session.
 
     def link_statuses(self) -> Mapping[str, Lamp]:
@@ -128,6 +158,47 @@ class Fleet:
 
     def instance_ids(self) -> Collection[str]:
         return {session.publisher.instance_id for session in self.sessions}
+
+    def publisher(self, instance_id: str) -> ViewPublisher | None:
+        publishers = (session.publisher for session in self.sessions)
+        return next((each for each in publishers if each.instance_id == instance_id), None)
+
+    def shared_with(self, robot: RobotState) -> SharedWidgets:
+        others = [name for name in dict.fromkeys(self._widget_robots.values()) if name != robot.id]
+        sessions = {name: self._sessions[name] for name in others if name in self._sessions}
+        widgets = dict(self._tiles()) if self._has_overview else {}
+        if not (sessions or widgets):
+            return NO_SHARED
+        without: dict[str, Mapping[str, Attributes]] = {}
+        for name, session in sessions.items():
+            own = session.refresher.own
+            ids = [widget for widget, robot_id in self._widget_robots.items() if robot_id == name]
+            widgets |= {widget: own.view["widgets"][widget] for widget in ids}
+            locks = own.without_control
+            without[name] = {widget: locks[widget] for widget in ids if widget in locks}
+        controls = {name: each.refresher.own.view["control"] for name, each in sessions.items()}
+        return SharedWidgets(widgets, without, controls)
+
+    def share(self, robot: RobotState) -> None:
+        if not (self._has_overview or robot.id in self._widget_robots.values()):
+            return
+        for session in self.sessions:
+            if session.robot is not robot:
+                session.refresher.show_shared()
+
+    def _tiles(self) -> Iterator[tuple[str, Attributes]]:
+        """(id, attributes) of the tile of each robot."""
+        for entry in self.panel.robots:
+            session = self._sessions.get(entry.id)
+            if session is None:  # not wired yet
+                continue
+            view = session.refresher.own.view
+            if view["alarms"]["rows"] is not self._alarm_rows:
+                self._alarm_rows = view["alarms"]["rows"]
+                self._most_urgent = most_urgent(self._alarm_rows)
+            figure = str(entry.figure.id) if entry.figure else ""
+            alarm = self._most_urgent.get(entry.id)
+            yield entry.tile_id, tile(view, session.refresher.lamp, figure, alarm)
 
     def show_but(self, robot: RobotState) -> None:
         for session in self.sessions:

@@ -62,7 +62,10 @@ class RobotCommands:
             ),
             flushed=peer.flushed,
         )
-        arrivals = PendingSamples(context.signals.judging.emit, lambda: link.has_immediate)
+        arrivals = PendingSamples(
+            context.signals.judging.emit,
+            lambda: any(each.has_immediate for each in (link, *context.awaited)),
+        )
         judge = PressJudge(panel, robot, press_guard, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(

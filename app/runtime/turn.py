@@ -41,7 +41,7 @@ class Turn:
     ) -> None:
         self._link = context.link
         self._robot = context.robot
-        self._link_lost = context.signals.link_lost
+        self._link_lost, self._ran = context.signals.link_lost, context.signals.ran
         self._peer = peer
         self._control = control
         self._ingest = ingest
@@ -130,6 +130,7 @@ class Turn:
                 self._apply(updates)
         finally:
             self._running = running
+            self._ran.emit()
             if self._again and not running:
                 self._again = False
                 self._loop.call_soon(self.changed)

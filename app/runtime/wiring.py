@@ -19,6 +19,7 @@ from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
+from app.panel.robot_panels import panel_of, widget_robots
 from app.panel.widgets.trend import trends_of
 from app.permission.control_authority import ControlAuthority
 from app.robot.log_lines import LogListener
@@ -80,7 +81,10 @@ def wire_session(
     """A session that has not been started. `access` is how the robot is reached. If the panel has
     several robots, `entry` is this one and `others` gives access to all of them."""
     panel, operators_log = server.panel, server.operators_log
-    context = _context(server, config, access, entry)
+    robots = widget_robots(panel)
+    pages = panel.widgets_by_page
+    panel = panel_of(panel, entry.id if entry else None)
+    context = _context(server, panel, config, access, entry)
     robot, link, signals = context.robot, context.link, context.signals
     control = ControlAuthority(
         panel.control,
@@ -88,9 +92,9 @@ def wire_session(
         log_line=RobotLog(log, robot.name).info,
         on_hand_over=signals.handed_over.emit,
     )
-    alarms = server.alarms or Alarms(panel)
+    alarms = server.alarms or Alarms(server.panel)
     robot_alarms = alarms.add_robot(entry.id if entry else "", robot)
-    recipes = server.recipes or Recipes(panel)
+    recipes = server.recipes or Recipes(server.panel)
     recipes.add_listener(signals.changed.emit)
     sources = ViewSources(
         control,
@@ -101,6 +105,7 @@ def wire_session(
         alarms.view,
         robot_alarms.inhibited,
         recipes.revisions,
+        pages,
     )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
@@ -111,6 +116,8 @@ def wire_session(
         panel.press_expires_s,
         others.instance_ids,
         robot_alarms.inhibited,
+        robots,
+        others.publisher,
     )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
     act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)
@@ -162,10 +169,10 @@ def wire_session(
 
 
 def _context(
-    server: ServerParts, config: Config, access: RobotAccess, entry: RobotEntry | None
+    server: ServerParts, panel: Panel, config: Config, access: RobotAccess, entry: RobotEntry | None
 ) -> RobotContext:
-    """The state of the robot and the link to it."""
-    panel, signals = server.panel, RobotSignals()
+    """The state of the robot and the link to it. `panel` is the robot's."""
+    signals = RobotSignals()
     interfaces = load_interfaces(panel.distro, panel.interfaces)
     hashes = distribution_hashes(panel.distro, interfaces)
     dialect = access.dialect((entry or panel).domain, hashes)

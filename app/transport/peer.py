@@ -1,7 +1,7 @@
 """The protocol of the peer that a robot is reached by: a bridge, or the robot's own nodes."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.dialect.dialect import Dialect, DialectName, TypeHash
@@ -79,6 +79,8 @@ class RobotContext:
     link: ZenohSession
     signals: RobotSignals
     config: Config
+    # Of robots with interlocks that widgets of this one name: their data counts for a press too.
+    awaited: list[ZenohSession] = field(default_factory=list)
 
     def another_session(self) -> ZenohSession:
         """A further session with the robot. Its data waits until it is drained."""

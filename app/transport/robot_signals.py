@@ -31,6 +31,8 @@ class RobotSignals:
         self.arrived = Signal[[bool]]()
         # A permission is about to be checked: it needs everything that has arrived.
         self.judging = Signal[[]]()
+        # A turn has run: a permission may have changed.
+        self.ran = Signal[[]]()
         # Something that permission or the view depends on has changed, but no data has arrived.
         self.changed = Signal[[]]()
         # The nodes of the robot's graph were read: what they are may be known now.

@@ -27,8 +27,11 @@ class Row(NamedTuple):
 def condition_row(condition: NamedCondition, robot: RobotState, now: float) -> Row:
     """An interlock or another condition. Only a value that was received makes it "unmet": without
     one, it is not known whether it is met."""
-    link = link_verdict(robot, now)
-    state = state_of(condition, robot, now, link)
+    publishing = robot.named(condition.robot)
+    if publishing is None:
+        return Row(condition.name, "unknown", say("condition_unknown"), "", math.inf)
+    link = link_verdict(publishing, now)
+    state = state_of(condition, publishing, now, link)
     verdict = state.verdict
     met: Met = "met" if verdict.permitted else "unmet" if verdict.code in BY_VALUE else "unknown"
     is_plain = not condition.comparisons or met == "unknown" or state.value == ""

@@ -24,6 +24,7 @@ from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
 from app.view.rendered_rows import RenderedRows
 from app.view.sections import CHANGES, PERMISSION_EVENT, Events, difference
+from app.view.shared_widgets import NO_SHARED, SharedWidgets
 from app.view.view import View, for_audience
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
@@ -71,7 +72,9 @@ class ViewPublisher:
         self._changed = asyncio.Event()
         self._latest_events: Events = {}  # from the view before to this one
         self._without_control = without_control
-        self._views: dict[tuple[bool, Role], View] = {}  # by the audience without its language
+        self.shared = NO_SHARED
+        # By the audience without its language.
+        self._views: dict[tuple[bool, Role, frozenset[str]], View] = {}
         self._snapshots: dict[tuple[Audience, str], bytes] = {}  # by the audience and the page
         self._prepared: dict[Variant, bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
@@ -84,11 +87,21 @@ class ViewPublisher:
         """`<instance_id>-<version>`, the id of the events that lead here."""
         return f"{self.instance_id}-{self.version}"
 
-    def post(self, view: View, without_control: Mapping[str, Attributes] = NOTHING) -> None:
-        """Publishes a view with a new version; does nothing if it is the same as the newest."""
+    def post(
+        self,
+        view: View,
+        without_control: Mapping[str, Attributes] = NOTHING,
+        shared: SharedWidgets = NO_SHARED,
+    ) -> None:
+        """Publishes a view with a new version; does nothing if it is the same as the newest. `shared`
+        are the widgets of other robots."""
+        if shared.widgets:
+            view = {**view, "widgets": {**view["widgets"], **shared.widgets}}
         events = difference(self.view, view)
-        if not events and without_control == self._without_control:
+        locks = without_control, shared.without_control, shared.controls
+        if not events and locks == (self._without_control, *self.shared[1:]):
             return
+        self.shared = shared
         self.version += 1
         for widget, changed in events.get("update", {}).items():
             if "enabled" in changed:
@@ -124,9 +137,11 @@ class ViewPublisher:
         """The newest view for an audience."""
         if not audience.role:
             return self.view
-        key = audience.has_control, audience.role
+        key = audience.has_control, audience.role, audience.without
         if key not in self._views:
-            self._views[key] = for_audience(self.view, self._without_control, audience)
+            self._views[key] = for_audience(
+                self.view, self._without_control, audience, self.shared.without_control
+            )
         return self._views[key]
 
     def snapshot(self, audience: Audience = EVERYONE, page: str = "") -> bytes:

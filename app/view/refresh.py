@@ -22,6 +22,7 @@ from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.view.link_status import Lamp, LinkTimes
 from app.view.publisher import ViewPublisher
+from app.view.shared_widgets import NO_SHARED, SharedWidgets
 from app.view.view import ViewContext, ViewWithDeadlines, build_view, lock_all, update_displays
 
 log = logging.getLogger("kiosk.view")
@@ -41,6 +42,15 @@ class OtherRobots(Protocol):
     def show_but(self, robot: RobotState) -> None:
         """Refreshes the views of the other robots: the lamp of `robot` has changed."""
 
+    def shared_with(self, robot: RobotState) -> SharedWidgets:
+        """The widgets of other robots that are on pages of `robot`."""
+
+    def share(self, robot: RobotState) -> None:
+        """Shows the widgets of `robot` on the pages of the others."""
+
+    def publisher(self, instance_id: str) -> ViewPublisher | None:
+        """The publisher with this `instance_id`, of any robot."""
+
 
 class NoOtherRobots:
     """A robot without others."""
@@ -52,6 +62,13 @@ class NoOtherRobots:
         return ()
 
     def show_but(self, robot: RobotState) -> None: ...
+
+    def shared_with(self, robot: RobotState) -> SharedWidgets:
+        return NO_SHARED
+
+    def share(self, robot: RobotState) -> None: ...
+
+    def publisher(self, instance_id: str) -> None: ...
 
 
 def no_alarms() -> AlarmsView:
@@ -78,6 +95,7 @@ class ViewSources:
     alarms: Callable[[], AlarmsView] = no_alarms
     inhibited: Callable[[], Mapping[str, Verdict]] = dict
     recipes: Callable[[], Mapping[str, int]] = dict
+    pages: Mapping[str, Collection[str]] | None = None  # of all robots
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -111,8 +129,10 @@ class ViewRefresher:
         self._displays = [(_shown_keys(widget, panel, robot), widget) for widget in panel.displays]
         self._current = self._build()
         self.lamp = self._current.robot
+        pages = panel.widgets_by_page if sources.pages is None else sources.pages
+        self.own = self._current  # the newest view without the widgets of other robots
         self.publisher = ViewPublisher(
-            self._current.view, revision, self._current.without_control, panel.widgets_by_page
+            self._current.view, revision, self._current.without_control, pages
         )
         self._shown_at = 0.0
         self._updated_keys: set[str] = set()  # of topics with a sample since the last frame
@@ -165,18 +185,27 @@ class ViewRefresher:
         try:
             self._refresh()
             self._log_failures()
-            self.publisher.post(self._current.view, self._current.without_control)
+            self._post(self._current)
         except Exception:
             if not self._failed:
                 self._log.exception("the view could not be refreshed; it is tried again")
             self._failed = self._whole = True
             self._schedule(self._shown_at + AGAIN_S)
-            locked = lock_all(self._panel, self._current, say("view_failed"))
-            self.publisher.post(locked.view, locked.without_control)
+            self._post(lock_all(self._panel, self._current, say("view_failed")))
         else:
             self._failed = self._whole = self._alarms_changed = False
             self._updated_keys = set()
             self._schedule(self._current.until)
+
+    def _post(self, own: ViewWithDeadlines) -> None:
+        self.own = own
+        self.show_shared()
+        self._sources.others.share(self._robot)
+
+    def show_shared(self) -> None:
+        """Publishes the newest view with the widgets of other robots as they are now."""
+        shared = self._sources.others.shared_with(self._robot)
+        self.publisher.post(self.own.view, self.own.without_control, shared)
 
     def _log_failures(self) -> None:
         """Logs each widget that can't be shown, once until it is shown again."""

@@ -24,6 +24,7 @@ from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 from app.view.robot_state import UNKNOWN, RobotWord, robot_word
 
 RETRY_S: Final = 1.0  # after which a widget that can't be shown is tried again
+NOTHING_OF_OTHERS: Final[Mapping[str, Mapping[str, Attributes]]] = {}
 FAILURE: Final = say("widget_failed")
 FAILED: Final[Attributes] = {"failed": FAILURE, "state": "unreadable", "note": FAILURE}
 FAILED_COMMAND: Final[Attributes] = {
@@ -107,7 +108,7 @@ def build_view(
 ) -> ViewWithDeadlines:
     """The view at `now` (monotonic seconds)."""
     passable = link_verdict(robot, now)
-    interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.interlocks}
+    interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.every_interlock}
     grounds = NO_CONDITIONS
     if context.log_lock or context.inhibited:
         grounds = ServerConditions(log_lock=context.log_lock, inhibited=context.inhibited)
@@ -208,8 +209,14 @@ def update_displays(
     return current._replace(view=view, displays=untils, failures=failures)
 
 
-def for_audience(view: View, without_control: Mapping[str, Attributes], audience: Audience) -> View:
-    """The view for an audience; without control, commands are locked."""
+def for_audience(
+    view: View,
+    without_control: Mapping[str, Attributes],
+    audience: Audience,
+    of_others: Mapping[str, Mapping[str, Attributes]] = NOTHING_OF_OTHERS,
+) -> View:
+    """The view for an audience; without control, commands are locked. `of_others` has the same for the
+    widgets of other robots, by the robot's id."""
     role = audience.role
     if not role:
         return view
@@ -217,9 +224,12 @@ def for_audience(view: View, without_control: Mapping[str, Attributes], audience
         widgets = {name: _embedded(attributes) for name, attributes in view["widgets"].items()}
         return {**view, "control": {**NO_CONTROL, "role": role}, "widgets": widgets}
     control = for_role(view["control"], role)
-    if audience.has_control:
+    locked = {} if audience.has_control else dict(without_control)
+    for robot in audience.without:
+        locked |= of_others.get(robot, {})
+    if not locked:
         return {**view, "control": control}
-    return {**view, "control": control, "widgets": {**view["widgets"], **without_control}}
+    return {**view, "control": control, "widgets": {**view["widgets"], **locked}}
 
 
 def _embedded(attributes: Attributes) -> Attributes:

@@ -78,6 +78,7 @@ class AlarmRuns:
         if control is None or (described.ack_input is None and control in self._pressed):
             return "", None
         self._pressed.add(control)
+        session = self._state.fleet.session_for(session, control)
         widget = session.presses.widget(control)
         press = press_of(alarm, widget, act_id, request.who, request.at)
         task = asyncio.ensure_future(self._state.counted(session.presses.press(press)))

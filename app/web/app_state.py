@@ -67,11 +67,19 @@ async def _current(request: HTTPConnection) -> AppState:
 CurrentState = Annotated[AppState, Depends(_current)]
 
 
-async def _of_robot(request: HTTPConnection) -> RobotSession:
+async def _of_path(request: HTTPConnection) -> RobotSession:
     return site_of(request).fleet.session(request.path_params.get("robot"))
 
 
-CurrentSession = Annotated[RobotSession, Depends(_of_robot)]
+async def _of_widget(request: HTTPConnection) -> RobotSession:
+    session = await _of_path(request)
+    return site_of(request).fleet.session_for(session, request.path_params.get("widget", ""))
+
+
+# The session of the robot in the path, whose pages are shown; and that of the widget in the path, which
+# may be another robot's.
+PageSession = Annotated[RobotSession, Depends(_of_path)]
+CurrentSession = Annotated[RobotSession, Depends(_of_widget)]
 
 
 async def named_robot(robot: Annotated[str, Path(description="The id of a [[robot]]")]) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from docs._generate.schema import REF, ROOT, WIDGET, WORDS, Schema, of_kind, panel_schema
+from docs._generate.schema import REF, ROOT, SAME, WIDGET, WORDS, Schema, of_kind, panel_schema
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
 EXACT: Final = 2**53  # the limit of every number in a browser: it is described once, not at each key
@@ -40,8 +40,9 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
             if _by_name(tables[name]["properties"].get(key, {})):
                 inner = list(value.values())
             for field in inner:
-                if isinstance(field, dict) and (part := of_kind(field.get("kind")) or key) in tables:
-                    walk(part, field)
+                if isinstance(field, dict):
+                    part = SAME if SAME in field else of_kind(field.get("kind")) or key
+                    walk(part, field) if part in tables else None
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))
     own: dict[str, Any] = WORDS["examples"]
@@ -51,7 +52,8 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     }
     with_label = (name for name, table in tables.items() if "show_label" in table["properties"])
     label = {f"{name}.show_label": False for name in with_label}
-    return grow | label | source | examples | own
+    robot = {f"{name}.robot": "r1" for name, table in tables.items() if "robot" in table["properties"]}
+    return grow | label | source | robot | examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:

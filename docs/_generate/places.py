@@ -15,9 +15,10 @@ from pydantic import BaseModel
 
 from app import i18n
 from app.i18n import BETWEEN, ENGLISH, sentences
-from app.panel import Panel
+from app.panel.panel_keys import PanelKeys
+from app.panel.same_widgets import SameWidget
 from docs._generate.locks import shown
-from docs._generate.schema import ROOT, of_kind
+from docs._generate.schema import ROOT, SAME, of_kind
 
 SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
@@ -81,19 +82,19 @@ def _slug(name: str) -> str:
 
 def models() -> dict[str, type[BaseModel]]:
     """The classes of the tables, by the names that the file gives them."""
-    known: dict[str, type[BaseModel]] = {ROOT: Panel}
+    known: dict[str, type[BaseModel]] = {ROOT: PanelKeys}
 
     def walk(model: type[BaseModel]) -> None:
         for key, field in model.model_fields.items():
-            for inner in _models_in(field.annotation):
+            for inner in () if field.exclude else _models_in(field.annotation):
                 kind = inner.model_fields.get("kind")
                 name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
                 if name not in known:
                     known[name] = inner
                     walk(inner)
 
-    walk(Panel)
-    return known
+    walk(PanelKeys)
+    return known | {SAME: SameWidget}
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:

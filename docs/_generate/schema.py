@@ -11,6 +11,8 @@ from typing import Any, Final
 
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
 from app.panel import Panel
+from app.panel.load import NOT_WRITTEN
+from app.panel.same_widgets import SameWidget
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.trend import DURATION
@@ -25,6 +27,7 @@ ROOT: Final = "panel"
 WIDGET: Final = "widget"
 REF: Final = "#/definitions/"
 SOURCE: Final = "source"
+SAME: Final = "same"
 PUBLISHED: Final = [kind for kind, row in KINDS.items() if issubclass(row.model, PublishCommand)]
 
 # What a text is, by "table.key" or "key" alone, and its pattern where the name alone decides.
@@ -60,7 +63,9 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "list.active": ("field path", ""),
     "catalogue": ("file", ""),
     "inhibits": ("id of a control", ""),
-    "alarm.robot": ("id of a robot", ""),
+    "robot": ("id of a robot", ""),
+    "panel.robot": ("", ""),
+    "same": ("id of a widget", ""),
     "diagnostics": ("pattern of names", ""),
     "success": ("field path", ""),
     "call.message": ("field path", ""),
@@ -74,6 +79,8 @@ def panel_schema() -> Schema:
     """The whole schema, as draft 7 has it: that is what the editors' plugins know."""
     root = Panel.model_json_schema(ref_template=REF + "{model}")
     definitions = root.pop("$defs")
+    for key in NOT_WRITTEN:
+        root["properties"].pop(key, None)
     tables = named_tables(root, definitions)
     for name, table in tables.items():
         _with_source(name, table)
@@ -84,7 +91,9 @@ def panel_schema() -> Schema:
     kinds = kinds_of(tables)
     for owner in ("page", "group", "frame"):
         by_name[owner]["properties"]["widget"]["items"] = {"$ref": REF + WIDGET}
-    by_name[WIDGET] = _widget(kinds)
+    by_name[SAME] = SameWidget.model_json_schema()
+    _finish(SAME, by_name[SAME])
+    by_name[WIDGET] = _widget(kinds, by_name[SAME])
     whole = {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "A panel file",
@@ -149,7 +158,6 @@ def _with_source(name: str, table: Schema) -> None:
 def _finish(name: str, table: Schema) -> None:
     """Descriptions, names of formats, and no more than an editor needs."""
     properties = table["properties"]
-    properties.pop("revision", None)  # of the file, not in it
     table["title"], table["description"] = name, WORDS["tables"][name]
     for key, prop in properties.items():
         properties[key] = {**_plain(name, key, prop), "description": about(name, key)}
@@ -191,9 +199,9 @@ def _one_or_more(schema: Schema) -> Schema:
     return {"anyOf": [schema, several]}
 
 
-def _widget(kinds: Mapping[str, Schema]) -> Schema:
-    """One kind's table, chosen by `kind`. The keys of all kinds stand beside that: editors complete
-    what is a property, but do not look into conditions."""
+def _widget(kinds: Mapping[str, Schema], same: Schema) -> Schema:
+    """One kind's table, chosen by `kind`, or that of a widget of another page. The keys of all kinds
+    stand beside that: editors complete what is a property, but do not look into conditions."""
     keys: dict[str, list[Schema]] = {}
     for table in kinds.values():
         for key, prop in table["properties"].items():
@@ -203,16 +211,21 @@ def _widget(kinds: Mapping[str, Schema]) -> Schema:
     properties = {key: _any_of(props) for key, props in keys.items()}
     said = {name: table["properties"]["kind"]["const"] for name, table in kinds.items()}
     properties["kind"] = {"enum": list(said.values()), "description": about(WIDGET, "kind")}
+    properties[SAME] = same["properties"][SAME]
     chosen = [
-        {"if": {"properties": {"kind": {"const": kind}}}, "then": {"$ref": REF + name}}
+        {
+            "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+            "then": {"$ref": REF + name},
+        }
         for name, kind in said.items()
     ]
+    chosen.append({"if": {"required": [SAME]}, "then": {"$ref": REF + SAME}})
     return {
         "title": WIDGET,
         "description": WORDS["tables"][WIDGET],
         "type": "object",
         "properties": properties,
-        "required": ["id", "kind", "label"],
+        "oneOf": [{"required": ["id", "kind", "label"]}, {"required": [SAME]}],
         "allOf": chosen,
     }
 

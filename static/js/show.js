@@ -169,6 +169,10 @@ export function lockWidget(root, lost, unknown) {
   root.querySelector(".ask:popover-open")?.hidePopover();
   const reason = root.querySelector(".why")?.dataset.lost ?? lost; // of a stop button: what to use instead
   if (buttons.length) showAttributes(root, { reason, reasons: reason, more: "", enabled: false });
+  // The tile of a robot.
+  if ("link_state" in root.dataset) {
+    showAttributes(root, { link_state: "wait", link: unknown, since: "", alarm: unknown, priority: "" });
+  }
   if (!root.dataset.state) return;
   root.dataset.state = "old";
   if (!root.dataset.shape) return;

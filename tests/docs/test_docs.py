@@ -85,7 +85,7 @@ def completed(example: str) -> str:
         text += BATTERY
     named_in_demo = {"/battery": BATTERY, **DEMO}
     text += "".join(named_in_demo[name] for name in tables.get("demo", {}))
-    widgets = {widget["id"] for each in tables["page"] for widget in each.get("widget", [])}
+    widgets = {widget.get("id") for each in tables["page"] for widget in each.get("widget", [])}
     named = set(re.findall(r'"\{(\w+)\}"', text)) - widgets
     text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))
     locks = set(re.findall(r'^interlock = "(\w+)"', text, re.MULTILINE))

@@ -18,6 +18,7 @@ from app.panel.condition import COMPARISONS
 from app.panel.faults.table_keys import inner_model, known_keys
 from app.panel.layout import Page
 from app.panel.model import Panel
+from app.panel.same_widgets import SameWidget
 from app.panel.source import NAME as SOURCE
 from app.panel.widgets.kinds import KINDS
 from tests.support.form import LONG, several
@@ -92,7 +93,7 @@ def id_at(number: int) -> str:
         if name and name[1] == "page.group":
             return id_at(max(n for n in range(1, header) if LINES[n - 1] == "[[page]]"))
         header -= 1
-    return LINES[header].removeprefix('id = "').removesuffix('"') if header else ""
+    return re.sub('(?:id|same) = "(.*)"', r"\1", LINES[header]) if header else ""
 
 
 def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[str]:
@@ -111,7 +112,8 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
 def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsOf) -> None:
     assert faults_of(GOOD) == []
     comparisons = [*COMPARISONS, "unit", "scale", "offset", "format"]  # not all fit one condition
-    conditions = [f"{table}.{key}" for table in ("interlock", "condition") for key in comparisons]
+    of_interlocks = [f"interlock.{key}" for key in (*comparisons, "robot")]
+    conditions = [*of_interlocks, *(f"condition.{key}" for key in comparisons)]
     left_out = ["type", *comparisons[1:]]
     of_alarms = [f"{table}.{key}" for table in ("when", "while") for key in left_out]
     of_one_robot = ["namespace", "dialect", "domain"]  # there are robots, which have their own
@@ -125,13 +127,18 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
         TABLES["page"],
         [group for page in TABLES["page"] for group in page.get("group", ())],
     )
-    widgets = [widget for part in (*pages, *groups, TABLES["frame"]) for widget in part["widget"]]
+    widgets = [
+        widget for part in (*pages, *groups, TABLES["frame"]) for widget in part.get("widget", ())
+    ]
+    copies = [widget for widget in widgets if "same" in widget]
+    assert [list(lacking(copy, SameWidget)) for copy in copies] == [[]]
+    widgets = [widget for widget in widgets if widget not in copies]
     together = {key: value for page in pages for key, value in page.items()}
     # Those are files beside the panel file; test_page_templates.py has them.
-    assert list(lacking(together, Page)) == ["template", "styles"]
+    assert list(lacking(together | {"robot": "r1"}, Page)) == ["template", "styles"]
     for kind, (model, *_) in KINDS.items():
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
-        own |= {"grow": True, "show_label": False}  # of any kind, but of few widgets
+        own |= {"grow": True, "show_label": False, "robot": "r1"}  # of any kind, but of few widgets
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
         # A switch switches back; options are the file's or the robot's.
         refused = {
@@ -210,7 +217,8 @@ def one_each(faults_of: FaultsOf, mistakes: Mapping[int, str]) -> dict[int, Faul
 def test_a_value_that_is_of_no_use_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     faults = one_each(faults_of, {n: f"{key_of(n)} = 1979-05-27" for n in numbers})
     for number, fault in faults.items():
-        assert fault.id == ("" if key_of(number) == "id" else id_at(number)), str(fault)
+        own_id = key_of(number) in ("id", "same")
+        assert fault.id == ("" if own_id else id_at(number)), str(fault)
         assert fault.place.endswith(key_of(number)), str(fault)
 
 

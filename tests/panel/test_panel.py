@@ -488,7 +488,7 @@ def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> 
     assert faults(load, tables(page=[page])) == {
         "page[0].widget[0].constants": (
             'unknown key, as "order"; known here: '
-            "id, label, show_label, span, rows, grow, kind, max_length, default, scan"
+            "id, label, show_label, span, rows, grow, robot, kind, max_length, default, scan"
         )
     }
 

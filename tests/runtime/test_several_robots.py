@@ -258,9 +258,9 @@ def test_faults_of_robot_tables_are_reported(tmp_path: Path) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(path)
     assert faults_text(caught.value).splitlines() == [
-        'robot[1].id: "r1" is already the id of robot[0]',
+        'robot[1].id: "r1" is already the id of robot[0], line 8',
         'robot[2].namespace: "a b" is not a ROS 2 namespace: it must be like /robot1',
-        'robot[3].name: "Robot 1" is already the name of robot[0]',
+        'robot[3].name: "Robot 1" is already the name of robot[0], line 8',
         "robot[4].namespace: robot[0] has the same namespace and endpoints: it would be the same robot",
     ]
 

@@ -105,7 +105,7 @@ def _trend_notes(panel: Panel) -> Iterator[Note]:
     robots = len(panel.robots) or 1
     for p, page in enumerate(panel.pages):
         for place, widget in page.placed():
-            if isinstance(widget, Trend):
+            if isinstance(widget, Trend) and f"page[{p}].{place}" not in panel.copies:
                 size = robots * len(widget.pens) * history_bytes(widget.keep_s) / 1e6
                 where = "memory, and as much on disk" if widget.disk else "memory"
                 pens = f"{len(widget.pens)} pen{'s' * (len(widget.pens) > 1)}"

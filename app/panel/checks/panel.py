@@ -12,7 +12,13 @@ from app.panel.checks.look import brand_faults, grow_faults, help_faults, label_
 from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.recipes import recipe_faults
-from app.panel.checks.robots import duplicate_ids, robot_faults
+from app.panel.checks.robots import (
+    duplicate_ids,
+    figure_faults,
+    overview_faults,
+    robot_faults,
+    robot_name_faults,
+)
 from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
@@ -46,6 +52,8 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     """
     yield from _required_type_faults(panel, interfaces)
     yield from robot_faults(panel)
+    yield from robot_name_faults(panel)
+    yield from overview_faults(panel)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
     yield from duplicate_ids("page", [page.id for page in panel.pages])
@@ -172,6 +180,7 @@ def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]
                 yield from widget.faults(f"page[{p}].{place}", checking)
     checking = _check_context(panel, interfaces, (), faulty)
     yield from _frame_faults(panel, checking, faulty)
+    yield from figure_faults(panel, checking)
     if panel.state:
         yield from panel.state.display.faults("state", checking)
     yield from recipe_faults(panel.recipes, panel.recipe_loads, checking)
@@ -223,6 +232,8 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
         for at, widget in page.placed():
             place = f"page[{p}].{at}"
+            if place in panel.copies:
+                continue
             if widget.id in places and page.id not in ids[:p]:  # not in a page with a duplicate id
                 yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {places[widget.id]}')
             places.setdefault(widget.id, place)

@@ -7,7 +7,9 @@ from typing import Final
 from app.dialect.dialect import WITH_OWN_DOMAIN
 from app.errors import Fault
 from app.i18n.values import alike
+from app.panel.faults.wording import closest_name, list_names
 from app.panel.model import Panel, RobotEntry
+from app.panel.widgets.families import CheckContext
 
 OF_ONE_ROBOT: Final = "is of the one robot: with [[robot]] each has its own"
 
@@ -25,6 +27,59 @@ def robot_faults(panel: Panel) -> Iterator[Fault]:
     for r, robot in enumerate(panel.robots):
         yield from islice(_duplicate_robot_faults(f"robot[{r}]", robot, panel.robots[:r]), 1)
         yield from _domain_faults(f"robot[{r}].", robot)
+
+
+def robot_name_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of tables that name a robot which the panel does not have."""
+    known = [str(robot.id) for robot in panel.robots]
+    if len({*known}) < len(known):
+        return  # one of them has another id
+    for place, robot in _named_robots(panel):
+        if robot is not None and not known:
+            message = "this panel has one robot: it is of [[robot]] tables, which are missing"
+            yield Fault(f"{place}.robot", message, cause=f"robot {robot}")
+        elif robot is not None and robot not in known:
+            meant = closest_name(robot, known)
+            hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(known)}"
+            yield Fault(f"{place}.robot", f'no robot "{robot}"; {hint}', cause=f"robot {robot}")
+
+
+def overview_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of overviews, which have a tile for each robot and nothing else."""
+    for p, page in enumerate(panel.pages):
+        place = f"page[{p}]"
+        if not page.overview:
+            continue
+        if not panel.robots:
+            yield Fault(f"{place}.overview", "is for several robots: this panel has no [[robot]] table")
+        keys = {
+            "widget": page.own,
+            "group": page.groups,
+            "template": page.template,
+            "robot": page.robot,
+        }
+        for key, value in keys.items():
+            if value:
+                message = "has no meaning on an overview: it has a tile for each robot, and no more"
+                yield Fault(f"{place}.{key}", message, cause="robot overview")
+
+
+def figure_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:
+    """Faults of the robots' figures."""
+    for r, robot in enumerate(panel.robots):
+        if robot.figure is not None:
+            yield from robot.figure.faults(f"robot[{r}].overview", checking)
+
+
+def _named_robots(panel: Panel) -> Iterator[tuple[str, str | None]]:
+    """(place, robot) of each table that may name one."""
+    yield from ((f"interlock[{i}]", interlock.robot) for i, interlock in enumerate(panel.interlocks))
+    yield from ((f"condition[{c}]", each.robot) for c, each in enumerate(panel.own_conditions))
+    yield from ((f"frame.widget[{w}]", each.robot) for w, each in enumerate(panel.frame.widgets))
+    for p, page in enumerate(panel.pages):
+        yield f"page[{p}]", page.robot
+        yield from ((f"page[{p}].group[{g}]", group.robot) for g, group in enumerate(page.groups))
+        yield from ((f"page[{p}].{place}", widget.robot) for place, widget in page.placed())
 
 
 def _domain_faults(place: str, robot: Panel | RobotEntry) -> Iterator[Fault]:

@@ -9,6 +9,7 @@ from app.errors import Remark
 from app.panel.faults.toml_lines import Path, lines_of
 
 MAX_ID: Final = 64
+SAME: Final = "same"  # in place of an id: the widget is one of another page
 _OWNER: Final = re.compile(
     r"(?:^|\.)(page|group|frame|widget|interlock|alarm|robot|source)(?:\[([0-9]+)\])?(?=\.|$)"
 )
@@ -57,9 +58,11 @@ def id_at(place: str, tables: Any) -> str:
     known: Any = ""
     around = tables
     for name, index in _OWNER.findall(place):
+        if name == "robot" and not index:  # a key of the table
+            break
         try:
             around = around[name][int(index)] if index else around[name]
-            known = around["id"] if name in _WITH_ID else known
+            known = around[SAME if SAME in around else "id"] if name in _WITH_ID else known
         except (LookupError, TypeError):
             return ""
         if name in ("widget", "alarm"):

@@ -14,6 +14,7 @@ from app.panel.faults.table_keys import Model, TableKeys, inner_model, key_fault
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name, describe_error
 from app.panel.model import Panel
+from app.panel.same_widgets import NAME as SAME
 from app.panel.widgets.kinds import KINDS
 
 _PRESS: Final = (
@@ -157,6 +158,11 @@ def _its_keys(path: Path, model: Model, header: str) -> str:
 def _kind_fault(path: Path, table: Any) -> Fault:
     if not isinstance(table, Mapping):
         return Fault(place_of(path), f"must be a table, not {format_value(table)}")
+    if SAME in table:
+        why = "is for widgets of pages: those of the frame are on every page"
+        return Fault(place_of((*path, SAME)), why)
+    if "id" not in table and "kind" not in table and (meant := closest_name(SAME, table)):
+        return Fault(place_of((*path, meant)), f'unknown key; did you mean "{SAME}"?')
     kinds = ", ".join(KINDS)
     written = str(table.get("kind", "")).lower()
     if "kind" not in table:

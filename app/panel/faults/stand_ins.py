@@ -67,7 +67,9 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}
                 unnamed = _unnamed("alarm", tables["alarm"][i])
                 rest.undecidable.update(("listens", "action", "group", *unnamed))
-            case ("robot", int(r), *_):
+            case ("robot", int(r), key, *_):
+                if key == "overview":  # the header of the next robot may be missing below it
+                    rest.undecidable.add("robot")
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
                 rest.undecidable.update(_unnamed("robot", tables["robot"][r]))
                 rest.tables["robot"][r] = {"id": _stand_in(tables["robot"][r], str(r))["id"], **names}

@@ -68,9 +68,8 @@ class TopicSource(NamedTuple):
 
 
 class BaseWidget(Description):
-    """The keys of every widget; `span` is its width in columns of its group, which are twelfths of the
-    page where the group does not say, and `rows` its height in rows of its group; with `grow` its row
-    takes the height that is left. Without `show_label` its label is only read aloud."""
+    """The keys of every widget: `span` and `rows` are its size in the grid of its group; with `grow`
+    its row takes the height that is left. Without `show_label` its label is only read aloud."""
 
     id: Id
     label: Label
@@ -78,6 +77,7 @@ class BaseWidget(Description):
     span: Span = 12
     rows: Annotated[int, Field(ge=1, le=8)] = 1
     grow: bool = False
+    robot: Id | None = None  # by default the group's, else the page's
     kind: str
     why_needed: ClassVar[Mapping[str, str]] = {}  # why a key is required, if that is not obvious
     required_types: ClassVar[tuple[str, ...]] = ()  # that the server needs for this kind

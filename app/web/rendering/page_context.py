@@ -105,7 +105,7 @@ def page_context(
     `recipes_page` as `alarms_page`, for recipes.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
-    receipt = _faded(session.presses.receipt(request.query_params.get("receipt", "")))
+    receipt = _faded(state.fleet.receipt(session, request.query_params.get("receipt", "")))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     again |= {EMBED: 1} if embedded else {}
     now, wall = clock.server_now(), time.time()
@@ -113,7 +113,8 @@ def page_context(
     if only_shows(session.panel.embed, embedded):
         of_client = audience("embedded", language)
     else:
-        of_client = audience_of(who, publisher.view["control"], rules, language)
+        others = publisher.shared.controls
+        of_client = audience_of(who, publisher.view["control"], rules, language, others)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
@@ -163,7 +164,11 @@ def page_context(
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
         words={"embed": embed, "root": state.root, "may_act": of_client.has_control}
         | page_words(
-            session, page, f"{state.root}/static/{state.assets.revision}/{PICTURES}", language
+            state.fleet,
+            session,
+            page,
+            f"{state.root}/static/{state.assets.revision}/{PICTURES}",
+            language,
         ),
         page_json=page_json(data, language),
         refresh_s=refresh_s,

@@ -6,9 +6,12 @@ from typing import Any, Final, TypedDict
 
 from app.i18n import Text, joined, number, say
 from app.panel.layout import Page
+from app.panel.robot_panels import opened_page, page_for
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.trend import Trend
+from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
 from app.view.trend_plot import Plot, plot
 from app.web.rendering.entry_words import ENTRY_WORDS, UNREADABLE
@@ -82,29 +85,44 @@ class Ask(TypedDict):
     inputs: list[EntryWidget]
 
 
-def page_words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
+def page_words(
+    fleet: Fleet, session: RobotSession, page: Page, pictures: str, language: str
+) -> dict[str, Any]:
     """The `words` of a page's context; `pictures` is the path of the panel's picture files. `stop_lost`
     is shown at a stop button of a page without its server. `plot` and
     `lines` are called by the macros of trends and logs, with the widget."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
-    own |= {"asks": asks_of(session, page)}
+    panel = fleet.panel
+    pages = {robot.id: page_for(panel, robot.id, page).id for robot in panel.robots}
+    tiles = {robot.id: opened_page(panel, robot.id).id for robot in panel.robots}
+    own |= {"tile_pages": {robot: f"pages/{shown}" for robot, shown in tiles.items()}}
+    own |= {"robot_pages": {robot: f"pages/{shown}" for robot, shown in pages.items()}}
+    own |= {"asks": asks_of(fleet, session, page)}
     own |= {"stop_lost": joined((say("server_lost"), session.panel.stop_hint))}
-    own |= {"plot": partial(_plot_now, session), "lines": partial(newest_lines, session, language)}
+    own |= {"plot": partial(_plot_now, fleet, session)}
+    own |= {"lines": partial(_lines_now, fleet, session, language)}
     own |= {"minutes": lambda minutes: say("alarms_minutes", count=number(str(minutes)))}
     named = (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS, *ALARM_WORDS)
     plain = {word: say(word) for word in named}
     return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 
-def _plot_now(session: RobotSession, widget: Trend) -> Plot:
-    return plot(widget, session.robot, time.monotonic(), time.time())
+def _plot_now(fleet: Fleet, session: RobotSession, widget: Trend) -> Plot:
+    robot = fleet.session_for(session, str(widget.id)).robot
+    return plot(widget, robot, time.monotonic(), time.time())
 
 
-def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
+def _lines_now(
+    fleet: Fleet, session: RobotSession, language: str, widget: LogView
+) -> list[dict[str, Any]]:
+    return newest_lines(fleet.session_for(session, str(widget.id)), language, widget)
+
+
+def asks_of(fleet: Fleet, session: RobotSession, page: Page) -> dict[str, Ask]:
     """The questions before presses of a page, by the ids of the widgets that need one."""
-    shown = (*page.widgets, *session.panel.frame.widgets)
+    shown = (*page.widgets, *fleet.panel.frame.widgets)
     pressed = (w for w in shown if isinstance(w, PressCommand) and w.confirm_press)
-    return {widget.id: ask_of(session, widget) for widget in pressed}
+    return {w.id: ask_of(fleet.session_for(session, str(w.id)), w) for w in pressed}
 
 
 def ask_of(session: RobotSession, widget: PressCommand) -> Ask:

@@ -79,7 +79,9 @@ class ControlAnswer(BaseModel):
 )
 async def keep_alive(request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    session.control.keepalive(principal_of(request, state), (await _body(KeepAlive, request)).touched)
+    who, touched = principal_of(request, state), (await _body(KeepAlive, request)).touched
+    for shown in (session, *state.fleet.sharing(session)):
+        shown.control.keepalive(who, touched)
     return Response(status_code=204)
 
 

@@ -70,7 +70,8 @@ async def events(
 def _audience_now(
     publisher: ViewPublisher, who: Principal, rules: ControlRules, language: str
 ) -> Audience:
-    return audience_of(who, publisher.view["control"], rules, language)
+    control, others = publisher.view["control"], publisher.shared.controls
+    return audience_of(who, control, rules, language, others)
 
 
 def _everyone() -> Audience:

@@ -9,6 +9,7 @@ from jinja2 import Environment
 from app.errors import NotFound
 from app.i18n import say
 from app.panel.layout import Page
+from app.panel.robot_panels import page_for
 from app.panel.widgets.families import EntryWidget
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
@@ -58,7 +59,9 @@ OTHER_PAGES = (
 async def first_page(request: Request, state: CurrentState) -> Response:
     if away := _to_a_robot(request, state, "/"):
         return away
-    return _render(request, state, state.fleet.panel.pages[0])
+    panel = state.fleet.panel
+    page = page_for(panel, request.path_params.get("robot"), panel.pages[0])
+    return _render(request, state, page)
 
 
 @router.get(
@@ -94,6 +97,9 @@ def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None
 
 def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
+    if session.entry is not None and page.robot not in (None, session.entry.id):
+        path = f"{state.fleet.session(page.robot).base}/pages/{page.id}"
+        return RedirectResponse(f"{path}?{request.url.query}".rstrip("?"), status_code=303)
     rules = session.panel.embed
     embedded = bool(rules.origins) and is_embedded(request)
     if embedded and not says_embedded(request.url.query):

@@ -6,7 +6,7 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
 from app.i18n import render
-from app.web.app_state import CurrentSession
+from app.web.app_state import CurrentSession, CurrentState, PageSession
 from app.web.language import language_of
 from app.web.openapi_parts import FORM, errors
 from app.web.request_body import body_of, kind_of
@@ -33,10 +33,12 @@ class ReadAnswer(BaseModel):
         409: {"model": ReadAnswer, "description": "its node is not there"},
     },
 )
-async def read(widget: str, request: Request, session: CurrentSession) -> Response:
+async def read(
+    widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
+) -> Response:
     await body_of(request)  # a page without scripts sends its whole form
     why = session.read_again(widget)
     if kind_of(request) == FORM:
-        return RedirectResponse(page_after(session, widget, ""), status_code=303)
+        return RedirectResponse(page_after(state, page, widget, ""), status_code=303)
     answer = ReadAnswer(asked=not why, reason=render(why, language_of(request)))
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

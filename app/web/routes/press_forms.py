@@ -14,6 +14,7 @@ from app.commands.press import PRESS_ID, Press
 from app.errors import InputError
 from app.i18n import say
 from app.panel.layout import Page
+from app.panel.model import Panel
 from app.panel.widgets.families import PressCommand
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.permission.principal import Principal
@@ -47,14 +48,16 @@ TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 QUESTION_LIFE_S: Final = 30.0  # the answer is a press, and no later one
 
 
-async def pressed_by_form(state: AppState, session: RobotSession, form: PressForm) -> Response:
+async def pressed_by_form(
+    state: AppState, page: RobotSession, session: RobotSession, form: PressForm
+) -> Response:
     """The response to a press: a redirect to the page with its receipt, or the question before the
-    press."""
+    press. `session` is that of the widget's robot, `page` that of the robot whose page it was."""
     fields, refusals = form.fields, session.presses.early_refusals
     too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
     shown_on = fields.pop("_page", "")
     if form.widget.confirm_press and (fields.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(state, session, form, shown_on)
+        return _ask(state, page, session, form, shown_on)
     press = _press_of(state, session, form)
     if not state.limits.admit(press.principal):
         receipt = refusals.limited(press, shown=True)
@@ -62,7 +65,7 @@ async def pressed_by_form(state: AppState, session: RobotSession, form: PressFor
         session.press_guard.receive(press)
         work = refusals.too_soon(press, before) if too_soon else session.presses.press(press)
         receipt = await state.counted(work)
-    path = page_after(session, press.widget.id, receipt.id, shown_on)
+    path = page_after(state, page, press.widget.id, receipt.id, shown_on)
     return RedirectResponse(path, status_code=303)
 
 
@@ -79,7 +82,9 @@ def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[
     return Press(f"{page_id}.{widget.id}", widget, inputs, form.principal, seen, until)
 
 
-def _ask(state: AppState, session: RobotSession, form: PressForm, shown_on: str) -> Response:
+def _ask(
+    state: AppState, page: RobotSession, session: RobotSession, form: PressForm, shown_on: str
+) -> Response:
     """The page that asks before a press; its answer is the press."""
     widget = form.widget
     html = state.templates.render(
@@ -87,16 +92,16 @@ def _ask(state: AppState, session: RobotSession, form: PressForm, shown_on: str)
         form.reader.language,
         site=state,
         display=form.reader.display,
-        panel=session.panel,
+        panel=state.fleet.panel,
         banner=session.publisher.view["notice"]["banner"],
         question=ask_of(session, widget),
-        action=f"{session.base}/widgets/{widget.id}",
-        back=page_after(session, widget.id, "", shown_on),
+        action=f"{page.base}/widgets/{widget.id}",
+        back=page_after(state, page, widget.id, "", shown_on),
         fields={
             **form.fields,
             "_page": shown_on,
             CONFIRMED: "yes",
-            "_seen": session.publisher.id,
+            "_seen": page.publisher.id,
             "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
@@ -108,11 +113,14 @@ def _ask(state: AppState, session: RobotSession, form: PressForm, shown_on: str)
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
 
-def _page_of(session: RobotSession, widget: str, shown_on: str) -> Page:
-    """The page of a widget; of one in the frame the page that it was `shown_on`, else the first."""
-    panel = session.panel
+def _page_of(panel: Panel, widget: str, shown_on: str) -> Page:
+    """The page of a widget that it was `shown_on`, else the first with it; one in the frame is on every
+    page."""
+    pressed_on = panel.page(shown_on)
     if any(shown.id == widget for shown in panel.frame.widgets):
-        return panel.page(shown_on) or panel.pages[0]
+        return pressed_on or panel.pages[0]
+    if pressed_on and any(shown.id == widget for shown in pressed_on.widgets):
+        return pressed_on
     return next(page for page in panel.pages if any(shown.id == widget for shown in page.widgets))
 
 
@@ -155,18 +163,21 @@ def _moment(fields: dict[str, str], name: str) -> float | None:
     return moment
 
 
-def page_after(session: RobotSession, widget: str, receipt_id: str, shown_on: str = "") -> str:
-    """The path of a widget's page, with a receipt if there is one; `shown_on` is the page's id where
-    it was pressed, "" if unknown."""
-    loads = {load.id: load for load in session.panel.recipe_loads}
+def page_after(
+    state: AppState, page: RobotSession, widget: str, receipt_id: str, shown_on: str = ""
+) -> str:
+    """The path of a widget's page, with a receipt if there is one. `page` is the session of the robot
+    whose page it was, `shown_on` the page's id where it was pressed, "" if unknown."""
+    panel = state.fleet.panel
+    loads = {load.id: load for load in panel.recipe_loads}
     if widget in loads:
-        page = f"{session.base}/recipes/{widget}"
-        recipe = recipe_of(session, loads[widget], receipt_id)
-        page += f"?recipe={quote(recipe)}" if recipe else ""
+        path = f"{page.base}/recipes/{widget}"
+        recipe = recipe_of(page, loads[widget], receipt_id)
+        path += f"?recipe={quote(recipe)}" if recipe else ""
     else:
-        page = f"{session.base}/pages/{_page_of(session, widget, shown_on).id}"
-    receipt = f"{'&' if '?' in page else '?'}receipt={quote(receipt_id)}" if receipt_id else ""
-    return page + receipt
+        path = f"{page.base}/pages/{_page_of(panel, widget, shown_on).id}"
+    receipt = f"{'&' if '?' in path else '?'}receipt={quote(receipt_id)}" if receipt_id else ""
+    return path + receipt
 
 
 def recipe_of(session: RobotSession, load: RecipeLoad, receipt_id: str) -> str:

@@ -102,7 +102,8 @@ class _PressSocket:
     async def _press(self, body: SocketPress) -> None:
         state, socket = self._state, self._socket
         try:
-            session = state.fleet.session(socket.path_params.get("robot"))
+            shown = state.fleet.session(socket.path_params.get("robot"))
+            session = state.fleet.session_for(shown, body.widget)
             who = self._caller.principal(state)
             press = body.press(session.presses.widget(body.widget), who)
             receipt = await receipt_of_press(state, session, press)

@@ -16,7 +16,7 @@ from app.i18n import localized
 from app.panel.widgets.families import PressCommand
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
-from app.web.app_state import AppState, CurrentSession, CurrentState
+from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession
 from app.web.client_cookie import principal_of
 from app.web.language import language_of
 from app.web.openapi_parts import (
@@ -106,7 +106,7 @@ RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
     ),
 )
 async def press(
-    widget: str, request: Request, state: CurrentState, session: CurrentSession
+    widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
 ) -> Response:
     command = session.presses.widget(widget)
     who = principal_of(request, state)
@@ -117,7 +117,8 @@ async def press(
         return _answer(request, await receipt_of_press(state, session, pressed))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        return await pressed_by_form(state, session, PressForm(command, who, form_of(body), reader))
+        form = PressForm(command, who, form_of(body), reader)
+        return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
@@ -129,7 +130,7 @@ async def press(
     openapi_extra=described_body(Cancel, fields(_press={}), required=False),
 )
 async def cancel(
-    widget: str, request: Request, state: CurrentState, session: CurrentSession
+    widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
 ) -> Response:
     command = session.presses.widget(widget)
     who = principal_of(request, state)
@@ -147,7 +148,7 @@ async def cancel(
         refusals = session.presses.early_refusals
         receipt = refusals.limited(canceling, "cancel_too_often", shown=form)
     if form:
-        return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(state, page, widget, receipt.id), status_code=303)
     return _answer(request, receipt)
 
 

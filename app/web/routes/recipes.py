@@ -106,10 +106,11 @@ FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
 
 @router.get("/recipes", summary="The page of the first set of recipes", responses=errors(403, 404))
 async def first(state: CurrentState, session: CurrentSession) -> Response:
-    books = state.fleet.panel.recipe_loads
-    if not books:
+    loads = session.panel.recipe_loads or state.fleet.panel.recipe_loads
+    if not loads:
         raise NotFound("this panel has no recipes")
-    return RedirectResponse(f"{session.base}/recipes/{books[0].id}", status_code=303)
+    its = _session_of(state, session, loads[0].id)
+    return RedirectResponse(f"{its.base}/recipes/{loads[0].id}", status_code=303)
 
 
 @router.get(
@@ -130,7 +131,8 @@ async def as_csv(set: SetId, state: CurrentState) -> Response:
     "/recipes/{set}",
     response_class=HTMLResponse,
     summary="The page of a set of recipes",
-    responses=errors(403, 404, 422),
+    responses=errors(403, 404, 422)
+    | {303: {"description": "to the first robot that has it, of several"}},
 )
 async def page(
     set: SetId,
@@ -140,7 +142,9 @@ async def page(
     query: Annotated[RecipesQuery, Query()],
 ) -> Response:
     book = _book(state, set)
-    loads = state.fleet.panel.recipe_loads
+    if (its := _session_of(state, session, set)) is not session:
+        return RedirectResponse(f"{its.base}/recipes/{set}", status_code=303)
+    loads = session.panel.recipe_loads
     said = _said(session, query.act)
     context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
     shown = context["chosen"].id if context["chosen"] else ""
@@ -176,6 +180,7 @@ async def act(
     set: SetId, act: ActName, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     book, kind, content = _book(state, set), kind_of(request), await body_of(request)
+    session = _session_of(state, session, set)
     form = form_of(content) if kind == FORM else None
     body = (
         _form_body(book, act, form, language_of(request)) if form is not None else _body(kind, content)
@@ -206,6 +211,12 @@ def _book(state: AppState, set_id: str) -> RecipeBook:
     if book is None:
         raise NotFound(f'there are no recipes "{set_id:.64}" on this panel')
     return book
+
+
+def _session_of(state: AppState, session: RobotSession, set_id: str) -> RobotSession:
+    """The session of a robot that has the set: this one, else the first that has it."""
+    every = (session, *state.fleet.sessions)
+    return next(s for s in every if any(load.id == set_id for load in s.panel.recipe_loads))
 
 
 def _body(kind: str, content: bytes) -> RecipeActBody:
