@@ -56,7 +56,12 @@ def _changes(plan: Plan) -> Callable[[RecipeBooks, ActRequest], RecipeChange]:
         if isinstance(change, Text):
             return RecipeChange(change)
         note = _import_text(change) if isinstance(change, ImportChange) else None
-        if note and isinstance(change, ImportChange) and change.bad and not change.puts:
+        if (
+            isinstance(note, Text)
+            and isinstance(change, ImportChange)
+            and change.bad
+            and not change.puts
+        ):
             return RecipeChange(note)
         return RecipeChange(
             finish=books.write(book, author, change) if change.ids else None,
@@ -76,7 +81,7 @@ def _changed_text(book: RecipeBook, change: Change) -> TextLike:
     return differences_text(book.load.fields, change.differences) or say("recipe_no_change")
 
 
-def _import_text(change: ImportChange) -> Text:
+def _import_text(change: ImportChange) -> TextLike:
     created, changed, same = (number(str(n)) for n in (change.created, change.changed, change.same))
     said = say("recipe_imported", created=created, changed=changed, same=same)
     if not change.bad:
@@ -85,7 +90,7 @@ def _import_text(change: ImportChange) -> Text:
     if len(change.bad) > MOST_BAD:
         rows.append(say("recipe_more_bad_rows", number=len(change.bad) - MOST_BAD))
     refused = say("recipe_rows_refused", number=len(change.bad), rows=joined(rows, "between_sentences"))
-    return say("between_sentences", first=said, last=refused)
+    return joined((said, refused))
 
 
 def _version(values: Mapping[str, Any], name: str = "version") -> int:

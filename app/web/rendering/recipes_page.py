@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, TypedDict
 
 from app.clock import format_datetime
 from app.errors import InputError
-from app.i18n import Text, TextLike, number, say
+from app.i18n import Text, TextLike, joined, number, say
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, Input
 from app.panel.widgets.inputs import SelectInput, TextInput
@@ -214,7 +214,7 @@ def _history(load: RecipeLoad, recipe: Recipe) -> Sequence[HistoryRow]:
         changes = differences_text(load.fields, changed)
         if before is not None and before.name != version.name:
             renamed = say("recipe_change", label=say("recipe_name"), old=before.name, new=version.name)
-            changes = say("between_names", first=renamed, last=changes) if changed else renamed
+            changes = joined((renamed, changes), "between_names") if changed else renamed
         act, is_now = word(f"act_{version.act}"), version is recipe.now
         changes = changes if changed or before else changes or say("recipe_no_change")
         at = format_datetime(version.at)
