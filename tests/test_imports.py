@@ -95,6 +95,7 @@ OF_A_KIND: dict[tuple[str, ...], set[str]] = {
         "app.runtime.robot_access",
         "app.simulator.zenoh_wire",
         "app.transport.auto_peer",
+        "app.transport.rmw_zenoh_router",
     },
 }
 KNOWN_TO_THE_SIMULATOR = (

@@ -13,9 +13,8 @@ Rows = Mapping[str, tuple[str, str]]
 _LINKS: Final = sentences(ENGLISH)
 
 _UNREACHABLE: Final = (
-    "Check the cable, and that the bridge's machine is on. Then check that it listens there: "
-    "`listen` in "
-    "the bridge's file, `connect` in the Zenoh configuration"
+    "Check the cable, and that the bridge's machine is on. Then check that it listens there: `listen`"
+    " in the bridge's file, `connect` in the Zenoh configuration"
 )
 
 _LOST: Final = (
@@ -55,8 +54,7 @@ ERRORS: Final[Rows] = {
     ),
     "screen_small_targets": (
         "On the screen {about} a button of 20 mm is {real_mm} mm wide: it has {screen} mm for a pixel, "
-        "and the "
-        "panel file says {panel}.",
+        "and the panel file says {panel}.",
         "Set mm_per_px = {screen} in the panel file, then check that the pages still fit.",
     ),
     # The way to the robot
@@ -130,11 +128,9 @@ ERRORS: Final[Rows] = {
     ),
     "bridges_two": (
         "{number} bridges forward {about}: {zids}. Each message arrives, and each command acts, "
-        "more than "
-        "once.",
+        "more than once.",
         "Run one bridge for each robot: end the others, or give them another domain or allow-lists "
-        "that do "
-        "not overlap.",
+        "that do not overlap.",
     ),
     "bridge_denies": (
         "The bridge's file does not let {about} through.",

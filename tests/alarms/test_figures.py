@@ -126,6 +126,7 @@ def test_three_raises_in_more_than_a_minute_do_not_chatter() -> None:
     assert worst_burst([Activation(30.0 * n, math.inf) for n in range(3)]) is not None
 
 
+@pytest.mark.real_time
 def test_the_figures_of_100_000_rows_are_read_at_once(tmp_path: Path) -> None:
     rows = [event(DAY_S * n / MANY, f"a{n % 300}") for n in range(MANY)]
     figures = figures_of(tmp_path, rows)

@@ -130,7 +130,8 @@ def find_demo_faults(tables: Mapping[str, Any]) -> list[Fault]:
     """Faults of names in `[demo]` that nearly are names of the panel, whatever else is wrong in it."""
     demo = tables.get("demo")
     used = {text for key, table in tables.items() if key != "demo" for text in _texts(table)}
-    names = [name for name in (demo if isinstance(demo, Mapping) else ()) if name not in used]
+    bare = {text.strip("/") for text in used}
+    names = [n for n in (demo if isinstance(demo, Mapping) else ()) if n.strip("/") not in bare]
     near = {name: closest_name(name, [text for text in used if "/" in text]) for name in names}
     return [
         Fault(place_of(("demo", name)), f"the panel does not use {name}; did you mean {meant}?")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from app.errors import Fault
 from app.interfaces.validation import format_value
@@ -30,7 +30,11 @@ def _unique(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return values
 
 
-Groups = Annotated[tuple[str, ...], BeforeValidator(_parse_groups)]
+Groups = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_parse_groups),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
 Priorities = Annotated[
     tuple[Annotated[int, Field(ge=1, le=4)], ...], Field(strict=False), AfterValidator(_unique)
 ]

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
 from app import clock
 from app.commands.acts import ActReceipt, ActRequest
@@ -46,6 +46,9 @@ RecipeId = Annotated[str, Field(max_length=64)]
 OWN_FIELDS: Final = ("id", "recipe", "version", "to", "name", "csv")
 
 
+VALUES: Final = {"type": "object", "description": "values by the ids of inputs"}
+
+
 class RecipesQuery(BaseModel):
     """What the page shows; `act` is the id of an act, `receipt` that of a press, whose receipt is
     shown."""
@@ -70,7 +73,7 @@ class RecipeActBody(BaseModel):
     version: Annotated[int, Field(ge=0, lt=2**53)] | None = None
     to: Annotated[int, Field(ge=0, lt=2**53)] | None = None
     name: Annotated[str, Field(max_length=500)] | None = None
-    values: dict[str, JsonValue] | None = None
+    values: Annotated[dict[str, JsonValue], WithJsonSchema(VALUES)] | None = None
     csv: str | None = None
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     at: AwareDatetime | None = None
