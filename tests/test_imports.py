@@ -87,6 +87,7 @@ OF_A_KIND: dict[tuple[str, ...], set[str]] = {
         "app.runtime.robot_access",
         "app.simulator.zenoh_peer",
         "app.transport.auto_peer",
+        "app.transport.rmw_zenoh_router",  # reads the endpoints as a bridge's file has them
         "app.simulator.zenoh_wire",
     },
     ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
@@ -95,7 +96,6 @@ OF_A_KIND: dict[tuple[str, ...], set[str]] = {
         "app.runtime.robot_access",
         "app.simulator.zenoh_wire",
         "app.transport.auto_peer",
-        "app.transport.rmw_zenoh_router",
     },
 }
 KNOWN_TO_THE_SIMULATOR = (

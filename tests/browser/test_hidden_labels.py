@@ -55,13 +55,17 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
+HIDDEN_LABEL: Final = "label-title-only"  # that an input has no label which is seen, as the panel says
+
+
 def test_a_label_that_is_not_seen_is_still_the_name(bare: Server, page: Page) -> None:
     for described in load_panel(SHIPPED).pages:
         page.goto(f"{bare.url}/pages/{described.id}")
         expect(page.locator("[data-widget=stop] > button")).to_be_enabled()
         expect(page.locator(".unlabelled").first).to_be_attached()
         assert page.evaluate(SEEN) == [], described.id
-        assert violations(page, CHOICES["theme"][:1]) == [], described.id
+        others = [v for v in violations(page, CHOICES["theme"][:1]) if v[1] != HIDDEN_LABEL]
+        assert others == [], described.id
     page.goto(f"{bare.url}/pages/cell")
     for name in ("Start", "Pause", "Reset", "Pallet out", "Back"):
         button = page.locator(".unlabelled").get_by_role("button", name=name, exact=True)
