@@ -87,7 +87,7 @@ OF_A_KIND: dict[tuple[str, ...], set[str]] = {
         "app.runtime.robot_access",
         "app.simulator.zenoh_peer",
         "app.transport.auto_peer",
-        "app.transport.rmw_zenoh_router",  # reads the endpoints as a bridge's file has them
+        "app.transport.rmw_zenoh_router",  # a panel may look whether a bridge is there
         "app.simulator.zenoh_wire",
     },
     ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
