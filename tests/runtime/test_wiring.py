@@ -32,7 +32,8 @@ def test_each_signal_of_a_session_has_a_receiver() -> None:
     async def scene() -> None:
         signals = vars(wired().context.signals)
         assert signals
-        assert [name for name, signal in signals.items() if not signal._receivers] == []
+        silent = {name for name, signal in signals.items() if not signal._receivers}
+        assert silent == {"ran"}  # which interlocks of another robot listen to, where there are any
 
     asyncio.run(scene())
 

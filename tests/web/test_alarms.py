@@ -99,7 +99,7 @@ def test_the_most_urgent_is_the_line_and_the_events_bring_changes_only(cell: Ser
     assert shown["line"]["id"] == "air_latched"
     assert list(shown["rows"]) == ["air_latched", "air_low"]
     assert (shown["standing"], shown["unacknowledged"], shown["more"]) == (2, 2, 0)
-    assert shown["priorities"]["2"] == {"standing": 1, "unacknowledged": 1}
+    assert shown["priorities"]["2"] == {"standing": 1, "unacknowledged": 1, "raised": 1}
     with cell.stream() as stream:
         stream.next("snapshot")
         assert act(cell, "air_latched", "acknowledge", occurrence=1).status_code == 200
