@@ -53,7 +53,9 @@ def test_the_routers_unit_is_written_and_taken_back(host: Host, tmp_path: Path) 
     assert not any(f"enable {ROUTER}" in line for line in said)  # no zenohd is there
     apply(of_files(plan), host, str)
     assert f"zenohd --config {CONFIG}" in path_on(host, UNIT).read_text()
-    revert([step for step in uninstall_steps(host) if ROUTER in step.describe(host)], host, str)
+    revert(
+        [step for step in of_files(uninstall_steps(host)) if ROUTER in step.describe(host)], host, str
+    )
     assert not path_on(host, UNIT).exists()
 
 
