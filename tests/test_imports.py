@@ -65,6 +65,7 @@ COMMON = {
     "app.repeated_records",
     "app.ros_logging",
     "app.settings",
+    "app.toml_values",
     "app.version",
 }
 WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room

@@ -4,6 +4,7 @@ Messages are queued as they arrive. The queue, the entries of a message and the 
 no size that a message claims is trusted.
 """
 
+import logging
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,6 +25,8 @@ from app.panel.fault_catalogue import Catalogue, read_catalogue
 from app.panel.model import Panel
 from app.robot.sample import Sample
 from app.robot.slices import Slices
+
+log = logging.getLogger("kiosk.alarms")
 
 MAX_QUEUED: Final = 256  # messages of one alarm's topic; the oldest go
 MAX_QUEUED_BYTES: Final = 8_000_000
@@ -167,17 +170,24 @@ class PublishedAlarms:
     def _decode(self, until: float) -> bool:
         """Decodes until a time (monotonic seconds); returns whether nothing is left."""
         for source in self._sources:
-            if source.batch is None and (
-                decoded := source.is_pending and source.decode_one(self._slices, until)
-            ):
-                rows, sample = decoded
-                source.batch = _Batch(rows.values, sample.at, rows.total <= len(rows.values))
-            while source.batch is not None:
-                self._pass_on(source, source.batch)
-                if time.monotonic() >= until:
-                    break
+            try:
+                self._decode_some(source, until)
+            except Exception:  # the next message has another try; until then the alarms get old
+                log.exception("%s: a message could not be read as alarms", source.alarm.id)
+                source.walk = source.batch = None
         self._scheduled = any(source.is_pending for source in self._sources)
         return not self._scheduled
+
+    def _decode_some(self, source: _Source, until: float) -> None:
+        if source.batch is None and (
+            decoded := source.is_pending and source.decode_one(self._slices, until)
+        ):
+            rows, sample = decoded
+            source.batch = _Batch(rows.values, sample.at, rows.total <= len(rows.values))
+        while source.batch is not None:
+            self._pass_on(source, source.batch)
+            if time.monotonic() >= until:
+                break
 
     def _pass_on(self, source: _Source, batch: _Batch) -> None:
         """Passes on some of the entries of a message."""

@@ -57,7 +57,7 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Writes a configuration of a Zenoh router for a robot on rmw_zenoh: the robot's"
-        " nodes may do everything, and whoever connects where the panel does only what it needs.",
+        " nodes may do everything, and clients at the panel's endpoint only what the panel needs.",
         epilog="Start the router with it: zenohd -c router.json5",
     )
     add_options(parser, listen=f"{LISTEN[0]} for a panel on the same machine")

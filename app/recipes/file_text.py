@@ -1,8 +1,6 @@
 """The text of a recipe's file, in TOML, and a recipe from it. Pure."""
 
-import json
 import math
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -10,6 +8,7 @@ from typing import Any, Final, get_args
 
 from app.i18n import Text, say
 from app.recipes.recipe import LONGEST_NAME, MAX_VERSIONS, Act, BrokenRecipe, Recipe, Version
+from app.toml_values import key_text, value_text
 
 MOST_BYTES: Final = 1_000_000  # of a file
 MAX_DEPTH: Final = 4  # of lists and tables in a value
@@ -17,7 +16,6 @@ HEAD: Final = (
     "# A recipe of the operator panel. It is changed by the panel: stop that before you edit it.\n"
 )
 ACTS: Final = get_args(Act)
-PLAIN_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class RecipeFileError(ValueError):
@@ -98,23 +96,6 @@ def is_plain(value: Any, depth: int = 0) -> bool:
 def _version_lines(version: Version) -> Iterator[str]:
     at = datetime.fromtimestamp(version.at, UTC).isoformat(timespec="milliseconds")
     yield "\n[[version]]\n"
-    yield f"number = {version.number}\nat = {at}\nby = {_value(version.by)}\n"
-    yield f"act = {_value(version.act)}\nname = {_value(version.name)}\n[version.values]\n"
-    yield from (f"{_key(name)} = {_value(value)}\n" for name, value in version.values.items())
-
-
-def _key(name: str) -> str:
-    return name if PLAIN_KEY.fullmatch(name) else _value(name)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, str):
-        whole = value.encode(errors="replace").decode()  # TOML has no lone surrogates
-        return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
-    return "[" + ", ".join(map(_value, value)) + "]"
+    yield f"number = {version.number}\nat = {at}\nby = {value_text(version.by)}\n"
+    yield f"act = {value_text(version.act)}\nname = {value_text(version.name)}\n[version.values]\n"
+    yield from (f"{key_text(name)} = {value_text(value)}\n" for name, value in version.values.items())

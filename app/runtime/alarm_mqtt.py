@@ -205,7 +205,7 @@ class AlarmMqtt:
             try:
                 info.wait_for_publish(1.0)
             except (RuntimeError, ValueError):
-                log.info("the broker of alarms has not been told that the panel ends")
+                log.info("the panel's end could not be sent to the broker of alarms")
         client.disconnect()
         client.loop_stop()
 

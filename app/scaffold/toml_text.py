@@ -1,6 +1,5 @@
 """A draft as the text of a panel file, with comments for those who write their first one."""
 
-import json
 import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -8,6 +7,7 @@ from typing import Any, Final
 from app.printable import printable
 from app.scaffold.draft_parts import Draft, DraftWidget
 from app.scaffold.naming import id_of, label_of
+from app.toml_values import value_text
 
 WIDTH: Final = 100
 CHECK: Final = "operator-panel check"
@@ -47,19 +47,19 @@ def _head(draft: Draft) -> Iterator[str]:
         f" labels, units and limits of your own. `{CHECK} FILE` names every mistake with its line."
     )
     yield ""
-    yield f"title = {_value(draft.title)}"
+    yield f"title = {value_text(draft.title)}"
     yield 'mode = "live"'
-    yield f"distro = {_value(draft.distro)}  # of the robot's ROS 2"
+    yield f"distro = {value_text(draft.distro)}  # of the robot's ROS 2"
     if draft.interfaces:
-        yield f"interfaces = {_value(list(draft.interfaces))}  # packages with the robot's own types"
+        yield f"interfaces = {value_text(list(draft.interfaces))}  # with the robot's own types"
     for key, value in draft.reached.items() if not draft.robots else ():
-        yield f"{key} = {_value(value)}"
+        yield f"{key} = {value_text(value)}"
     if draft.namespace and not draft.robots:
-        yield f"namespace = {_value(draft.namespace)}  # it stands before each name below"
+        yield f"namespace = {value_text(draft.namespace)}  # it stands before each name below"
     for robot in draft.robots:
         yield ""
         yield "[[robot]]"
-        yield from (f"{key} = {_value(item)}" for key, item in robot.items())
+        yield from (f"{key} = {value_text(item)}" for key, item in robot.items())
 
 
 def _interlocks(draft: Draft) -> Iterator[str]:
@@ -80,10 +80,10 @@ def _interlocks(draft: Draft) -> Iterator[str]:
     )
     for interlock in draft.interlocks:
         yield "[[interlock]]"
-        yield f"id = {_value(interlock.id)}"
-        yield f"label = {_value(interlock.label)}"
-        yield f"topic = {_value(interlock.topic)}"
-        yield f"type = {_value(interlock.type)}"
+        yield f"id = {value_text(interlock.id)}"
+        yield f"label = {value_text(interlock.label)}"
+        yield f"topic = {value_text(interlock.topic)}"
+        yield f"type = {value_text(interlock.type)}"
         if interlock.nodes:
             yield from _comment(
                 f"It has several publishers, of which the last counts: {interlock.nodes}"
@@ -110,16 +110,16 @@ def _alarms(draft: Draft) -> Iterator[str]:
         own_id = id_of(row.topic, taken)
         taken.add(own_id)
         yield "[[alarm]]"
-        yield f"id = {_value(own_id)}"
-        yield from (f"{key} = {_value(value)}" for key, value in row.keys.items())
+        yield f"id = {value_text(own_id)}"
+        yield from (f"{key} = {value_text(value)}" for key, value in row.keys.items())
         yield ""
 
 
 def _page(page: str, own_id: str) -> Iterator[str]:
     yield ""
     yield "[[page]]"
-    yield f"id = {_value(own_id)}"
-    yield f"title = {_value(label_of(page))}"
+    yield f"id = {value_text(own_id)}"
+    yield f"title = {value_text(label_of(page))}"
 
 
 def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Iterator[str]:
@@ -129,11 +129,11 @@ def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Ite
         yield from _comment(entry.comment)
     if not live:
         yield from _comment("It acts on the robot. Uncomment it when you know what it does.")
-    body = ["[[page.widget]]", f"id = {_value(own_id)}", f"kind = {_value(entry.kind)}"]
+    body = ["[[page.widget]]", f"id = {value_text(own_id)}", f"kind = {value_text(entry.kind)}"]
     for key, value in entry.keys.items():
         body += _key(key, value)
     if entry.interlock:
-        body.append(f"interlock = {_value(entry.interlock)}")
+        body.append(f"interlock = {value_text(entry.interlock)}")
     elif entry.control:
         body.append('# interlock = "…": it needs one')
     yield from body if live else (f"# {line}" for line in body)
@@ -142,24 +142,10 @@ def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Ite
 def _key(key: str, value: Any) -> Iterator[str]:
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
         yield f"{key} = ["
-        yield from (f"  {_value(element)}," for element in value)
+        yield from (f"  {value_text(element)}," for element in value)
         yield "]"
     else:
-        yield f"{key} = {_value(value)}"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, str):
-        whole = value.encode(errors="replace").decode()  # TOML has no lone surrogates
-        return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, Mapping):
-        inner = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())
-        return f"{{ {inner} }}" if inner else "{}"
-    return f"[{', '.join(map(_value, value))}]"
+        yield f"{key} = {value_text(value)}"
 
 
 def _comment(text: str) -> list[str]:

@@ -179,7 +179,7 @@ def _kinds_of(tokens: Iterable[str], dialect: AutoDialect) -> set[Kind]:
 
 
 async def present_kinds(config: Config, domain: int) -> frozenset[Kind]:
-    """The `KindsThere` of a robot of which nobody said how it is reached."""
+    """The `KindsThere` of a robot whose dialect is not given."""
     dialect = AutoDialect(domain, any_hash)
     tokens = await in_own_thread(lambda: tokens_for_clients(config, _peers(dialect)))
     return frozenset(_kinds_of(tokens, dialect))

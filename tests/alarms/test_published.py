@@ -4,6 +4,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from app.alarms.entries import LONGEST_TEXT, AlarmEntry
 from app.alarms.published import CHUNK, MAX_QUEUED, MAX_STATUSES, PublishedAlarms
 from app.i18n import render
@@ -23,6 +25,7 @@ class Received:
     def __init__(self, panel: Panel) -> None:
         self.entries: list[AlarmEntry] = []
         self.whole: list[bool] = []
+        self.fails = False
         self.listener = PublishedAlarms(
             panel, "", INTERFACES, lambda topic: [topic.lstrip("/")], Slices(), self.receive
         )
@@ -35,6 +38,8 @@ class Received:
         is_whole: bool,
         earlier: Collection[str],
     ) -> None:
+        if self.fails:
+            raise RuntimeError("a fault of the program")
         self.entries += entries
         self.whole.append(is_whole)
         self.earlier = set(earlier)
@@ -156,3 +161,15 @@ def test_a_status_that_is_the_same_again_is_the_same_entry(tmp_path: Path) -> No
     assert first is second
     assert third is fourth
     assert (third.details, fifth.details) == ("load: 3 %", "load: 4 %")
+
+
+def test_after_a_message_that_can_not_be_passed_on_the_next_one_counts(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot = received(tmp_path, HEALTH)
+    robot.fails = True
+    robot.send({"name": "motor 1", "level": 2, "message": "Hot"})
+    assert "health: a message could not be read as alarms" in caplog.text
+    robot.fails = False
+    robot.send({"name": "motor 1", "level": 2, "message": "Burnt"})
+    assert [entry.text for entry in robot.entries] == ["Burnt"]

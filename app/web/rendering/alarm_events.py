@@ -91,8 +91,8 @@ def _event_word(row: HistoryRow) -> TextLike:
     if row.event in AFTER and row.lasted_s is not None:
         return say(f"alarms_event_{row.event}_after", duration=duration_text(row.lasted_s))
     if row.event in ("", "changed"):
-        words = STATE_WORDS.get(row.state)  # type: ignore[call-overload]
-        return say(words[0]) if words else row.state
+        words = {str(state): word for state, (word, _) in STATE_WORDS.items()}
+        return say(words[row.state]) if row.state in words else row.state
     return say(f"alarms_event_{row.event}")
 
 
