@@ -4,18 +4,26 @@ from dataclasses import dataclass
 
 from app.i18n import TextLike, render
 from app.permission.clients import Client
+from app.roles import ENGINEER, meets
 
 
 @dataclass(frozen=True, slots=True)
 class Principal:
     """Who asks for something: permissions, limits and log entries are per principal.
 
-    `client` is the browser or program. `user` is the name of the user who is logged in, "" while there
-    are no users.
+    `client` is the browser or program. `user` is the name of the user who is signed in, "" for nobody.
+    `role` is one of `ROLES`, `groups` are the panel's own groups that the user is in. While there are
+    no users, everybody is an engineer.
     """
 
     client: Client
     user: str = ""
+    role: str = ENGINEER
+    groups: frozenset[str] = frozenset()
+
+    def meets(self, needs: str) -> bool:
+        """Whether this principal has the role or is in the group `needs`; "" needs nothing."""
+        return meets(needs, self.role, self.groups)
 
     @property
     def name(self) -> TextLike:
