@@ -115,7 +115,7 @@ def take_for_readme(browser: Browser, url: str) -> None:
         expect(page.locator(".machine-state")).to_contain_text(word, timeout=CYCLE_MS)
         time.sleep(SETTLED_S)
 
-    start = page.locator("[data-widget=start] > button")
+    start = page.locator("[data-widget=start] > button:not(.more)")
     if start.is_enabled():
         start.click()
     state("RUNNING")

@@ -196,7 +196,7 @@ def test_axe_finds_nothing_in_dialogs(example: Server, page: Page) -> None:
         page.locator(opener).click()
         assert violations(page) == [], opener
         page.keyboard.press("Escape")
-    page.locator("[data-widget=reset] > button").click()
+    page.locator("[data-widget=reset] > button:not(.more)").click()
     expect(page.locator("dialog:popover-open")).to_be_visible()
     assert violations(page) == []
 
@@ -238,7 +238,7 @@ def test_every_control_is_reached_by_the_keyboard_in_order(
     def reached_and_open() -> tuple[list[int], list[int]] | None:
         """What Tab reaches and what is open; None where a lock came or fell in the meantime."""
         page.goto(example.url + path)
-        expect(page.locator(f"[data-widget={key}] > button")).to_be_enabled()
+        expect(page.locator(f"[data-widget={key}] > button:not(.more)")).to_be_enabled()
         expect(page.locator("[data-step]:visible").first).to_be_visible()
         expected = page.evaluate(CONTROLS)[0]
         reached = []
@@ -262,7 +262,7 @@ BOXES: Final = """() => [...document.querySelectorAll(
     const { width, height } = e.getBoundingClientRect();
     return [e.outerHTML.slice(0, 90), width, height];
   })"""
-MAIN_KEYS: Final = ".cell > .key > button, .action button"
+MAIN_KEYS: Final = ".cell > .key > button:not(.more), .action button"
 
 
 def test_touch_targets_are_large_enough(example: Server, page: Page) -> None:
@@ -279,7 +279,7 @@ def test_touch_targets_are_large_enough(example: Server, page: Page) -> None:
                 box = place(key)
                 assert box["height"] >= least - 0.5
                 assert box["width"] >= 20 / MM_PER_PX - 0.5
-            stop = place(page.locator(".frame-keys .key > button"))
+            stop = place(page.locator(".frame-keys .key > button:not(.more)"))
             assert min(stop["height"] / 12, stop["width"] / 18) * MM_PER_PX >= 1 - 0.01
 
 
@@ -307,7 +307,7 @@ def shifts(pages: Sequence[Page], url: str, states: Sequence[str]) -> list[list[
             if state == "online":
                 expect(page.locator("#state")).to_have_attribute("data-state", state)
             else:
-                button = page.locator("[data-widget=start] > button")
+                button = page.locator("[data-widget=start] > button:not(.more)")
                 expect(button).to_be_enabled(enabled=state == "permitted")
     return [] if any(page.evaluate("lost") for page in pages) else [p.evaluate("shifts") for p in pages]
 

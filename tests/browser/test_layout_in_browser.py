@@ -142,7 +142,7 @@ def test_the_header_shows_the_robots_name_whole_and_all_that_can_be_touched(show
 
 def take_control(page: Page) -> None:
     """The first browser at the cell has it already."""
-    button = page.locator('[data-widget="allow"] > button')
+    button = page.locator('[data-widget="allow"] > button:not(.more)')
     take = page.get_by_role("button", name="Take control")
     until(lambda: button.is_enabled() or take.is_visible(), "there is a way to control")
     if not button.is_enabled():
@@ -153,7 +153,7 @@ def take_control(page: Page) -> None:
 def test_confirmation_names_the_robot_and_empty_inputs(shown: Page) -> None:
     expect(shown.locator("html[data-floor]")).to_be_attached()
     take_control(shown)
-    dialog = asked(shown.locator('[data-widget="allow"] > button'))
+    dialog = asked(shown.locator('[data-widget="allow"] > button:not(.more)'))
     expect(dialog.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
     expect(dialog.locator("dd")).to_have_text("(empty)")
     yes, no = box(shown, "dialog:popover-open .yes"), box(shown, "dialog:popover-open .no")
@@ -175,14 +175,14 @@ def test_confirmation_question_is_the_same_without_scripts(demo: Server, without
     take = page.get_by_role("button", name="Take control")
     if take.is_visible():
         take.click()
-    page.locator('[data-widget="allow"] > button').click()
+    page.locator('[data-widget="allow"] > button:not(.more)').click()
     expect(page.get_by_role("heading", level=2)).to_have_text(f"{LONG} on {ROBOT}?")
     expect(page.get_by_text("SIMULATED ROBOT")).to_be_visible()
     expect(page.locator("dd")).to_have_text("(empty)")
 
 
 def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:
-    button = box(shown, '[data-widget="allow"] > button')
+    button = box(shown, '[data-widget="allow"] > button:not(.more)')
     assert button["y"] + 0.7 * button["height"] <= shown.evaluate("innerHeight")
     toggle = box(shown, '[data-widget="light"] i')
     assert button["y"] - toggle["y"] - toggle["height"] >= 4 / 0.22 - 1  # millimetres

@@ -292,7 +292,9 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
         "(one) => { one.textContent = 'Another.'; }"
     )
     expect(page.locator("#whole > p")).to_have_text("Another.")
-    page.locator("[data-widget=locked] > button").evaluate("(one) => { one.disabled = false; }")
+    page.locator("[data-widget=locked] > button:not(.more)").evaluate(
+        "(one) => { one.disabled = false; }"
+    )
     expect(page.locator("#whole")).to_be_hidden()
 
 
@@ -364,7 +366,7 @@ def test_the_state_of_the_robot_is_a_word_in_the_header(cell: Server, page: Page
     page.goto(f"{cell.url}/pages/setup")
     state = page.locator("#state")
     for enabled in (True, False):
-        button = page.locator('[data-widget="load"] > button')
+        button = page.locator('[data-widget="load"] > button:not(.more)')
         expect(button).to_be_enabled(enabled=enabled, timeout=40_000)
         expect(state).to_have_text("ONLINE")  # what is permitted is no state of the robot
         expect(state.locator("svg:visible")).to_have_count(1)

@@ -15,7 +15,7 @@ from tests.support.browser.touch import MM_PER_PX, PANEL, SIZES, overlap, permit
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
-STOP: Final = "[data-widget=stop] > button"
+STOP: Final = "[data-widget=stop] > button:not(.more)"
 PAUSE: Final = """
 [[frame.widget]]
 id = "pause"
@@ -180,7 +180,8 @@ def uncovered(page: Page) -> bool:
 # Parts of the rail that are below something else.
 COVERED: Final = """() => {
   const found = [];
-  for (const part of document.querySelectorAll(".pages, .frame-keys, .frame-keys > .key > button")) {
+  const parts = ".pages, .frame-keys, .frame-keys > .key > button:not(.more)";
+  for (const part of document.querySelectorAll(parts)) {
     const { left, top, right, bottom } = part.getBoundingClientRect();
     for (const x of [left + 2, (left + right) / 2, right - 2]) {
       for (const y of [top + 2, (top + bottom) / 2, bottom - 2]) {
@@ -199,8 +200,8 @@ def opened_parts(page: Page) -> Iterator[tuple[str, str]]:
     for opener, sheet in (
         (".menu-key", "#menu"),
         (".lamps", "#links"),
-        ("[data-widget=reset] > button", "dialog:popover-open"),
-        ("[data-widget=pause] > button", "dialog:popover-open"),
+        ("[data-widget=reset] > button:not(.more)", "dialog:popover-open"),
+        ("[data-widget=pause] > button:not(.more)", "dialog:popover-open"),
         ("#input-speed", ".keypad"),
         ("#input-order", ".keyboard"),
         ("#input-belt", ".keypad"),
@@ -237,7 +238,7 @@ def test_nothing_that_opens_reaches_the_rail_with_stop_in_its_lower_left_corner(
 
 
 def test_a_double_tap_of_a_frame_key_asks_once(page: Page, cell: Server) -> None:
-    page.locator("[data-widget=pause] > button").dblclick()
+    page.locator("[data-widget=pause] > button:not(.more)").dblclick()
     question = page.get_by_role("dialog", name="Pause")
     expect(question).to_be_visible()
     expect(page.locator("[data-widget=pause] .receipt")).to_be_empty()
@@ -310,17 +311,15 @@ def test_the_first_touch_on_a_dark_page_stops(touchscreen: Page, tmp_path: Path)
 
 @pytest.mark.real_time
 def test_a_touch_is_seen_within_50_ms(page: Page, cell: Server) -> None:
-    load = page.locator("[data-widget=load] > button")
+    load = page.locator("[data-widget=load] > button:not(.more)")
     touch = Touch(page)
 
     def felt() -> Any:
-        page.evaluate(
-            f"void (window.felt = ({FEELS})(document.querySelector('[data-widget=load] > button')))"
-        )
+        load.evaluate(f"(button) => void (window.felt = ({FEELS})(button))")
         touch.send("touchStart", middle(load))
         took = page.evaluate("window.felt")
         touch.send("touchCancel")
-        expect(page.locator("[data-widget=load] > button[data-down]")).to_have_count(0)
+        expect(page.locator("[data-widget=load] > button:not(.more)[data-down]")).to_have_count(0)
         return took
 
     assert sorted(felt() for _ in range(5))[2] < 50

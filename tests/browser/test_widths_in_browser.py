@@ -90,7 +90,7 @@ CUTS: Final = """(samples) => {
       delete each.dataset.said; // one reason for all its buttons, in place of the note
     }
     const root = widget ? document.querySelector(`[data-widget="${widget}"]`) : document;
-    const button = root.querySelector?.(".key > button, :scope > button");
+    const button = root.querySelector?.(".key > button:not(.more), :scope > button:not(.more)");
     const isLocked = button?.disabled;
     if (button) button.disabled = locked;
     if (widget) root.dataset.enabled = String(!locked);
