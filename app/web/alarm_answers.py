@@ -1,7 +1,7 @@
 """What clients send to `/alarms` and get from it."""
 
 import math
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
@@ -13,6 +13,7 @@ from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.receipts import Receipt
 from app.web.receipt_answer import ReceiptAnswer
+from app.web.rendering.alarm_choice import AlarmChoice, Show, Sort
 
 MAX_ACKNOWLEDGED: Final = 500  # alarms in one request
 MAX_OCCURRENCE: Final = 2**53
@@ -24,7 +25,9 @@ class AlarmQuery(BaseModel):
     for the history: of transitions before the number `before`, from `since` on and before `until`, with
     `text` in the alarm's id, texts or group or in the name of who acted, of a `priority` (0: all), a
     `robot` and a `group`. `alarm` is the id of one alarm: of the history, or whose details the page
-    shows. For the page only: `show` chooses what is listed, `act` the act whose receipt is shown."""
+    shows. The page lists alarms of such a `priority`, `robot` and `group` too. For the page only:
+    `show` chooses the states that are listed, `sort` their order, `act` the act whose receipt is
+    shown."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -37,7 +40,8 @@ class AlarmQuery(BaseModel):
     priority: Annotated[int, Field(ge=0, le=4)] = 0
     robot: Annotated[str, Field(max_length=64)] = ""
     group: Annotated[str, Field(max_length=400)] = ""
-    show: Literal["all", "unacknowledged", "shelved"] = "all"
+    show: Show = "all"
+    sort: Sort = "urgent"
     alarm: Annotated[str, Field(max_length=300)] = ""
     act: Annotated[str, Field(max_length=400)] = ""
 
@@ -52,6 +56,10 @@ class AlarmQuery(BaseModel):
             self.robot,
             self.group,
         )
+
+    def choice(self) -> AlarmChoice:
+        """What the page lists."""
+        return AlarmChoice(self.show, self.priority, self.group, self.robot, self.sort, self.alarm)
 
 
 class AlarmActBody(BaseModel):

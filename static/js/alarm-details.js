@@ -4,17 +4,17 @@ import { closest, find, setText } from "./show.js";
 
 const TEXTS = ["text", "state_text", "since_text", "value_text", "limit_text", "details"];
 
-/** @type {Map<string, Data>} */
-let rows = new Map();
-/** @type {Map<string, Data> | null} */
-let touched = null; // the rows on the screen when the finger went down on a button
+/** @type {{ rows: Map<string, Data>, listed: Data[] }} */
+let shown = { rows: new Map(), listed: [] };
+/** @type {typeof shown | null} */
+let touched = null; // what the screen showed when the finger went down on a button
 const details = document.querySelector("section.details");
 const chosen = document.querySelector("[data-alarm-details]")?.dataset.alarmDetails ?? "";
 
 addEventListener(
   "pointerdown",
   ({ target }) => {
-    touched = closest(target, "main button") ? new Map(rows) : null;
+    touched = closest(target, "main button") ? shown : null;
   },
   true,
 );
@@ -22,9 +22,10 @@ addEventListener("submit", ({ target }) => fill(closest(target, "form")), true);
 
 followLock(lockActs);
 
-/** @param {Map<string, Data>} shown */
-export function showDetails(shown) {
-  rows = shown;
+// `listed` are the rows that the list shows.
+/** @param {Map<string, Data>} rows @param {Data[]} listed */
+export function showDetails(rows, listed) {
+  shown = { rows: new Map(rows), listed };
   const row = rows.get(chosen);
   if (details && row) for (const name of TEXTS) setText(details.querySelector(`[data-text="${name}"]`), row[name]);
   const over = details?.querySelector(".over");
@@ -36,8 +37,8 @@ export function showDetails(shown) {
 function lockActs() {
   const { lock } = find(document, "form.alarm-line").dataset;
   const all = find(document, ".all-shown button");
-  all.disabled = isLocked() || ![...rows.values()].some(mayAcknowledge);
-  const acts = rows.get(chosen)?.acts ?? [];
+  all.disabled = isLocked() || !shown.listed.some(mayAcknowledge);
+  const acts = shown.rows.get(chosen)?.acts ?? [];
   for (const part of document.querySelectorAll("[data-act]:not([data-fixed])")) {
     const isPossible = acts.includes(part.dataset.act);
     if (isPossible) part.hidden = false;
@@ -55,16 +56,16 @@ function mayAcknowledge({ acts }) {
 // A form names the occurrences that the screen showed at the touch, not those of the page's loading or of now.
 /** @param {HTMLElement | null} form */
 function fill(form) {
-  const seen = touched ?? rows;
+  const seen = touched ?? shown;
   if (form?.matches(".all-shown")) {
     for (const input of form.querySelectorAll('[name^="occurrence."]')) input.remove();
-    for (const row of [...seen.values()].filter(mayAcknowledge)) {
+    for (const row of seen.listed.filter(mayAcknowledge)) {
       const input = document.createElement("input");
       Object.assign(input, { type: "hidden", name: `occurrence.${row.id}`, value: row.occurrence });
       form.append(input);
     }
   }
   const occurrence = form?.closest("[data-act]") && form.querySelector("input[name=occurrence]");
-  const row = seen.get(chosen);
+  const row = seen.rows.get(chosen);
   if (occurrence && row) occurrence.value = row.occurrence;
 }

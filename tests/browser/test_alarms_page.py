@@ -49,8 +49,61 @@ def test_the_list_follows_the_events_in_the_servers_order(cell: Server, page: Pa
     act(cell, "air_low", "shelve", reason="Tests", for_s=60)
     expect(first).to_have_attribute("data-alarm", "air_latched")
     expect(page.locator("li.alarm [data-text=state_text]").last).to_have_text("Shelved")
-    page.get_by_role("link", name="Shelved", exact=True).click()
+    page.get_by_role("link", name="Shelved 1", exact=True).click()
     expect(page.locator("li.alarm:visible")).to_have_count(1)
+
+
+def counts(page: Page) -> list[str]:
+    return page.locator(".choices [data-count]").all_text_contents()
+
+
+def test_the_choices_count_and_events_keep_the_filter(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms")
+    assert counts(page) == ["2", "2", "0"]
+    page.locator(".filters").click()
+    page.locator("#only-priority").select_option("2")
+    page.locator("#only-sort").select_option("newest")
+    page.locator(".filter-sheet button[type=submit]").click()
+    expect(page.locator(".filters")).to_have_text("Filter: Medium, Newest first")
+    started(page, page.url)
+    assert ids(page) == ["air_low"]
+    assert counts(page) == ["1", "1", "0"]
+    act(cell, "air_latched", "acknowledge", occurrence=1)
+    act(cell, "air_low", "shelve", reason="Tests", for_s=60)
+    expect(page.locator("li.alarm[data-state=shelved]")).to_have_count(1)
+    assert ids(page) == ["air_low"]
+    assert counts(page) == ["1", "0", "1"]
+    page.locator(".choices a", has_text="Unacknowledged").click()
+    started(page, page.url)
+    assert ids(page) == []
+    act(cell, "air_low", "unshelve")
+    expect(page.locator("li.alarm")).to_have_count(1)
+    assert "priority=2" in page.url
+    assert "sort=newest" in page.url
+
+
+def test_the_filter_works_without_scripts_and_follows_to_the_details(
+    cell: Server, without_scripts: Page
+) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/alarms?group=Air")
+    assert ids(page) == ["air_low"]
+    page.locator("li.alarm a").click()
+    assert page.url.endswith("/alarms?group=Air&alarm=air_low")
+    assert page.locator("[name^='occurrence.']").count() == 1
+    page.goto(f"{cell.url}/alarms?show=latched")
+    assert ids(page) == []
+    page.goto(f"{cell.url}/alarms?sort=priority")
+    assert ids(page) == ["air_latched", "air_low"]
+
+
+def test_acknowledge_all_shown_leaves_what_the_filter_hides(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms?priority=2")
+    page.wait_for_timeout(SECOND_TAP_MS)
+    page.locator(".all-shown button").click()
+    until(lambda: listed(cell)["air_low"]["acknowledged"], "it is acknowledged")
+    assert not listed(cell)["air_latched"]["acknowledged"]
+    expect(page.locator(".all-shown button")).to_be_disabled()
 
 
 def test_an_alarm_of_its_own_is_acknowledged_and_shelved_from_its_details(

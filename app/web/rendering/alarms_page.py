@@ -1,24 +1,26 @@
 """The page of alarms: its list, and the details of one alarm."""
 
-from typing import Final, Literal, TypedDict
+from typing import Final
 
 from app.alarms.rows import AlarmRow
 from app.alarms.shown import MAX_ROWS
 from app.i18n import Text, TextLike, number, render, say
 from app.web.app_state import AppState
+from app.web.rendering.alarm_choice import AlarmChoice, ChoiceContext, choice_context, shows
 
-Show = Literal["all", "unacknowledged", "shelved"]
 SHELF_MINUTES: Final = (15, 60, 120)
 REASONS: Final = ("maintenance", "repair", "sensor", "known")
 
 
-class AlarmsContext(TypedDict):
-    """The variables of `alarms.html`, beside those of the frame. `chosen` is the alarm whose details
-    are shown, None for none; `gone`: it was asked for and is no longer listed. `firsts` are the ids of
+class AlarmsContext(ChoiceContext):
+    """The variables of `alarms.html`, beside those of the frame. `details` is the address of an alarm's
+    details, up to its id, and `list_address` that of the list. `chosen` is the alarm whose details are
+    shown, None for none; `gone`: it was asked for and is no longer listed. `firsts` are the ids of
     alarms that others followed, `followers` those that followed the chosen one."""
 
     rows: list[AlarmRow]
-    show: Show
+    details: str
+    list_address: str
     chosen: AlarmRow | None
     gone: bool
     firsts: set[str]
@@ -33,20 +35,24 @@ def word(name: str) -> Text:
     return say(f"alarms_{name}")
 
 
-def alarms_context(state: AppState, show: Show, chosen: str, language: str) -> AlarmsContext:
+def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> AlarmsContext:
     """The alarms as they are now."""
     rows = state.fleet.alarms.rows()
-    of_id = {row["id"]: row for row in rows}
-    row = of_id.get(chosen)
-    shown = rows[:MAX_ROWS]
+    row = next((row for row in rows if row["id"] == choice.alarm), None)
+    taken = [row for row in rows if choice.takes(row)]
+    listed = choice.sorted((row for row in taken if shows(choice.show, row)), language)
+    shown = listed[:MAX_ROWS]
+    address = choice.address(alarm="")
     return AlarmsContext(
+        **choice_context(state.fleet.panel, choice, taken),
         rows=shown,
-        show=show,
+        details=f"alarms?{address}{'&' if address else ''}alarm=",
+        list_address=f"alarms?{address}" if address else "alarms",
         chosen=row,
-        gone=bool(chosen) and row is None,
+        gone=bool(choice.alarm) and row is None,
         firsts={follower["follows"] for follower in rows},
         followers=[follower for follower in rows if follower["follows"] == row["id"]] if row else [],
-        more=say("alarms_more", count=number(str(len(rows) - len(shown)))) if rows != shown else "",
+        more=say("alarms_more", count=number(str(len(listed) - len(shown)))) if listed != shown else "",
         steps=_lines(row["action"], language) if row else [],
         reasons=[word(f"reason_{name}") for name in REASONS],
         shelf_times=[

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Annotated, Any, Final
-from urllib.parse import quote, urlencode, urlsplit
+from urllib.parse import quote, urlsplit
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
@@ -112,10 +112,11 @@ async def alarms(
 
 def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     """The page of alarms, for a browser."""
-    shown = {"show": query.show, "alarm": query.alarm}
-    again = urlencode({name: value for name, value in shown.items() if value})
-    page = FramedPage("alarms.html", word("title"), alarms_page=f"alarms?{again}", vary="accept")
-    context = alarms_context(state, query.show, query.alarm, language_of(request))
+    choice = query.choice()
+    page = FramedPage(
+        "alarms.html", word("title"), alarms_page=f"alarms?{choice.address()}", vary="accept"
+    )
+    context = alarms_context(state, choice, language_of(request))
     return framed_page(request, state, page, {**context, "word": word})
 
 
