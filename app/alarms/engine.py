@@ -39,7 +39,7 @@ class AlarmEngine:
         on_transitions: Callable[[Sequence[Transition]], None],
     ) -> None:
         self._panel = panel
-        self._robots: dict[str, RobotState] = {}
+        self.robots: dict[str, RobotState] = {}
         self._clock = clock
         self._on_transitions = on_transitions
         self._began_at = clock().monotonic
@@ -60,7 +60,7 @@ class AlarmEngine:
 
     def add_robot(self, robot_id: str, robot: RobotState) -> None:
         """Adds the alarms of a robot by its id, "" for the only one without an id."""
-        self._robots[robot_id], self._by_robot[robot_id] = robot, []
+        self.robots[robot_id], self._by_robot[robot_id] = robot, []
         for definition in define(self._panel, robot_id):
             self._add(definition)
 
@@ -73,7 +73,7 @@ class AlarmEngine:
             return
         instance = self._keep(definition)
         for topic in alarm.evaluated_topics:
-            self._topics.listen(instance, self._robots[robot].possible_keys(topic))
+            self._topics.listen(instance, self.robots[robot].possible_keys(topic))
 
     def _keep(self, definition: Definition) -> AlarmInstance:
         alarm = self.alarms[definition.id] = AlarmInstance(definition)
@@ -118,8 +118,8 @@ class AlarmEngine:
     def evaluate(self, most: int = MAX_EVALUATED) -> None:
         """Evaluates the alarms that wait, and those whose time has come: `most` of them."""
         now = self._clock()
-        self._watch.expire(self._robots, now.monotonic)
-        self._waiting.update(dict.fromkeys(self._topics.take(self._robots, now.monotonic)))
+        self._watch.expire(self.robots, now.monotonic)
+        self._waiting.update(dict.fromkeys(self._topics.take(self.robots, now.monotonic)))
         while self._timers and self._timers[0][0] <= now.monotonic:
             at, alarm_id = heapq.heappop(self._timers)
             alarm = self.alarms[alarm_id]
@@ -180,7 +180,7 @@ class AlarmEngine:
         alarm = self._keep(definition)
         if definition.alarm.suppressed_while is not None:
             topic = definition.alarm.suppressed_while.topic
-            self._topics.listen(alarm, self._robots[definition.robot].possible_keys(topic))
+            self._topics.listen(alarm, self.robots[definition.robot].possible_keys(topic))
         self._entries[definition.robot, definition.alarm.id].append(alarm)
         return alarm
 
@@ -194,7 +194,7 @@ class AlarmEngine:
     def _evaluated(self, alarm: AlarmInstance, now: Moment) -> Iterator[Transition]:
         """Evaluates one alarm; returns its transitions."""
         definition, before = alarm.definition, alarm.status
-        lock, robot = alarm.lock, self._robots[definition.robot] if definition.is_of_robot else None
+        lock, robot = alarm.lock, self.robots[definition.robot] if definition.is_of_robot else None
         if robot is not None and not (robot.link_up and robot.graph.peers):
             alarm.heard_at = -math.inf  # what was published before a cut does not count after it
         reading = read_alarm(alarm, robot, now.monotonic, self._began_at)

@@ -193,11 +193,16 @@ class Alarm(Description):
         catalogue = self.listed.catalogue if self.listed else None
         return self.action is not None or catalogue is not None
 
+    @property
+    def limited_value(self) -> tuple[str, str] | None:
+        """The topic and field of the number that its limits are for; None without limits."""
+        return (self.topic, self.field) if self.source == "limits" and self.topic else None
+
     @cached_property
     def marked_values(self) -> tuple[tuple[str, str], ...]:
         """The topics and fields of the values that it is about: those of its limits and its
         condition."""
-        limited = [(self.topic, self.field)] if self.source == "limits" and self.topic else []
+        limited = [self.limited_value] if self.limited_value else []
         return (*limited, *([(self.when.topic, self.when.field)] if self.when else []))
 
     @property

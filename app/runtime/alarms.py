@@ -27,6 +27,7 @@ from app.audit.press_record import Log
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
+from app.runtime.alarm_curves import AlarmCurves
 from app.runtime.alarm_mqtt import AlarmMqtt
 from app.runtime.own_alarms import OwnAlarms
 from app.runtime.robot_alarms import RobotAlarms
@@ -52,6 +53,7 @@ class Alarms:
         self.engine = AlarmEngine(panel, now, self._receive)
         self.history = HistoryReader(None)
         self.counts = AlarmCounts()
+        self.curves = AlarmCurves(self.engine.robots, now)
         self._loop = asyncio.get_running_loop()
         self._disk: AlarmDisk | None = None
         self._loaded: asyncio.Future[None] = self._loop.create_future()
@@ -165,9 +167,7 @@ class Alarms:
                 robot.locks_changed.emit()
 
     def _plan(self) -> None:
-        due = self.engine.due
-        if due == 0.0:
-            due = time.monotonic()
+        due = self.engine.due or time.monotonic()
         if due >= self._due:
             return
         if self._due_timer is not None:
@@ -186,6 +186,7 @@ class Alarms:
             alarm = self.engine.alarms[transition.id]
             if self.counts.count(transition):
                 self._shown.count_raise(alarm, transition.at.monotonic)
+                self.curves.plan(alarm)
             row = history_row(alarm, transition)
             self.mqtt.put(row)
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
@@ -225,8 +226,7 @@ class Alarms:
         """Shows the changes that wait too long for the disk."""
         self._slow_timer = None
         since = time.monotonic() - SHOWN_WITHIN_S
-        last = max((change.seq for change in self._pending if change.since <= since), default=0)
-        self._show_until(last)
+        self._show_until(max((row.seq for row in self._pending if row.since <= since), default=0))
         if self._pending:
             wait_s = self._pending[0].since + SHOWN_WITHIN_S - time.monotonic()
             self._slow_timer = self._loop.call_later(max(SHOW_EVERY_S, wait_s), self._show_slow)

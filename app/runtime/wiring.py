@@ -223,8 +223,8 @@ def _recorder(
 
 
 def _trend_recorders(context: RobotContext) -> "Iterator[TrendRecorder]":
-    """The recorder of what trends show, if the panel has one."""
-    if trends_of(context.panel):
+    """The recorder of what trends show and alarms have limits for, if the panel has any."""
+    if trends_of(context.panel) or any(alarm.limited_value for alarm in context.panel.alarms):
         from app.trends.recorder import TrendRecorder
 
         yield TrendRecorder(context.panel, context.interfaces, context.robot)

@@ -1,4 +1,5 @@
-"""Records the fields that trends show, from each sample. Used on the event loop only.
+"""Records the fields that trends show, and those that alarms have limits for, from each sample. Used on
+the event loop only.
 
 Samples are kept undecoded for a moment, and decoded in slices of some milliseconds: whatever a robot
 publishes delays no press and no hold by more than a slice.
@@ -7,13 +8,14 @@ publishes delays no press and no hold by more than a slice.
 import asyncio
 import math
 import time
+from itertools import islice
 from typing import Any, Final, NamedTuple
 
 from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import FieldReader, Interfaces, has_key
 from app.panel.model import Panel
-from app.panel.widgets.trend import kept_fields, trends_of
+from app.panel.widgets.trend import RAW_S, kept_fields, trends_of
 from app.robot.history import FieldHistory
 from app.robot.sample import Sample
 from app.robot.slices import Slices
@@ -23,6 +25,7 @@ DECODE_AFTER_S: Final = 0.2
 MAX_PENDING: Final = 4_000  # samples that are not decoded yet
 MAX_PENDING_BYTES: Final = 16_000_000
 FORGET_EVERY: Final = 300  # decoded batches
+MAX_ALARMED: Final = 50  # fields that only alarms need: the others have no curve
 BETWEEN_CLOCK: Final = 32  # samples that are decoded between two looks at the clock
 
 
@@ -52,9 +55,9 @@ class TrendRecorder:
         self._batches = 0
         types = panel.subscriptions()
         by_topic: dict[str, list[str]] = {}
-        for (topic, field), trend in kept_fields(trends_of(panel)).items():
+        for (topic, field), (keep_s, max_age_s) in recorded_fields(panel).items():
             by_topic.setdefault(topic, []).append(field)
-            history = FieldHistory(trend.keep_s, trend.max_age_s)
+            history = FieldHistory(keep_s, max_age_s)
             robot.history.fields[robot.key(topic), field] = history
             self._fields.setdefault(robot.key(topic), []).append((field, history))
         for topic, fields in by_topic.items():
@@ -125,6 +128,16 @@ class TrendRecorder:
             if value is None and has_key(field) and not values.is_ambiguous(field):
                 continue  # another node's part of the list
             history.add(at, _number(value))
+
+
+def recorded_fields(panel: Panel) -> dict[tuple[str, str], tuple[float, float]]:
+    """(topic, field) → how long it is kept, and after which silence there is a gap, in seconds: of all
+    trends, and of the first alarms with limits."""
+    kept = kept_fields(trends_of(panel))
+    fields = {value: (trend.keep_s, trend.max_age_s) for value, trend in kept.items()}
+    limited = ((alarm.limited_value, alarm.max_age_s or math.inf) for alarm in panel.alarms)
+    added = {value: (RAW_S, max_age_s) for value, max_age_s in limited if value and value not in fields}
+    return fields | dict(islice(added.items(), MAX_ALARMED))
 
 
 def _number(value: Any) -> float:

@@ -107,7 +107,11 @@ def pen_columns(
     """The columns of a pen, in its unit."""
     history: History = robot.history
     field = history.fields[robot.key(pen.topic), pen.field]
-    columns = history.columns(field, begin, end, width)
+    return scaled_columns(history.columns(field, begin, end, width), pen)
+
+
+def scaled_columns(columns: Sequence[Column], pen: Pen) -> Sequence[Column]:
+    """Columns of a field, in the unit of its pen."""
     if (pen.scale, pen.offset) == (1.0, 0.0):
         return columns
     return [_scaled(column, pen) for column in columns]
@@ -123,15 +127,22 @@ def _finite(value: float) -> float:
     return min(max(value, -sys.float_info.max), sys.float_info.max)
 
 
-def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: float) -> Plot:
-    """The plot of columns from `begin` to `end`, which are seconds of the wall clock."""
+def draw(
+    widget: Trend,
+    columns: Sequence[Sequence[Column]],
+    begin: float,
+    end: float,
+    points: int = COLUMNS,
+) -> Plot:
+    """The plot of columns from `begin` to `end`, which are seconds of the wall clock; there is room for
+    so many `points` between them."""
     ends = {axis: value_range(widget, columns, axis) for axis in _axes(widget)}
 
     def place(value: float, axis: Axis = "left") -> float:
         low, high = ends[axis]
         return round(min(max((high - value) / (high - low), -0.5), 1.5) * 100, 2)
 
-    width = (end - begin) / COLUMNS
+    width = (end - begin) / points
     pens = list(enumerate(widget.pens))
     bands = [
         Band(i, place(pen.normal[1], pen.axis), round(low - place(pen.normal[1], pen.axis), 2))

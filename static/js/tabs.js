@@ -9,3 +9,12 @@ function show(number) {
 }
 
 for (const tab of tabs) tab.addEventListener("click", () => show(tab.dataset.shows));
+
+// An address that names a widget shows its group.
+function showNamed() {
+  const group = document.getElementById(location.hash.slice(1))?.closest("[data-group]");
+  if (group instanceof HTMLElement && tabs.length) show(group.dataset.group);
+}
+
+addEventListener("hashchange", showNamed);
+showNamed();

@@ -1,5 +1,6 @@
 """The page of alarms: its list follows the events, its acts are forms with a receipt."""
 
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,9 +14,41 @@ from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import DRAWN
 from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 from tests.web.test_alarms import act, listed, server_with
 
 SECOND_TAP_MS: Final = 800  # a form that is sent sooner after the page is a second tap
+TABS: Final = """
+title = "Cell"
+[[page]]
+id = "main"
+title = "Main"
+fit = true
+[[page.group]]
+title = "Oil"
+[[page.group.widget]]
+id = "oil"
+kind = "readout"
+label = "Oil"
+topic = "/oil"
+type = "std_msgs/msg/Float64"
+[[page.group]]
+title = "Air"
+[[page.group.widget]]
+id = "air"
+kind = "readout"
+label = "Air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+[demo]
+"/air" = { values = [4.5] }
+[[alarm]]
+id = "air_low"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "Air pressure low"
+low = 5.0
+"""
 
 
 @pytest.fixture
@@ -121,6 +154,34 @@ def test_an_alarm_of_its_own_is_acknowledged_and_shelved_from_its_details(
     assert not listed(cell)["air_latched"]["acknowledged"]
     page.goto(f"{cell.url}/alarms?alarm=air_latched")
     expect(page.get_by_role("button", name="Shelve")).to_be_disabled()
+
+
+def test_details_show_the_curve_and_lead_to_the_widget(cell: Server, page: Page) -> None:
+    started(page, f"{cell.url}/alarms?alarm=air_low")
+
+    def has_curve() -> bool:
+        page.reload()
+        return page.locator(".curve .line").count() == 1
+
+    until(has_curve, "its samples are in the history", every_s=0.3)
+    expect(page.locator(".curve-head")).to_contain_text("at the alarm 4.5 bar")
+    expect(page.locator(".curve .time")).to_have_text(["\N{MINUS SIGN}8 s", re.compile(":"), "+6 s"])
+    page.get_by_role("link", name="Go to Air").click()
+    expect(page).to_have_url(f"{cell.url}/pages/main#at-air")
+    ring = page.locator(".cell:target").evaluate("(cell) => getComputedStyle(cell).outlineStyle")
+    assert ring == "solid"
+    expect(page.locator(".cell:target [data-widget=air]")).to_be_visible()
+
+
+def test_a_way_to_a_widget_shows_its_group(tmp_path: Path, page: Page) -> None:
+    """On a small screen the groups of a page that fits take turns."""
+    with demo_server(tmp_path, TABS) as server:
+        until(lambda: len(listed(server)) == 1, "the alarm is raised")
+        sized(page, 800, 480)
+        started(page, f"{server.url}/alarms?alarm=air_low")
+        page.get_by_role("link", name="Go to Air").click()
+        expect(page.locator("[data-widget=air]")).to_be_visible()
+        expect(page.locator("[data-widget=oil]")).to_be_hidden()
 
 
 def test_forms_without_scripts_acknowledge(cell: Server, without_scripts: Page) -> None:

@@ -21,6 +21,8 @@ PREFIXES = (
     "alarms_span_",
     "alarms_event_",
     "alarms_report_",
+    "alarms_show_",
+    "alarms_sort_",
     "condition_",
     "diagnostics_",
     "look_",

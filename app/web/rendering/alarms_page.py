@@ -5,8 +5,10 @@ from typing import Final
 from app.alarms.rows import AlarmRow
 from app.alarms.shown import MAX_ROWS
 from app.i18n import Text, TextLike, number, render, say
+from app.panel.alarm_places import AlarmPlace, alarm_place
 from app.web.app_state import AppState
 from app.web.rendering.alarm_choice import AlarmChoice, ChoiceContext, choice_context, shows
+from app.web.rendering.alarm_curve import ShownCurve, shown_curve
 
 SHELF_MINUTES: Final = (15, 60, 120)
 REASONS: Final = ("maintenance", "repair", "sensor", "known")
@@ -15,14 +17,18 @@ REASONS: Final = ("maintenance", "repair", "sensor", "known")
 class AlarmsContext(ChoiceContext):
     """The variables of `alarms.html`, beside those of the frame. `details` is the address of an alarm's
     details, up to its id, and `list_address` that of the list. `chosen` is the alarm whose details are
-    shown, None for none; `gone`: it was asked for and is no longer listed. `firsts` are the ids of
-    alarms that others followed, `followers` those that followed the chosen one."""
+    shown, None for none; `gone`: it was asked for and is no longer listed. `place` is where a page
+    shows what it is about, `curve` that of its value. `firsts` are the ids of alarms that others
+    followed, `followers` those that followed the chosen one."""
 
     rows: list[AlarmRow]
     details: str
     list_address: str
     chosen: AlarmRow | None
     gone: bool
+    place: AlarmPlace | None
+    place_address: str
+    curve: ShownCurve | None
     firsts: set[str]
     followers: list[AlarmRow]
     more: TextLike
@@ -43,6 +49,13 @@ def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> Alarm
     listed = choice.sorted((row for row in taken if shows(choice.show, row)), language)
     shown = listed[:MAX_ROWS]
     address = choice.address(alarm="")
+    alarm = state.fleet.alarms.engine.alarms.get(choice.alarm) if row else None
+    place = (
+        alarm_place(state.fleet.panel, alarm.definition.alarm, alarm.definition.robot)
+        if alarm
+        else None
+    )
+    curve = state.fleet.alarms.curves.of_alarm(alarm) if alarm else None
     return AlarmsContext(
         **choice_context(state.fleet.panel, choice, taken),
         rows=shown,
@@ -50,6 +63,9 @@ def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> Alarm
         list_address=f"alarms?{address}" if address else "alarms",
         chosen=row,
         gone=bool(choice.alarm) and row is None,
+        place=place,
+        place_address=_address(state, place, row["robot"]) if place and row else "",
+        curve=shown_curve(alarm, curve) if alarm and curve else None,
         firsts={follower["follows"] for follower in rows},
         followers=[follower for follower in rows if follower["follows"] == row["id"]] if row else [],
         more=say("alarms_more", count=number(str(len(listed) - len(shown)))) if listed != shown else "",
@@ -60,6 +76,12 @@ def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> Alarm
             for minutes in SHELF_MINUTES
         ],
     )
+
+
+def _address(state: AppState, place: AlarmPlace, robot: str) -> str:
+    """The path of a widget on its page, of a robot."""
+    base = state.fleet.of_robot(robot).base
+    return f"{base}/pages/{place.page.id}#at-{place.widget.id}"
 
 
 def _lines(text: TextLike, language: str) -> list[str]:
