@@ -23,6 +23,7 @@ from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
 from app.audit.readers import Readers
 from app.audit.refusal_quota import SUMMARY_INTERVAL_S, RefusalQuota
+from app.audit.start_record import StartRecord
 from app.audit.ticket import Limits, Results, Ticket
 from app.errors import LogError
 from app.i18n import ENGLISH, TextLike, number, say
@@ -37,7 +38,9 @@ ENDED_WITHIN_S: Final = 10.0
 class OperatorLog:
     """The log of one server, in its own folder. Used on the event loop only."""
 
-    def __init__(self, folder: Path, limits: Limits, mode: str = "live") -> None:
+    def __init__(
+        self, folder: Path, limits: Limits, mode: str = "live", record: StartRecord | None = None
+    ) -> None:
         self.folder = folder
         self._limits = limits
         self._folder = DataDir(folder)
@@ -47,7 +50,9 @@ class OperatorLog:
         self._loop = asyncio.get_running_loop()
         self._refusals = RefusalQuota()
         self._summary_timer: asyncio.TimerHandle | None = None
-        self._writer = LogWriter(self._folder, limits, secrets.token_hex(4), mode, self._post_results)
+        self._writer = LogWriter(
+            self._folder, limits, secrets.token_hex(4), mode, self._post_results, record
+        )
 
     async def start(self) -> None:
         """Opens the log; FolderInUse if another server has the folder. Any other error becomes `fault`,

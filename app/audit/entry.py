@@ -17,6 +17,7 @@ from app.i18n import ENGLISH, TextLike, render, text_in
 
 Kind = Literal[
     "began",
+    "changed",
     "pressed",
     "closed",
     "corrected",

@@ -16,7 +16,8 @@ from typing import Final
 from app.audit.data_dir import DataDir
 from app.audit.database import Head, as_log_error
 from app.audit.entry import Entry, new_entry
-from app.audit.opening import Opening, unfinished_entries
+from app.audit.opening import Opening, start_entries, unfinished_entries
+from app.audit.start_record import StartRecord
 from app.audit.store import Store
 from app.audit.syncer import Syncer
 from app.audit.ticket import Limits, Repeated, Results, Ticket
@@ -65,13 +66,15 @@ class LogWriter:
         boot: str,
         mode: str,
         report: Callable[[Results, bool], None],
+        record: StartRecord | None = None,
     ) -> None:
         """`report` is called on the writer or sync thread with results, and whether `fault` has
-        changed."""
+        changed. `record` makes the entries about this start."""
         self._folder = folder
         self._limits = limits
         self._mode = mode
         self._report = report
+        self._record = record
         self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
@@ -203,12 +206,13 @@ class LogWriter:
         entries = [*self._opening.first_entries(store, self.head), *self._unwritten]
         if not self._start_logged:
             entries += unfinished_entries(store)
-            values = {"mode": self._mode}
-            entries.append(new_entry("began", values=values, reason=say("log_began")))
+            entries += start_entries(store, self._mode, self._record)
         if self.fault:
             text = say("log_resumed", since=self._fault_since, why=self.fault)
             entries.append(new_entry("resumed", reason=text))
-        store.append(entries)
+        for entry in store.append(entries):
+            if entry.kind == "began":
+                store.mark_start(entry.seq)
         self._opening.mark_written()
         self._unwritten.clear()
         self._start_logged = True

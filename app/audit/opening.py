@@ -1,11 +1,14 @@
 """Opens the file of the operator's log, and makes the first entries after that."""
 
+import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from app.audit.database import NAME, Head, as_log_error, make_room, set_aside
 from app.audit.entry import Entry, new_entry
+from app.audit.start_record import StartRecord
 from app.audit.store import Store
 from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, joined, say
@@ -89,3 +92,17 @@ def unfinished_entries(store: Store) -> Sequence[Entry]:
         )
         for entry in store.undone()
     ]
+
+
+def start_entries(store: Store, mode: str, record: StartRecord | None) -> Sequence[Entry]:
+    """The entry of this start, and those about what has changed since the last one."""
+    values: dict[str, Any] = {"mode": mode}
+    changed: Sequence[Entry] = ()
+    if record is not None:
+        try:
+            about, changed = record.make(json.loads(store.last_start()).get("files", ""))
+            values |= about
+        except Exception:  # the panel starts all the same, and its log says that this is missing
+            log.exception("the files of this start are not in the operator's log")
+            values["kept"] = False
+    return [new_entry("began", values=values, reason=say("log_began")), *changed]

@@ -99,6 +99,19 @@ class Store:
             row = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
         return bool(row and row[0])
 
+    def last_start(self) -> str:
+        """The values of the entry of the last start, as JSON; "{}" without one."""
+        query = """SELECT "values" FROM entry WHERE kind = 'began' AND seq =
+            (SELECT value FROM about WHERE key = 'start')"""
+        with as_log_error():
+            row = self._db.execute(query).fetchone()
+        return str(row[0]) if row else "{}"
+
+    def mark_start(self, seq: int) -> None:
+        """Notes the number of the entry of this start."""
+        with as_log_error():
+            self._db.execute("INSERT OR REPLACE INTO about VALUES ('start', ?)", (seq,))
+
     def remove_old(self, days: float, size_mb: float, now_ms: int) -> bool:
         """Removes some of the oldest entries if they are too old or too many; returns whether it did.
 

@@ -4,10 +4,14 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 from app.alarms.state_times import NAME as STATES
 from app.audit import Limits, NullLog, OperatorLog
+from app.audit.kept_files import KeptFiles
+from app.audit.start_files import read_start_files
+from app.audit.start_record import StartRecord
 from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.panel.widgets.trend import trends_of
@@ -47,7 +51,8 @@ async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLo
     oplog: OperatorLog | NullLog = NullLog(folder)
     if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
-        oplog = OperatorLog(folder, limits, mode)
+        read = partial(read_start_files, settings, panel, mode)
+        oplog = OperatorLog(folder, limits, mode, StartRecord(KeptFiles(folder), read, panel.revision))
     await oplog.start()
     try:
         yield oplog

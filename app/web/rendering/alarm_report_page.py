@@ -33,7 +33,8 @@ COUNTED: Final = 500  # presses at most
 DAY_S: Final = 86_400.0
 SHIFTS: Final = ("this", "last", "previous")
 MARKS: Final = 4
-LEFT_OUT: Final = frozenset({"began", "resumed", "removed"})  # entries that no operator made
+# Entries that no operator made.
+LEFT_OUT: Final = frozenset({"began", "changed", "signed", "resumed", "removed"})
 
 
 class ReportQuery(BaseModel):

@@ -16,9 +16,11 @@ from app.printable import printable
 
 OUTCOMES: Final = (
     "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
-    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "recipe", "began", "resumed",
-    "removed",
+    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "recipe", "began", "changed",
+    "signed", "resumed", "removed",
 )  # fmt: skip
+HASH: Final = re.compile(r"[0-9a-f]{64}")
+HASH_SHOWN: Final = 12  # characters; the CSV has all
 NAMES: Final = ("browser", "browser_local", "browser_more", "browser_unknown", "others", "unknown")
 
 
@@ -83,6 +85,6 @@ def values_of(text: str, language: str) -> list[tuple[str, str]]:
 
 def _value_of(value: Any, language: str) -> str:
     if isinstance(value, str):
-        return printable(value)
+        return f"{value[:HASH_SHOWN]}…" if HASH.fullmatch(value) else printable(value)
     text = json.dumps(value, ensure_ascii=False)
     return number_in(text, language) if isinstance(value, float) else printable(text)

@@ -1,0 +1,135 @@
+"""The files and settings that a server starts with, by their hashes: its manifest."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from app.audit.kept_files import list_digest, sha256
+from app.i18n.catalogue import files as catalogues
+from app.panel import Panel
+from app.settings import PACKAGE, Settings, shipped_path
+from app.version import installed_version
+
+DEFINITIONS: Final = re.compile(r".*\.(msg|srv|action)")
+MOST_DEFINITIONS: Final = 2000
+PROGRAM: Final = re.compile(r".*\.(py|po|json|toml|html|js|css|svg)")
+SECRET: Final = re.compile(r"(?i)password|passwd|secret|token|\bpin\b|_pin\b|private|credential")
+USER_IN_URL: Final = re.compile(r"(?<=//)[^/@\s]+@")
+HIDDEN: Final = "…"
+
+# The groups of files, in the order in which they are kept. The Zenoh file may have a password and the
+# program is in its wheel: of these only the hash is.
+PANEL: Final = "panel"
+KEPT: Final = (PANEL, "templates", "styles", "definitions", "catalogues", "pictures")
+GROUPS: Final = (*KEPT, "zenoh", "program")
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """The version, the settings as text, and group → name of a file → SHA-256."""
+
+    version: str
+    settings: Mapping[str, str]
+    files: Mapping[str, Mapping[str, str]]
+
+    def as_json(self) -> bytes:
+        about = {"version": self.version, "settings": self.settings, "files": self.files}
+        return json.dumps(about, ensure_ascii=False, sort_keys=True, indent=1).encode()
+
+    def digests(self) -> dict[str, str]:
+        """One hash for the settings and for each group with files: that of the file itself for the
+        panel file and the Zenoh file, else that of their list."""
+        own: dict[str, str] = {}
+        for group, files in self.files.items():
+            alone = group in (PANEL, "zenoh") and len(files) == 1
+            own[group] = next(iter(files.values())) if alone else list_digest(files.items())
+        text = "".join(f"{name}={value}\n" for name, value in sorted(self.settings.items()))
+        return {name: digest for name, digest in own.items() if digest} | {
+            "settings": sha256(text.encode())
+        }
+
+
+def parse_manifest(data: bytes) -> Manifest:
+    """ValueError if that is not a manifest."""
+    about = json.loads(data)
+    try:
+        return Manifest(str(about["version"]), dict(about["settings"]), dict(about["files"]))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"not a list of files: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class StartFiles:
+    """A manifest, with the contents of the files that are kept: SHA-256 → bytes."""
+
+    manifest: Manifest
+    contents: Mapping[str, bytes]
+
+
+def read_start_files(settings: Settings, panel: Panel, mode: str) -> StartFiles:
+    """Reads all files. One that can't be read has the error in place of its hash. Blocks."""
+    contents: dict[str, bytes] = {}
+    files: dict[str, dict[str, str]] = {}
+    for group, name, path in _paths(settings, panel):
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            files.setdefault(group, {})[name] = f"unreadable: {error.strerror}"
+            continue
+        digest = sha256(data)
+        files.setdefault(group, {})[name] = digest
+        if group in KEPT:
+            contents[digest] = data
+    return StartFiles(Manifest(installed_version(), settings_text(settings, mode), files), contents)
+
+
+def settings_text(settings: Settings, mode: str) -> dict[str, str]:
+    """The settings in force as text, by the names of their variables; secrets are hidden."""
+    values = {
+        "KIOSK_PANEL": settings.panel,
+        "KIOSK_ZENOH": settings.zenoh,
+        "KIOSK_MODE": mode,
+        "KIOSK_DATA": settings.data or "",
+        "KIOSK_HOSTS": ",".join(settings.hosts),
+        "KIOSK_PROXIES": ",".join(settings.proxies),
+        "KIOSK_ROOT_PATH": settings.root_path,
+        "KIOSK_LOG_LEVEL": settings.log_level,
+        "KIOSK_DEV": "1" if settings.dev else "",
+    }
+    return {name: without_secret(name, str(value)) for name, value in values.items()}
+
+
+def without_secret(name: str, text: str) -> str:
+    """The text as it may be logged: not a secret, and not what stands before @ in an address."""
+    return HIDDEN if text and SECRET.search(name) else USER_IN_URL.sub(f"{HIDDEN}@", text)
+
+
+def _paths(settings: Settings, panel: Panel) -> Iterator[tuple[str, str, Path]]:
+    """Group, name and path of each file. Those of the panel have the name that the panel file has for
+    them."""
+    beside = settings.panel.parent
+    yield PANEL, settings.panel.name, settings.panel
+    for group, own in (("templates", panel.templates), ("styles", panel.styles)):
+        yield from ((group, _name(path, beside), path) for path in own)
+    for folder in panel.interfaces:
+        paths = sorted(path for path in Path(folder).rglob("*") if DEFINITIONS.fullmatch(path.name))
+        for path in paths[:MOST_DEFINITIONS]:
+            yield "definitions", _name(path, beside), path
+    for tag, path in catalogues().items():
+        yield "catalogues", f"{tag}.po", Path(path)
+    yield from (("pictures", name, path) for name, path in panel.picture_files.items())
+    yield "zenoh", settings.zenoh.name, settings.zenoh
+    for root in (PACKAGE, shipped_path("templates"), shipped_path("static")):
+        for path in sorted(root.rglob("*")):
+            if PROGRAM.fullmatch(path.name) and path.is_file():
+                yield "program", f"{root.name}/{path.relative_to(root)}", path
+
+
+def _name(path: Path, beside: Path) -> str:
+    try:
+        return str(path.relative_to(beside))
+    except ValueError:
+        return str(path)
