@@ -18,9 +18,24 @@ PACKAGE = Path(__file__).resolve().parent
 LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
 ROOT_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)*")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
+SYSLOG = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::([0-9]{1,5}))?")
+SYSLOG_PORT = 6514  # RFC 5425
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 PREFIX = "KIOSK_"
-VARIABLES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "ROOT_PATH", "LOG_LEVEL", "DEV")
+VARIABLES = (
+    "PANEL",
+    "ZENOH",
+    "MODE",
+    "DATA",
+    "HOSTS",
+    "PROXIES",
+    "ROOT_PATH",
+    "LOG_LEVEL",
+    "DEV",
+    "LOG_COPY",
+    "SYSLOG",
+    "SYSLOG_CA",
+)
 
 
 def shipped_path(name: str) -> Path:
@@ -42,6 +57,9 @@ class Settings:
     log_level: str = "info"
     dev: bool = False
     data: Path | None = None
+    log_copy: Path | None = None
+    syslog: tuple[str, int] | None = None
+    syslog_ca: Path | None = None
 
     def data_folder(self, mode: Mode) -> Path:
         """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""
@@ -66,6 +84,9 @@ class Settings:
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
             data=_parse_path(env, "KIOSK_DATA", None),
+            log_copy=_parse_path(env, "KIOSK_LOG_COPY", None),
+            syslog=_parse_syslog(env.get("KIOSK_SYSLOG", "")),
+            syslog_ca=_parse_path(env, "KIOSK_SYSLOG_CA", None),
         )
 
 
@@ -130,6 +151,20 @@ def _parse_proxies(text: str) -> Iterator[str]:
                 "127.0.0.1 or 192.0.2.0/24"
             ) from None
         yield proxy
+
+
+def _parse_syslog(text: str) -> tuple[str, int] | None:
+    """Host and port; an IPv6 address is in brackets."""
+    if not text:
+        return None
+    match = SYSLOG.fullmatch(text)
+    port = int(match[2] or SYSLOG_PORT) if match else 0
+    if match is None or not 1 <= port <= 65_535:
+        raise SettingsError(
+            f'KIOSK_SYSLOG is "{text}": it must be a host and a port such as log.plant:6514; the'
+            " messages go over TLS"
+        )
+    return match[1].strip("[]"), port
 
 
 @overload

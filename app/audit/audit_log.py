@@ -39,7 +39,12 @@ class OperatorLog:
     """The log of one server, in its own folder. Used on the event loop only."""
 
     def __init__(
-        self, folder: Path, limits: Limits, mode: str = "live", record: StartRecord | None = None
+        self,
+        folder: Path,
+        limits: Limits,
+        mode: str = "live",
+        record: StartRecord | None = None,
+        signs: bool = False,
     ) -> None:
         self.folder = folder
         self._limits = limits
@@ -51,7 +56,7 @@ class OperatorLog:
         self._refusals = RefusalQuota()
         self._summary_timer: asyncio.TimerHandle | None = None
         self._writer = LogWriter(
-            self._folder, limits, secrets.token_hex(4), mode, self._post_results, record
+            self._folder, limits, secrets.token_hex(4), mode, self._post_results, record, signs
         )
 
     async def start(self) -> None:
@@ -88,6 +93,16 @@ class OperatorLog:
     def head(self) -> Head | None:
         """The newest entry; None until the log is open."""
         return self._writer.head
+
+    @property
+    def synced_seq(self) -> int:
+        """Entries up to this number are on the disk."""
+        return self._writer.synced_seq
+
+    @property
+    def key(self) -> str:
+        """The public key that signs the log, "" if none does or the log is not open yet."""
+        return self._writer.public_key if self.head else ""
 
     @property
     def fault(self) -> TextLike:

@@ -18,6 +18,7 @@ from app.i18n import ENGLISH, TextLike, render, text_in
 Kind = Literal[
     "began",
     "changed",
+    "signed",
     "pressed",
     "closed",
     "corrected",

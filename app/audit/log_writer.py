@@ -16,6 +16,7 @@ from typing import Final
 from app.audit.data_dir import DataDir
 from app.audit.database import Head, as_log_error
 from app.audit.entry import Entry, new_entry
+from app.audit.log_key import Signer
 from app.audit.opening import Opening, start_entries, unfinished_entries
 from app.audit.start_record import StartRecord
 from app.audit.store import Store
@@ -67,17 +68,20 @@ class LogWriter:
         mode: str,
         report: Callable[[Results, bool], None],
         record: StartRecord | None = None,
+        signs: bool = False,
     ) -> None:
         """`report` is called on the writer or sync thread with results, and whether `fault` has
-        changed. `record` makes the entries about this start."""
+        changed. `record` makes the entries about this start. `signs`: with the key in the folder."""
         self._folder = folder
         self._limits = limits
         self._mode = mode
         self._report = report
         self._record = record
+        self._signer = Signer(folder.path) if signs else None
         self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
+        self.synced_seq = 0  # entries up to this number are on the disk
         self._writer: DiskWriter[Ticket] = DiskWriter("operators-log", self, most=MOST_WAITING)
         self._unwritten: deque[Entry] = deque(maxlen=MAX_UNWRITTEN)
         self._opening = Opening(folder.path, boot)
@@ -90,7 +94,7 @@ class LogWriter:
         self._since_tidy = 0
         self._fresh_wal = True
         self._clock = ClockSteadiness()
-        self._syncer = Syncer(lambda results: self._report(results, False), self._sync_failed)
+        self._syncer = Syncer(self._synced, self._sync_failed)
 
     # On the event loop.
 
@@ -118,6 +122,8 @@ class LogWriter:
         self._store = store = self._opening.store(self.head)
         self._syncer.set_store(store)
         store.probe()
+        if self._start_logged and self._signer:
+            self._signer.sign(store, "again")
         self._write_first_entries(store)
         self._check(store)
         self._fresh_wal, self._hourly_at = False, 0.0
@@ -165,6 +171,9 @@ class LogWriter:
     def close(self, error: LogError | None) -> None:
         if error is None:
             self._syncer.end(IDLE_S * 5)
+            if self._signer and self._store:
+                self.head = self._signer.sign_end(self._store)
+                self.synced_seq = self.head.seq
         self._close_store(complete=isinstance(error, LogGone))
         if error is None:
             return
@@ -206,7 +215,7 @@ class LogWriter:
         entries = [*self._opening.first_entries(store, self.head), *self._unwritten]
         if not self._start_logged:
             entries += unfinished_entries(store)
-            entries += start_entries(store, self._mode, self._record)
+            entries += start_entries(store, self._mode, self._record, self.public_key)
         if self.fault:
             text = say("log_resumed", since=self._fault_since, why=self.fault)
             entries.append(new_entry("resumed", reason=text))
@@ -218,6 +227,12 @@ class LogWriter:
         self._start_logged = True
         self.head = store.head
         store.sync()
+        self.synced_seq = store.head.seq
+
+    @property
+    def public_key(self) -> str:
+        """The key that signs, "" without one."""
+        return self._signer.public if self._signer else ""
 
     def _remove_old(self, store: Store) -> None:
         now = time.monotonic()
@@ -230,7 +245,10 @@ class LogWriter:
         self._fresh_wal = self._fresh_wal and not more
         self.head = store.head
         if now >= self._hourly_at and not more:
+            if self._signer:
+                self._signer.sign(store, "hour")
             self._hourly_at = now + HOUR_S
+            self.head = store.head
             log.info(
                 "operator's log: %d entries, head %s (for `log verify --head`)",
                 self.head.count,
@@ -257,6 +275,10 @@ class LogWriter:
                 log.error("the operator's log could not be closed: %s", error)
 
     # On the sync thread.
+
+    def _synced(self, results: Results) -> None:
+        self.synced_seq = max(entry.seq for _, entry in results if isinstance(entry, Entry))
+        self._report(results, False)
 
     def _sync_failed(self, results: Results) -> None:
         """Reports the failure; the writer thread then closes the file."""

@@ -24,6 +24,8 @@ class NullLog:
     fault: TextLike = ""
     lock: TextLike = ""
     head: Head | None = None
+    key = ""
+    synced_seq = 0
     left_out = 0
 
     def __init__(self, folder: Path | None = None) -> None:

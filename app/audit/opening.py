@@ -94,9 +94,12 @@ def unfinished_entries(store: Store) -> Sequence[Entry]:
     ]
 
 
-def start_entries(store: Store, mode: str, record: StartRecord | None) -> Sequence[Entry]:
-    """The entry of this start, and those about what has changed since the last one."""
-    values: dict[str, Any] = {"mode": mode}
+def start_entries(
+    store: Store, mode: str, record: StartRecord | None, key: str = ""
+) -> Sequence[Entry]:
+    """The entry of this start, and those about what has changed since the last one. `key` is the public
+    key that signs the log, "" without one."""
+    values: dict[str, Any] = {"mode": mode} | ({"key": key} if key else {})
     changed: Sequence[Entry] = ()
     if record is not None:
         try:

@@ -5,13 +5,15 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from app.audit.kept_files import list_digest, sha256
 from app.i18n.catalogue import files as catalogues
-from app.panel import Panel
 from app.settings import PACKAGE, Settings, shipped_path
 from app.version import installed_version
+
+if TYPE_CHECKING:
+    from app.panel import Panel
 
 DEFINITIONS: Final = re.compile(r".*\.(msg|srv|action)")
 MOST_DEFINITIONS: Final = 2000
@@ -69,7 +71,7 @@ class StartFiles:
     contents: Mapping[str, bytes]
 
 
-def read_start_files(settings: Settings, panel: Panel, mode: str) -> StartFiles:
+def read_start_files(settings: Settings, panel: "Panel", mode: str) -> StartFiles:
     """Reads all files. One that can't be read has the error in place of its hash. Blocks."""
     contents: dict[str, bytes] = {}
     files: dict[str, dict[str, str]] = {}
@@ -98,6 +100,9 @@ def settings_text(settings: Settings, mode: str) -> dict[str, str]:
         "KIOSK_ROOT_PATH": settings.root_path,
         "KIOSK_LOG_LEVEL": settings.log_level,
         "KIOSK_DEV": "1" if settings.dev else "",
+        "KIOSK_LOG_COPY": settings.log_copy or "",
+        "KIOSK_SYSLOG": ":".join(map(str, settings.syslog or ())),
+        "KIOSK_SYSLOG_CA": settings.syslog_ca or "",
     }
     return {name: without_secret(name, str(value)) for name, value in values.items()}
 
@@ -107,7 +112,7 @@ def without_secret(name: str, text: str) -> str:
     return HIDDEN if text and SECRET.search(name) else USER_IN_URL.sub(f"{HIDDEN}@", text)
 
 
-def _paths(settings: Settings, panel: Panel) -> Iterator[tuple[str, str, Path]]:
+def _paths(settings: Settings, panel: "Panel") -> Iterator[tuple[str, str, Path]]:
     """Group, name and path of each file. Those of the panel have the name that the panel file has for
     them."""
     beside = settings.panel.parent

@@ -1,20 +1,24 @@
-"""Verifies the hash chain of the operator's log.
+"""Verifies the hash chain of the operator's log, and its signatures.
 
 The chain alone does not show the removal of the newest entries, or a log that was rewritten as a whole.
-For that, an earlier head that was noted elsewhere has to be in the log.
+The signatures show a log that was rewritten without the key. For the removal of the newest entries, a
+copy of the log or an earlier head is needed from elsewhere.
 """
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from app.audit.database import as_log_error, open_read_only
 from app.audit.entry import Entry
+from app.audit.signed_part import Signed, SignedPart
 from app.audit.store import COLUMNS
 from app.errors import LogError
+
+NONE_SIGNED: Final = Signed()
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +28,24 @@ class Verified:
     count: int
     head: str
     fault: str = ""
+    signed: Signed = NONE_SIGNED
 
 
-def verify(folder: Path, known_head: str = "") -> Verified:
-    """Verifies the whole log at this moment, and that `known_head`, if given, is in it; LogError if it
-    can't be read."""
+def verify(
+    folder: Path,
+    known_head: str = "",
+    keys: Collection[str] = (),
+    against: Callable[[Entry], str] | None = None,
+) -> Verified:
+    """Verifies the whole log at this moment, that `known_head`, if given, is in it, and that only
+    `keys` signed it, if given. `against` returns the fault of an entry by a copy, "" if there is none.
+    LogError if the log can't be read."""
     db = open_read_only(folder)
     try:
         with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            return _Chain(genesis, known_head).check(_entries(db))
+            return _Chain(genesis, known_head, SignedPart(keys), against).check(_entries(db))
     finally:
         db.close()
 
@@ -50,9 +61,17 @@ def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
 class _Chain:
     """Verifies entries from the oldest on; keeps only the last two hashes."""
 
-    def __init__(self, genesis: str, known_head: str) -> None:
+    def __init__(
+        self,
+        genesis: str,
+        known_head: str,
+        signed: SignedPart,
+        against: Callable[[Entry], str] | None,
+    ) -> None:
         self._genesis = genesis
         self._known_head = known_head
+        self._signed = signed
+        self._against = against
         self._first: Entry | None = None
         self._begins = False
         self._kinds: set[str] = set()
@@ -62,7 +81,8 @@ class _Chain:
 
     def check(self, entries: Iterator[Entry]) -> Verified:
         for entry in entries:
-            if fault := self._fault(entry):
+            fault = self._fault(entry) or self._signed.fault(entry)
+            if fault := fault or (self._against(entry) if self._against else ""):
                 return self._verified(fault)
             self._first = self._first or entry
             if self._known_head in (entry.hash, entry.prev):
@@ -79,10 +99,10 @@ class _Chain:
             )
         if self._known_head:
             return self._verified(f"no entry has the head {self._known_head}: the newest were removed")
-        return self._verified("")
+        return self._verified(self._signed.end_fault())
 
     def _verified(self, fault: str) -> Verified:
-        return Verified(self._count, self._last[1], fault)
+        return Verified(self._count, self._last[1], fault, self._signed.result)
 
     def _fault(self, entry: Entry) -> str:
         before, last = self._last

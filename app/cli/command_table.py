@@ -39,7 +39,9 @@ class Command:
 COMMANDS: Final[Mapping[str, Command]] = {
     "run": Command("serve a panel to browsers", "run"),
     "check": Command("check panel files: every fault with its place", "check"),
-    "log": Command("check the operator's log, or print the panel that was shown at a time", "log"),
+    "log": Command(
+        "check the operator's log; print its key, or the panel that was shown at a time", "log"
+    ),
     "simulate": Command(
         "run the robot of a panel, or a recording, as a Zenoh peer of its own", "simulate"
     ),

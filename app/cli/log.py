@@ -7,11 +7,13 @@
 import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.audit.copied import Comparison, read_copy
+from app.audit.signed_part import Signed
 from app.audit.verify import verify
 from app.cli.parser import Parser
 from app.errors import KioskError, LogError
@@ -34,12 +36,66 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 
 def _verify(options: Namespace) -> int:
-    verification = verify(options.data or _usual_folder(), options.head)
-    if verification.fault:
-        print(f"the log was changed: {verification.fault} ({verification.count} entries verified)")
+    folder = options.data or _usual_folder()
+    comparison = Comparison(read_copy(options.against)) if options.against else None
+    against = comparison.fault if comparison else None
+    verification = verify(folder, options.head, options.key or _own_key(folder), against)
+    fault = verification.fault or (comparison.end_fault() if comparison else "")
+    if fault:
+        print(f"the log was changed: {fault} ({verification.count} entries verified)")
         return 1
     print(f"ok, {verification.count} entries, head {verification.head}")
+    for line in _proof(verification.signed, is_pinned=bool(options.key)):
+        print(line)
+    if comparison:
+        print(f"the log has each of the {comparison.count} entries of the copy")
     return 0
+
+
+def _own_key(folder: Path) -> tuple[str, ...]:
+    """The key in the data folder; a copy of the folder may have none."""
+    from app.audit.log_key import load_key
+
+    try:
+        key = load_key(folder)
+    except LogError as error:
+        print(f"note: {error}", file=sys.stderr)
+        return ()
+    return (key.public,) if key else ()
+
+
+def _proof(signed: Signed, is_pinned: bool) -> Iterator[str]:
+    """What is proven by signatures."""
+    if not signed.key:
+        yield "no entry is signed: the chain alone shows no change by a program that computes hashes"
+        return
+    at = datetime.fromtimestamp(signed.at / 1000).astimezone().isoformat(timespec="seconds")
+    yield f"signed up to entry {signed.seq} at {at} with the key {signed.key}"
+    if not is_pinned:
+        yield "compare this key with the one that you noted, or name that with --key"
+    if signed.unsigned:
+        yield f"the {signed.unsigned} entries after it are proven by the chain only"
+
+
+def _key(options: Namespace) -> int:
+    from app.audit.log_key import load_key
+
+    folder = options.data or _usual_folder()
+    key = load_key(folder)
+    if key is None:
+        print(f"there is no key in {folder}: the server makes it at its first start", file=sys.stderr)
+        return 1
+    print(key.public)
+    return 0
+
+
+def _public_key(text: str) -> str:
+    from app.audit.log_key import parse_public_key
+
+    try:
+        return parse_public_key(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def _panel(options: Namespace) -> int:
@@ -114,6 +170,23 @@ def make_parser(prog: str) -> Parser:
         metavar="HASH",
         help="a hash saved earlier; the check fails if the log no longer contains it",
     )
+    check.add_argument(
+        "--key",
+        action="append",
+        type=_public_key,
+        metavar="KEY",
+        help="the public key that may sign, as `log key` printed it; may be given several times;"
+        " default: the key in the data folder",
+    )
+    check.add_argument(
+        "--against",
+        type=Path,
+        metavar="COPY",
+        help="a copy of the log: the file of KIOSK_LOG_COPY, or what a syslog server has written",
+    )
+    key = commands.add_parser("key", help="print the public key that signs the log")
+    key.set_defaults(run=_key)
+    _add_data(key)
     panel = commands.add_parser("panel", help="print the panel file that was shown at a time")
     panel.set_defaults(run=_panel)
     _add_data(panel)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from app.alarms.state_times import NAME as STATES
 from app.audit import Limits, NullLog, OperatorLog
 from app.audit.kept_files import KeptFiles
+from app.audit.log_copier import log_copiers
 from app.audit.start_files import read_start_files
 from app.audit.start_record import StartRecord
 from app.panel import Panel
@@ -52,12 +53,17 @@ async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLo
     if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
         read = partial(read_start_files, settings, panel, mode)
-        oplog = OperatorLog(folder, limits, mode, StartRecord(KeptFiles(folder), read, panel.revision))
+        record = StartRecord(KeptFiles(folder), read, panel.revision)
+        oplog = OperatorLog(folder, limits, mode, record, signs=True)
     await oplog.start()
+    copiers = log_copiers(settings, folder, lambda: oplog.synced_seq) if rules.enabled else []
+    for copier in copiers:
+        copier.start()
     try:
         yield oplog
     finally:
         await oplog.stop()
+        await asyncio.gather(*(asyncio.to_thread(copier.stop) for copier in copiers))
 
 
 @asynccontextmanager

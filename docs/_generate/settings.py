@@ -29,6 +29,19 @@ ABOUT: Final = {
         "none, or that of uvicorn's `--root-path`",
     ),
     "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
+    "LOG_COPY": (
+        "A file, best on another disk, that gets a copy of each entry of the operator's log.",
+        "none",
+    ),
+    "SYSLOG": (
+        "A syslog server (RFC 5424 over TLS) that gets each entry of the operator's log: host, or host "
+        "and port such as `log.plant:6514`.",
+        "none",
+    ),
+    "SYSLOG_CA": (
+        "The certificate authority of that server, as a PEM file.",
+        "the system's authorities",
+    ),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "
         "in a checkout `/gallery` shows each widget in each state.",

@@ -25,4 +25,5 @@ async def page(
 ) -> Response:
     shown = signs(state.fleet.panel.may_raise)
     framed = FramedPage("help.html", say("help_title"), robot, is_help=True)
-    return framed_page(request, state, framed, {"signs": shown})
+    key = say("help_log_key", key=state.log.key) if state.log.key else ""
+    return framed_page(request, state, framed, {"signs": shown, "log_key": key})
