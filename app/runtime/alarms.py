@@ -184,7 +184,7 @@ class Alarms:
     def _receive(self, transitions: Sequence[Transition]) -> None:
         for transition in transitions:
             alarm = self.engine.alarms[transition.id]
-            if self.counts.count(transition):
+            if self.counts.count(transition, alarm.definition.rules):
                 self._shown.count_raise(alarm, transition.at.monotonic)
                 self.curves.plan(alarm)
             row = history_row(alarm, transition)

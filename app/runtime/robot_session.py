@@ -67,6 +67,7 @@ class RobotSession:
     alarm_acts: ActRunner[AlarmEngine]
     recipe_acts: ActRunner[RecipeBooks]
     diagnostic_acts: ActRunner[Doctor]
+    shift_acts: ActRunner[None]
     press_guard: PressGuard
     press_log: PressLog
     refresher: ViewRefresher

@@ -15,6 +15,7 @@ from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
 from app.commands.recipe_acts import RECIPE_ACTS
+from app.commands.shift_acts import SHIFT_ACTS
 from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
@@ -150,6 +151,7 @@ def wire_session(
         alarm_acts=ActRunner("alarm", ALARM_ACTS, alarms.engine, act_context),
         recipe_acts=ActRunner("recipe", RECIPE_ACTS, recipes, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
+        shift_acts=ActRunner("alarm", SHIFT_ACTS, None, act_context),
         press_guard=press_guard,
         press_log=press_log,
         refresher=refresher,

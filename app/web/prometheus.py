@@ -58,15 +58,20 @@ def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
     for priority, state in product(PRIORITIES, LISTED_STATES):
         listed.add_metric([str(priority), state], counts[priority, state])
     yield listed
-    yield CounterMetricFamily(
-        "kiosk_alarms_raised", "How often alarms were raised", value=alarms.counts.raised
+    raised = CounterMetricFamily(
+        "kiosk_alarms_raised", "How often alarms were raised", labels=["priority"]
     )
-    yield SummaryMetricFamily(
+    acknowledged = SummaryMetricFamily(
         "kiosk_alarm_acknowledge_seconds",
         "From the raise of an alarm to its acknowledgement",
-        count_value=alarms.counts.acknowledged,
-        sum_value=alarms.counts.acknowledge_s,
+        labels=["priority"],
     )
+    for priority in PRIORITIES:
+        raised.add_metric([str(priority)], alarms.counts.raised[priority])
+        count, seconds = alarms.counts.acknowledged[priority], alarms.counts.acknowledge_s[priority]
+        acknowledged.add_metric([str(priority)], count, seconds)
+    yield raised
+    yield acknowledged
 
 
 def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:

@@ -127,3 +127,42 @@ def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page
         assert axe_page.evaluate("document.documentElement.scrollWidth") == width
         if (width, height) in SIZES:
             assert violations(axe_page) == [], width
+
+
+def test_a_message_to_the_next_shift_is_on_the_report_and_in_the_log(
+    cell: Server, without_scripts: Page
+) -> None:
+    page = without_scripts
+    page.goto(f"{cell.url}/alarms/report")
+    assert page.locator(".bar-marks span").count() == page.locator(".paper .alarm-plot rect").count()
+    page.locator("#message").fill("Hose of gripper 2 leaks <b>")
+    page.get_by_role("button", name="Leave message").click()
+    expect(page.locator(".paper .shift-message h3")).to_have_text("Message to the next shift")
+    expect(page.locator(".paper .shift-message p")).to_have_text("Hose of gripper 2 leaks <b>")
+    at = time.time()
+    since, end = (time.strftime("%Y-%m-%dT%H:%M", time.localtime(at + s)) for s in (60, 7200))
+    page.goto(f"{cell.url}/alarms/report?since={since}&until={end}")
+    expect(page.locator(".paper .shift-message h3")).to_have_text("Message from the shift before")
+    page.goto(f"{cell.url}/log")
+    expect(page.locator(".entries")).to_contain_text("Message to the next shift")
+
+
+def test_a_message_for_programs(cell: Server) -> None:
+    left = cell.http.post("/alarms/report", json={"text": "Look at valve V1", "id": "left-1"})
+    assert (left.status_code, left.json()["outcome"]) == (200, "succeeded")
+    again = cell.http.post("/alarms/report", json={"text": "Look at valve V1", "id": "left-1"})
+    assert again.json() == left.json()
+    assert "Look at valve V1" in cell.http.get("/alarms/report").text
+    empty = cell.http.post("/alarms/report", json={"text": "  "})
+    assert (empty.status_code, empty.json()["code"]) == (409, "alarms_message_empty")
+    assert cell.http.post("/alarms/report", json={"text": "x" * 401}).status_code == 422
+
+
+def test_the_keyboard_writes_a_message(cell: Server, touch_page: Page) -> None:
+    page = started(touch_page, f"{cell.url}/alarms/report")
+    page.locator("#message").tap()
+    keyboard = page.locator(".sheet.keyboard")
+    expect(keyboard).to_be_visible()
+    keyboard.get_by_role("button", name="v", exact=True).tap()
+    keyboard.locator(".set-entry").tap()
+    expect(page.locator("#message")).to_have_value(re.compile("^v$", re.IGNORECASE))

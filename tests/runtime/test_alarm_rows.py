@@ -38,7 +38,7 @@ def test_the_values_of_a_standing_diagnostic_stay_new(tmp_path: Path) -> None:
                         "health", [entry("temperature: 95")], time.monotonic(), True, ()
                     )
                     await asyncio.sleep(0.1)
-            return alarms.view()["rows"][ALARM], alarms.counts.raised
+            return alarms.view()["rows"][ALARM], alarms.counts.raised.total()
         finally:
             await alarms.stop()
 

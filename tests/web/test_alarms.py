@@ -131,8 +131,10 @@ def test_metrics_count_alarms_raises_and_times_to_acknowledge(cell: Server) -> N
     text = cell.http.get("/metrics").text
     assert 'kiosk_alarms{priority="1",state="active"} 1.0' in text
     assert 'kiosk_alarms{priority="4",state="shelved"} 0.0' in text
-    assert "kiosk_alarms_raised_total 2.0" in text
-    assert "kiosk_alarm_acknowledge_seconds_count 1.0" in text
+    assert 'kiosk_alarms_raised_total{priority="1"} 1.0' in text
+    assert 'kiosk_alarms_raised_total{priority="2"} 1.0' in text
+    assert 'kiosk_alarm_acknowledge_seconds_count{priority="1"} 0.0' in text
+    assert 'kiosk_alarm_acknowledge_seconds_count{priority="2"} 1.0' in text
 
 
 def test_shelving_has_a_reason_and_an_end(cell: Server) -> None:

@@ -17,12 +17,19 @@ from app.alarms.state_times import StatePeriod
 from app.audit import Row
 from app.clock import format_datetime, format_time
 from app.commands.alarm_acts import ALARM_ACTS
+from app.commands.shift_acts import LONGEST_MESSAGE, SHIFT_ACTION
 from app.i18n import Text, TextLike, date_and_time, number, say, time_of_day
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.printable import printable, printable_texts
 from app.view.time_values import duration_text
-from app.web.rendering.alarm_figures import clock_text, median_text, rate_text
+from app.web.rendering.alarm_figures import (
+    FiguresContext,
+    clock_text,
+    figures_context,
+    median_text,
+    rate_text,
+)
 from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import outcome_of, who_of
 from app.web.rendering.log_words import word as log_word
@@ -61,6 +68,21 @@ class ReportQuery(BaseModel):
         since, until = typed_ms("since", self.since), typed_ms("until", self.until, fold=1)
         end = now if until is None else until / 1000
         return Shift(end - DAY_S if since is None else since / 1000, end)
+
+    def before(self, now: float, starts: Sequence[str]) -> Shift:
+        """The time before that, of the same length, or the shift before."""
+        if not self.has_times:
+            return shift_at(now, starts, SHIFTS.index(self.shift) + 1)
+        since, until = self.times(now, starts)
+        return Shift(since - (until - since), since)
+
+
+class ShownMessage(NamedTuple):
+    """A message to the next shift: who left it, and when."""
+
+    text: str
+    who: TextLike
+    at: Text
 
 
 class ShownState(NamedTuple):
@@ -105,16 +127,22 @@ class ReportContext(TypedDict):
     high_more: TextLike
     presses: list[ReportRow]
     presses_more: TextLike
+    of_time: FiguresContext
+    from_before: ShownMessage | None
+    to_next: ShownMessage | None
+    longest_message: int
     printed: Text
 
 
 class ReportParts(NamedTuple):
-    """What a report is made of: `rows` are entries of the operator's log, the newest first."""
+    """What a report is made of: `rows` are entries of the operator's log, the newest first, and
+    `messages` those of its messages, also of the shift before."""
 
     figures: Figures
     alarms: AlarmReport
     states: Sequence[StatePeriod]
     rows: Sequence[Row]
+    messages: Sequence[Row] = ()
 
 
 def report_context(
@@ -168,7 +196,22 @@ def report_context(
         high_more=say("alarms_report_more", count=number(f"{high_more:,d}")) if high_more else "",
         presses=[_press(panel, row) for row in reversed(presses[:PRESSES])],
         presses_more=_more(len(presses) - PRESSES, len(parts.rows)),
+        of_time=figures_context(parts.figures),
+        from_before=_message(row for row in parts.messages if row.entry.at < shift.since * 1000),
+        to_next=_message(row for row in parts.messages if row.entry.at >= shift.since * 1000),
+        longest_message=LONGEST_MESSAGE,
         printed=say("alarms_report_printed", time=format_datetime(now)),
+    )
+
+
+def _message(rows: Iterable[Row]) -> ShownMessage | None:
+    """The newest of messages."""
+    row = next(iter(rows), None)
+    if row is None:
+        return None
+    text, entry = json.loads(row.entry.values).get("text", ""), row.entry
+    return ShownMessage(
+        printable(str(text)), who_of(printable(entry.who)), format_datetime(entry.at / 1000)
     )
 
 
@@ -265,7 +308,7 @@ def _acknowledged(row: HistoryRow | None) -> TextLike:
 def _press(panel: Panel, row: Row) -> ReportRow:
     entry = row.entry
     if entry.kind in ("control", "alarm"):
-        acts = {f"alarm_{act}" for act in ALARM_ACTS}
+        acts = {*(f"alarm_{act}" for act in ALARM_ACTS), SHIFT_ACTION}
         is_known = entry.action in acts or entry.kind == "control"
         label: TextLike = log_word(entry.action) if is_known else entry.action
     else:

@@ -15,6 +15,7 @@ from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.control_acts import CONTROL_ACTS
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.commands.recipe_acts import RECIPE_ACTS
+from app.commands.shift_acts import SHIFT_ACTION
 from app.errors import NotFound
 from app.i18n import Text, TextLike, number, say
 from app.panel.widgets.families import Command, EntryWidget
@@ -46,7 +47,7 @@ CONTROL_ACTIONS: Final = (
     "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
 RECIPE_ACTIONS: Final = tuple(f"recipe_{act}" for act in RECIPE_ACTS)
-ALARM_ACTIONS: Final = tuple(f"alarm_{act}" for act in ALARM_ACTS)
+ALARM_ACTIONS: Final = (*(f"alarm_{act}" for act in ALARM_ACTS), SHIFT_ACTION)
 DIAGNOSTIC_ACTIONS: Final = tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS)
 ACTIONS: Final = (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS, *RECIPE_ACTIONS)
 

@@ -4,9 +4,10 @@ import { find } from "../show.js";
 /** @typedef {{ left: number, right: number, top: number, bottom: number }} Area @typedef {{ left: number, top: number, lift: number, side: string, point: number }} Spot */
 const GAP_PX = 8;
 
+// Of an input that is none of a widget: what is around it.
 /** @param {HTMLElement} input @returns {HTMLElement} */
 export function widgetOf(input) {
-  const root = input.closest("[data-widget]");
+  const root = /** @type {HTMLElement | null} */ (input.closest("[data-widget], [data-typed]"));
   if (!root) throw new Error("an input outside of a widget");
   return root;
 }

@@ -4,7 +4,7 @@ import { closest } from "../show.js";
 
 const coarse = matchMedia("(pointer: coarse)");
 const always = pageGuard.page.keyboard === "on";
-const TOUCHED = ":is(input[type=text], output)";
+const TOUCHED = ":is([data-widget], [data-typed]) :is(input[type=text], output)";
 /** @type {Record<"keypad" | "keyboard", () => Promise<{ Entry: new (input: HTMLInputElement, closed: () => void) => { input: HTMLElement, cancel(): void } }>>} */
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
@@ -15,7 +15,7 @@ let touches = 0; // counts them: a module that arrives after the next touch open
 // Without a system keyboard, where there is one of the page's own.
 function prepare() {
   const active = always || coarse.matches;
-  for (const input of document.querySelectorAll("[data-widget] input[type=text]")) {
+  for (const input of document.querySelectorAll(":is([data-widget], [data-typed]) input[type=text]")) {
     input.dataset.inputmode ??= input.inputMode;
     input.inputMode = active ? "none" : input.dataset.inputmode;
   }
@@ -38,7 +38,7 @@ async function openFor(place) {
 }
 
 document.addEventListener("click", ({ target }) => {
-  const place = closest(target, `[data-widget] ${TOUCHED}`);
+  const place = closest(target, TOUCHED);
   if (place && (always || coarse.matches)) openFor(place);
 });
 coarse.addEventListener("change", prepare);
