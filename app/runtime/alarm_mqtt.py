@@ -38,7 +38,8 @@ NOT_IN_HISTORY: Final = ("seq", "clock_back_s")  # are of the file
 
 class AlarmMqtt:
     """The publisher, from `start` to `stop`; a panel without `[alarms.mqtt]` publishes nothing. `state`
-    is "connected", or why it is not."""
+    is "connected", or why it is not, `since` (seconds since the epoch). `last_error` is the last reason
+    why there was no connection, "" for none."""
 
     def __init__(self, rules: MqttRules | None, language: str) -> None:
         self._rules = rules
@@ -54,6 +55,8 @@ class AlarmMqtt:
         self._thread: threading.Thread | None = None
         self.is_connected = False
         self.state = "not connected"
+        self.since = 0.0
+        self.last_error = ""
         self.published = 0
         self.dropped = 0
 
@@ -61,6 +64,11 @@ class AlarmMqtt:
     def address(self) -> str:
         """Of the broker; "" for none."""
         return f"{self._rules.host}:{self._rules.used_port}" if self._rules else ""
+
+    @property
+    def waiting(self) -> int:
+        """Transitions that the broker does not have yet."""
+        return len(self._transitions) + len(self._sending)
 
     # On the event loop.
 
@@ -104,10 +112,10 @@ class AlarmMqtt:
         try:
             client = self._connect(rules)
         except ImportError:
-            self._say("paho-mqtt is not installed: pip install 'operator-panel[mqtt]'")
+            self._lost("paho-mqtt is not installed: pip install 'operator-panel[mqtt]'")
             return
         except (OSError, ValueError) as error:
-            self._say(str(error))
+            self._lost(str(error))
             return
         while not self._stopped:
             self._wake.wait(STANDING_EVERY_S)
@@ -192,12 +200,13 @@ class AlarmMqtt:
 
     def _lost(self, reason: str) -> None:
         self.is_connected = False
+        self.last_error = reason
         self._say(reason)
 
     def _say(self, state: str) -> None:
         if state != self.state:
             log.info("alarms by MQTT to %s: %s", self.address, state)
-        self.state = state
+            self.state, self.since = state, time.time()
 
     def _end(self, client: Any, prefix: str) -> None:
         if self.is_connected:

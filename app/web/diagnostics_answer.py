@@ -182,9 +182,23 @@ class DoctorAnswer(BaseModel):
     facts: list[str]
 
 
+class MqttAnswer(BaseModel):
+    """The broker of `[alarms.mqtt]`: `state` is "connected", or why it is not, `since` when. `waiting`
+    transitions are not published yet, `dropped` ones found no room."""
+
+    address: str
+    connected: bool
+    state: str
+    since: AwareDatetime | None
+    last_error: str
+    waiting: int
+    published: int
+    dropped: int
+
+
 class DiagnosticsAnswer(BaseModel):
     """`versions` are by the name of the program; `looks` are the keys of topics that are looked into
-    now."""
+    now. `mqtt` is null for a panel without `[alarms.mqtt]`."""
 
     versions: dict[str, str]
     links: list[LinkAnswer]
@@ -194,6 +208,7 @@ class DiagnosticsAnswer(BaseModel):
     graph: GraphAnswer
     doctor: DoctorAnswer
     looks: list[str]
+    mqtt: MqttAnswer | None
 
 
 class LookedMessageAnswer(BaseModel):

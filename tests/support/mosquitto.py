@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from tests.support.certificates import Certificates
 from tests.support.parts import free_port, until
 
 MOSQUITTO: Final = "/usr/sbin/mosquitto"
@@ -17,10 +18,17 @@ MOSQUITTO: Final = "/usr/sbin/mosquitto"
 
 class Broker:
     """A broker on a port of this machine, from `start` to `end`; with a name and a password it takes
-    no other clients."""
+    no other clients. With certificates it has a second port, `tls_port`."""
 
-    def __init__(self, folder: Path, user: str = "", password: str = "") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        user: str = "",
+        password: str = "",
+        certificates: Certificates | None = None,
+    ) -> None:
         self.port = free_port()
+        self.tls_port = free_port()
         self._configuration = folder / "mosquitto.conf"
         lines = [f"listener {self.port} 127.0.0.1", f"allow_anonymous {'false' if user else 'true'}"]
         if user:
@@ -31,6 +39,12 @@ class Broker:
                 capture_output=True,
             )
             lines.append(f"password_file {users}")
+        if certificates is not None:
+            lines += [
+                f"listener {self.tls_port} 127.0.0.1",
+                f"certfile {certificates.server}",
+                f"keyfile {certificates.key}",
+            ]
         if os.geteuid() == 0:
             lines.append("user root")  # else it becomes another, which can't read the folder
         self._configuration.write_text("\n".join(lines) + "\n")

@@ -4,16 +4,18 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
+from tests.support.certificates import make_certificates
 from tests.support.mosquitto import Broker, listening, stands
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
 
 TOPIC: Final = "plant1/cell"
+BROWSER: Final = {"accept": "text/html"}
 MQTT: Final = '\n[alarms.mqtt]\nhost = "127.0.0.1"\nport = %d\nprefix = "plant1/cell"\n'
 
 
@@ -102,3 +104,49 @@ def test_a_broker_that_does_not_answer_delays_nothing(tmp_path: Path) -> None:
             until(lambda: len(listed(cell)) == 2, "the alarms are raised")
             assert act(cell, "air_low", "acknowledge", occurrence=1).json()["done"]
             assert "kiosk_alarms_mqtt_connected 0.0" in cell.http.get("/metrics").text
+
+
+def mqtt_state(cell: Server) -> dict[str, Any]:
+    state: dict[str, Any] = cell.http.get("/diagnostics").json()["mqtt"]
+    return state
+
+
+def test_diagnostics_say_whether_the_broker_has_a_connection(broker: Broker, tmp_path: Path) -> None:
+    with cell_at(tmp_path, broker.port) as cell:
+        until(lambda: mqtt_state(cell)["published"] == 2, "the raises are published")
+        state = mqtt_state(cell)
+        assert (state["connected"], state["state"], state["waiting"]) == (True, "connected", 0)
+        assert (state["address"], state["last_error"]) == (f"127.0.0.1:{broker.port}", "")
+        page = cell.http.get("/diagnostics", headers=BROWSER).text
+        assert "Alarms by MQTT" in page
+        assert "connected since" in page
+        broker.end()
+        until(lambda: not mqtt_state(cell)["connected"], "the loss is known")
+        act(cell, "air_low", "acknowledge", occurrence=1)
+        until(lambda: mqtt_state(cell)["waiting"] == 1, "the act waits")
+        assert mqtt_state(cell)["last_error"]
+        assert "no connection since" in cell.http.get("/diagnostics?part=content", headers=BROWSER).text
+
+
+def test_a_broker_with_tls_is_trusted_by_its_authority_only(tmp_path: Path) -> None:
+    certificates = make_certificates(tmp_path)
+    broker = Broker(tmp_path, certificates=certificates)
+    broker.start()
+    trusted = f'tls = true\nca = "{certificates.ca.name}"\n'
+    try:
+        with (
+            listening(broker.port, TOPIC) as listener,
+            cell_at(tmp_path, broker.tls_port, trusted) as cell,
+        ):
+            stands(listener, "air_low", "air_latched")
+            assert mqtt_state(cell)["connected"]
+        with cell_at(tmp_path, broker.tls_port, "tls = true\n") as cell:
+            until(lambda: mqtt_state(cell)["last_error"], "the certificate is refused")
+            assert not mqtt_state(cell)["connected"]
+        plain = tmp_path / "plain"
+        plain.mkdir()
+        with cell_at(plain, broker.tls_port) as cell:
+            until(lambda: mqtt_state(cell)["last_error"], "it speaks no TLS")
+            assert not mqtt_state(cell)["connected"]
+    finally:
+        broker.end()

@@ -7,6 +7,7 @@ from typing import Any
 
 from app.clock import iso_time
 from app.robot.round_trips import RoundTripSummary
+from app.runtime.alarm_mqtt import AlarmMqtt
 from app.runtime.doctor_process import DoctorProcess
 from app.runtime.graph_survey import Survey
 from app.runtime.live_look import Look
@@ -41,6 +42,22 @@ def diagnostics_json(
         },
         "doctor": _doctor(doctor),
         "looks": sorted(session.looks.keys),
+    }
+
+
+def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
+    """The content of an `MqttAnswer`; None for a panel that does not publish its alarms."""
+    if not mqtt.address:
+        return None
+    return {
+        "address": mqtt.address,
+        "connected": mqtt.is_connected,
+        "state": mqtt.state,
+        "since": _at(mqtt.since),
+        "last_error": mqtt.last_error,
+        "waiting": mqtt.waiting,
+        "published": mqtt.published,
+        "dropped": mqtt.dropped,
     }
 
 

@@ -36,7 +36,7 @@ from app.web.diagnostics_answer import (
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import JSON, PAGE, described_body, errors, fields
-from app.web.rendering.diagnostics_json import diagnostics_json, look_json
+from app.web.rendering.diagnostics_json import diagnostics_json, look_json, mqtt_json
 from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
 from app.web.request_body import act_body_of, as_model
@@ -64,6 +64,7 @@ async def diagnostics(
     if not _for_browser(request):
         survey = await session.survey.read()
         content = diagnostics_json(session, survey, state.doctor, versions())
+        content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
         answer = await asyncio.to_thread(localized, content, language_of(request))
         return JSONResponse(answer, headers=HEADERS)
     return await _page(request, state, session, query)
@@ -153,8 +154,8 @@ async def _page(
     again = urlencode({"robot": query.robot}) if query.robot else ""
     name = "_diagnostics.html" if query.part else "diagnostics.html"
     page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
-    refusal = _refusal(session, query.act)
-    return framed_page(request, state, page, {**context, **TEXTS, "act_refused": refusal})
+    more = {"act_refused": _refusal(session, query.act), "mqtt": state.fleet.alarms.mqtt}
+    return framed_page(request, state, page, {**context, **TEXTS, **more})
 
 
 async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
