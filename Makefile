@@ -10,6 +10,7 @@
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  installs what the benchmark's rivals need into the cache
 # make release  wheel, sdist, SBOM and documentation, checked in a clean environment, in dist/release
+# make audit  known weaknesses of the locked dependencies, by pip-audit; says so where its data is not reached
 # make dev   the panel; restarts whenever a file is saved
 
 PYTHON ?= python3
@@ -22,7 +23,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: fonts run test check format dev docs wheel release faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
+.PHONY: fonts run test check format dev docs wheel release audit faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
@@ -114,6 +115,9 @@ wheel: .venv/build .venv/bin/operator-panel
 release: docs .venv-release/ready
 	.venv-release/bin/hadolint deploy/Containerfile
 	.venv-release/bin/python deploy/release.py dist/release $(if $(TAG),--tag $(TAG))
+
+audit: .venv-release/ready
+	.venv-release/bin/python deploy/audit.py
 
 test-parts: system .venv/test .venv-ros/ready bridge
 

@@ -1,8 +1,8 @@
 """`python deploy/release.py FOLDER [--tag TAG]`: the files of a release, each checked.
 
 FOLDER gets the wheel, the sdist, the SBOM (CycloneDX), the documentation as a site, the locked
-dependencies and SHA256SUMS. The version is that of pyproject.toml. Exit status 1: what is wrong is
-printed.
+dependencies and SHA256SUMS. If RELEASE_KEY names a secret key of minisign, the wheel and SHA256SUMS are
+signed with it. The version is that of pyproject.toml. Exit status 1: what is wrong is printed.
 """
 
 import argparse
@@ -65,6 +65,7 @@ def empty(folder: Path) -> None:
 def is_of_release(path: Path) -> bool:
     named = path.name.startswith("operator_panel-") or path.name in (
         "SHA256SUMS",
+        "SHA256SUMS.minisig",
         LOCK.name,
         ".gitignore",
     )
@@ -161,6 +162,20 @@ def write_sums(folder: Path) -> None:
     (folder / "SHA256SUMS").write_text("".join(f"{digest(path)}  {path.name}\n" for path in files))
 
 
+def sign(folder: Path, wheel: Path, key: str) -> None:
+    """Signatures of the wheel and of all files by their sums. minisign asks for the key's password."""
+    for path in (wheel, folder / "SHA256SUMS"):
+        comment = f"operator-panel {version()} {path.name} sha256:{digest(path)}"
+        try:
+            subprocess.run(["minisign", "-S", "-s", key, "-m", str(path), "-t", comment], check=True)
+        except FileNotFoundError:
+            raise ReleaseError("RELEASE_KEY is set, and minisign is not installed") from None
+        except subprocess.CalledProcessError as error:
+            raise ReleaseError(
+                f"{path.name} is not signed: minisign ended with {error.returncode}"
+            ) from error
+
+
 def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -184,6 +199,10 @@ def main() -> int:
         pack_docs(options.folder)
         write_sums(options.folder)
         try_out(wheel)
+        if key := os.environ.get("RELEASE_KEY"):
+            sign(options.folder, wheel, key)
+        else:
+            print("not signed: RELEASE_KEY names no secret key of minisign", file=sys.stderr)
     except ReleaseError as error:
         print(error, file=sys.stderr)
         return 1

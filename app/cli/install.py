@@ -46,6 +46,7 @@ def _install(arguments: Namespace) -> int:
         screen=not arguments.no_screen,
         touch_matrix=tuple(arguments.touch_matrix.split()),
         any_system=arguments.any_system,
+        key=arguments.key,
     )
     plan = steps(options, host)
     for line in describe(plan, host):
@@ -85,6 +86,12 @@ def make_parser(prog: str) -> Parser:
     add("wheel", nargs="?", type=Path, metavar="WHEEL", help="default: the wheel that this runs from")
     add("--panel", type=Path, metavar="FILE", help="your panel file; default: the installed one")
     add("--zenoh", type=Path, metavar="FILE", help="your Zenoh configuration")
+    add(
+        "--key",
+        type=Path,
+        metavar="FILE",
+        help="the public key of the releases (minisign.pub): later updates have to be signed with it",
+    )
     add("--no-screen", action="store_true", help="the server alone, for browsers elsewhere")
     add("--touch-matrix", default="", metavar="'A B C D E F'", help="libinput's calibration matrix")
     add("--any-system", action="store_true", help="not only Debian 12 and 13 and Ubuntu 24.04")

@@ -1,14 +1,19 @@
 """`operator-panel update`: another release in place of the one that runs. Exit status: see
 `app.cli.install`."""
 
+import shutil
+import tempfile
 from argparse import ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from app.cli.install import add_root, add_wheels, exit_status, print_progress
 from app.cli.parser import Parser
+from app.errors import SettingsError
 from app.install.assets import checked_wheel
 from app.install.host import Host
+from app.install.minisign import PINNED, SUFFIX, check_wheel, parse_keys
 from app.install.update import URL, SystemdServices, Updater
 
 PROG = "python -m app.cli update"
@@ -28,9 +33,44 @@ def _update(options: Namespace) -> int:
     updater = Updater(host=host, services=SystemdServices(host), url=url, say=print_progress)
     if options.back:
         updater.back()
-    else:
-        updater.update(checked_wheel(options.wheel), options.wheels and options.wheels.resolve())
+        return 0
+    with signed_copy(checked_wheel(options.wheel), host, options.unsigned) as wheel:
+        updater.update(wheel, options.wheels and options.wheels.resolve())
     return 0
+
+
+@contextmanager
+def signed_copy(wheel: Path, host: Host, unsigned: bool) -> Iterator[Path]:
+    """A copy of the wheel that no one else can change, after its signature was checked; SettingsError
+    if it is not signed with a pinned key."""
+    with tempfile.TemporaryDirectory(prefix="operator-panel-update-") as folder:
+        copy = Path(folder, wheel.name)
+        shutil.copyfile(wheel, copy)
+        if unsigned:
+            print_progress(f"the signature of {wheel.name} is not checked (--unsigned)")
+        else:
+            print_progress(_signed_by(wheel, copy, host))
+        yield copy
+
+
+def _signed_by(wheel: Path, copy: Path, host: Host) -> str:
+    if not host.files.is_file(PINNED):
+        raise SettingsError(
+            f"no key is trusted: put the public key of the releases into {PINNED}, as `minisign -G`"
+            f" writes it, or give --unsigned to take {wheel.name} without a signature"
+        )
+    try:
+        import cryptography  # noqa: F401
+    except ImportError:
+        raise SettingsError(
+            "signatures can't be checked by this Python: run /opt/operator-panel/current/bin/"
+            f"operator-panel update {wheel.name}"
+        ) from None
+    keys = parse_keys(host.files.read(PINNED).decode("utf-8", "replace"), PINNED)
+    signature = wheel.with_name(wheel.name + SUFFIX)
+    if signature.is_file():
+        shutil.copyfile(signature, copy.with_name(copy.name + SUFFIX))
+    return check_wheel(copy, keys)
 
 
 def _url(text: str) -> str:
@@ -43,7 +83,8 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Installs another version beside the one that runs, and starts it. If its server or"
-        " page does not come up within a minute, the version of before runs again.",
+        " page does not come up within a minute, the version of before runs again. The wheel has to be"
+        " signed (minisign): its signature is the file beside it, with .minisig at the end.",
     )
     add = parser.add_argument
     add(
@@ -52,6 +93,11 @@ def make_parser(prog: str) -> Parser:
         type=Path,
         metavar="WHEEL",
         help="of the other version; default: the wheel that this runs from",
+    )
+    add(
+        "--unsigned",
+        action="store_true",
+        help=f"take a wheel whose signature matches no key in {PINNED}",
     )
     add("--back", action="store_true", help="run the version of before again")
     add("--url", type=_url, default=URL, help="where the server answers; default: %(default)s")

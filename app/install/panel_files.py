@@ -19,7 +19,7 @@ from app.pictures import picture_files
 
 OF_PAGES: Final = ("template", "styles")
 # What an installation has in the folder of the installed panel file.
-TAKEN: Final = re.compile(r"\.?(panel\.toml|zenoh\.json5|kiosk\.toml)(\..*)?")
+TAKEN: Final = re.compile(r"\.?(panel\.toml|zenoh\.json5|kiosk\.toml|release-keys\.pub)(\..*)?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,13 +2,14 @@
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Final
 
 from app.errors import SettingsError
 from app.install.assets import Assets, own_wheel
 from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
+from app.install.minisign import PINNED, parse_keys
 from app.install.panel_files import copies_for, users_file
 from app.install.release import CheckedPanel, Current, Release
 from app.install.router import ROUTER, RouterConfig, needs_router, router_steps, router_unit
@@ -53,6 +54,7 @@ class Options:
     screen: bool = True
     touch_matrix: tuple[str, ...] = ()
     any_system: bool = False
+    key: Path | None = None
 
 
 def steps(options: Options, host: Host) -> list[InstallStep]:
@@ -77,6 +79,7 @@ def steps(options: Options, host: Host) -> list[InstallStep]:
             replaces=options.zenoh is not None,
         ),
         *(copies_for(options.panel, ETC) if options.panel else ()),
+        *([_pinned(options.key)] if options.key else ()),
         CheckedPanel(release.name, PANEL),
         Current(release.name),
         *own_files(assets, options.screen),
@@ -85,6 +88,13 @@ def steps(options: Options, host: Host) -> list[InstallStep]:
         Unit(SERVER),
         *([Unit(SCREEN)] if options.screen else []),
     ]
+
+
+def _pinned(key: Path) -> UsersFile:
+    """The public key of the releases; SettingsError if the file has none."""
+    text = users_file(key).decode("utf-8", "replace")
+    names = ", ".join(each.name for each in parse_keys(text, str(key)))
+    return UsersFile(path=PINNED, content=text, about=f"updates are signed with {names}", replaces=True)
 
 
 def own_files(assets: Assets, screen: bool) -> list[InstallStep]:
@@ -127,7 +137,7 @@ def uninstall_steps(host: Host) -> list[InstallStep]:
         Release(wheel=here, lock=""),
         *(
             UsersFile(path=f"{ETC}/{name}", content="", about="")
-            for name in ("panel.toml", "zenoh.json5", "kiosk.toml")
+            for name in ("panel.toml", "zenoh.json5", "kiosk.toml", PurePosixPath(PINNED).name)
         ),
         *own_files(Assets(own_wheel()), screen=True),
         router_unit(Assets(own_wheel())),

@@ -1,0 +1,107 @@
+"""The licences of all locked dependencies: each is listed, as the installed package declares it, and
+allowed."""
+
+import re
+import tomllib
+from email.message import Message
+from importlib.metadata import metadata
+from typing import Final
+
+import pytest
+
+from tests.support.parts import ROOT
+
+LISTED: Final = tomllib.loads((ROOT / "deploy/licences.toml").read_text())
+# Of what a release installs: no duty beyond keeping the notices.
+ALLOWED: Final = frozenset(
+    [
+        "0BSD",
+        "Apache-2.0",
+        "BSD-2-Clause",
+        "BSD-3-Clause",
+        "CC0-1.0",
+        "ISC",
+        "MIT",
+        "MIT-0",
+        "MIT-CMU",
+        "PSF-2.0",
+        "Zlib",
+    ]
+)
+# Of tests and tools, which are not distributed.
+ALLOWED_IN_TESTS: Final = ALLOWED | {"MPL-2.0"}
+# What older metadata says in place of an SPDX expression.
+WORDS: Final = {
+    "MIT License": "MIT",
+    "MIT": "MIT",
+    "BSD License": "BSD-3-Clause",
+    "BSD": "BSD-3-Clause",
+    "BSD-3-Clause": "BSD-3-Clause",
+    "Apache Software License": "Apache-2.0",
+    "Apache-2.0": "Apache-2.0",
+    "Eclipse Public License 2.0 (EPL-2.0)": "EPL-2.0",
+    "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",
+    "MPL-2.0": "MPL-2.0",
+}
+
+
+def locked(lock: str) -> set[str]:
+    return set(re.findall(r"^([a-z0-9-]+)==", (ROOT / lock).read_text(), re.MULTILINE))
+
+
+SHIPPED: Final = locked("deploy/requirements.lock")
+EXTRAS: Final = {"paho-mqtt", "rosbags", "apsw", "numpy", "ruamel-yaml"}  # with the extras only
+TESTS: Final = locked("tests/requirements.lock")
+
+
+def declared(about: Message) -> str:
+    """The licence as a package declares it: an SPDX expression, or several by OR; "" for none."""
+    if expression := about["License-Expression"]:
+        return str(expression)
+    classifiers = about.get_all("Classifier") or []
+    words = [line.split(" :: ")[-1] for line in classifiers if line.startswith("License ::")]
+    names = {WORDS[word] for word in words if word in WORDS} or {WORDS.get(about["License"] or "", "")}
+    return " OR ".join(sorted(names))
+
+
+def is_allowed(expression: str, allowed: frozenset[str]) -> bool:
+    """Whether every part of one alternative is allowed."""
+    return any(
+        all(name.strip() in allowed for name in alternative.split(" AND "))
+        for alternative in expression.split(" OR ")
+    )
+
+
+def test_every_locked_dependency_is_listed_and_nothing_else() -> None:
+    assert set(LISTED["shipped"]) == SHIPPED
+    assert set(LISTED["extras"]) == EXTRAS
+    assert set(LISTED["tests"]) == TESTS - SHIPPED - EXTRAS
+    assert set(LISTED["undeclared"]) <= TESTS
+
+
+@pytest.mark.parametrize("part", ["shipped", "extras", "tests"])
+def test_every_licence_is_allowed(part: str) -> None:
+    allowed = ALLOWED_IN_TESTS if part == "tests" else ALLOWED
+    refused = {name: text for name, text in LISTED[part].items() if not is_allowed(text, allowed)}
+    assert refused == {}
+
+
+def test_every_licence_is_as_the_installed_package_declares_it() -> None:
+    every = LISTED["shipped"] | LISTED["extras"] | LISTED["tests"]
+    assert {n: declared(metadata(n)) for n in every if n not in LISTED["undeclared"]} == {
+        name: text for name, text in every.items() if name not in LISTED["undeclared"]
+    }
+
+
+@pytest.mark.parametrize(
+    ("expression", "allowed"),
+    [
+        ("MIT", True),
+        ("GPL-3.0-only", False),
+        ("GPL-3.0-only OR MIT", True),
+        ("MIT AND GPL-3.0-only", False),
+        ("", False),
+    ],
+)
+def test_a_licence_that_is_not_allowed_is_noticed(expression: str, allowed: bool) -> None:
+    assert is_allowed(expression, ALLOWED) == allowed
