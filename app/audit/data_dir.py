@@ -6,8 +6,10 @@ The lock is an flock: the system releases it when the process ends, for any reas
 import asyncio
 import fcntl
 import json
+import logging
 import os
 import shlex
+import stat
 import sys
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -17,6 +19,9 @@ from typing import Final
 from app.errors import FolderInUse
 from app.i18n import Text, say
 
+log = logging.getLogger("kiosk.log")
+
+LOG: Final = "operators-log."  # the beginning of the names of its files
 LOCK: Final = "server.lock"
 HELD_BY_OTHER_S: Final = 5.0  # a restarted server waits this long for the lock of the old one
 RETRY_S: Final = 0.1
@@ -51,6 +56,19 @@ class DataDir:
             if fd >= 0:
                 os.close(fd)
         self._write_holder(self._fd)
+        with suppress(OSError):  # such as a file system without modes
+            self._make_private()
+
+    def _make_private(self) -> None:
+        """Closes the folder to other users, if it is the server's own: it has its log, or nothing."""
+        about = os.stat(self.path)
+        is_shared = bool(stat.S_IMODE(about.st_mode) & 0o077) and about.st_uid == os.geteuid()
+        if not is_shared or about.st_mode & stat.S_ISVTX or self.path == Path.home():
+            return
+        names = {path.name for path in self.path.iterdir()}
+        if names <= {LOCK} or any(name.startswith(LOG) for name in names):
+            self.path.chmod(0o700)
+            log.info("the data folder %s is now for the server's user only", self.path)
 
     def check(self) -> None:
         """FolderInUse if the lock file was removed, renamed or replaced: another server may have it."""

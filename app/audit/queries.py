@@ -21,6 +21,8 @@ MAX_SCANNED: Final = 20_000  # entries, from the newest back
 
 # Without presses whose result is in a later entry.
 CLOSED_CONDITION: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
+# Without signatures of the log, one each hour.
+UNSIGNED_CONDITION: Final = "e.kind <> 'signed'"
 CONDITIONS: Final = {
     "since": "e.at >= :since",
     "until": "e.at < :until",
@@ -39,7 +41,7 @@ CONDITIONS: Final = {
 class Filter:
     """Which entries to read. Times in ms since 1970 (UTC), `since` inclusive, `until` exclusive.
 
-    `every`: also presses whose result is in a later entry.
+    `every`: also presses whose result is in a later entry, and signatures.
     """
 
     since: int | None = None
@@ -139,6 +141,7 @@ def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[st
     conditions = [CONDITIONS[name] for name in values if name in CONDITIONS]
     if not wanted.every:
         conditions.append(CLOSED_CONDITION)
+        conditions += [UNSIGNED_CONDITION] if wanted.outcome != "signed" else []
     if before is not None:
         conditions.append("e.seq < :before")
     where = f"WHERE {' AND '.join(conditions)}" if conditions else ""

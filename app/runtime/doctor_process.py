@@ -27,12 +27,15 @@ from app.settings import PACKAGE, PREFIX, Settings
 log = logging.getLogger("kiosk.doctor")
 
 NICE: Final = 10
-COMMAND: Final = (
-    sys.executable,
-    "-P",
-    "-c",
-    f"import os, sys; os.nice({NICE}); from app.cli.command import main; sys.exit(main())",
-)
+# The unit's filter of system calls forbids a change of the priority, as with `app.audit.reader_main`.
+PROGRAM: Final = f"""
+import contextlib, os, sys
+with contextlib.suppress(OSError):
+    os.nice({NICE})
+from app.cli.command import main
+sys.exit(main())
+"""
+COMMAND: Final = (sys.executable, "-P", "-c", PROGRAM)
 WITHIN_S: Final = 120.0
 MOST_BYTES: Final = 64_000_000  # of a bundle
 WELL: Final = (0, 1)  # the exit status of a doctor that could look

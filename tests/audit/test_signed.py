@@ -8,12 +8,14 @@ import stat
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from app.audit.database import NAME as DATABASE
 from app.audit.entry import FIELDS, Entry, Origin, new_entry
 from app.audit.log_key import NAME, Signer, load_key, load_or_make_key
+from app.audit.queries import Filter, rows
 from app.audit.signed_part import LONGEST_UNSIGNED_US
 from app.audit.store import COLUMNS, INSERT, Store
 from app.audit.verify import verify
@@ -214,3 +216,12 @@ def test_a_log_of_an_earlier_version_has_no_signatures_and_is_verified(
 
 def test_fields_of_an_entry_are_all_hashed() -> None:
     assert FIELDS[-2:] == ("prev", "hash")
+
+
+def test_signatures_are_read_with_every_step_or_by_their_name(data: Path) -> None:
+    def kinds(**wanted: Any) -> set[str]:
+        return {row.entry.kind for row in rows(data, Filter(**wanted), None, 100)}
+
+    assert "signed" not in kinds()
+    assert "signed" in kinds(every=True)
+    assert kinds(outcome="signed") == {"signed"}

@@ -555,3 +555,26 @@ def test_a_reader_never_holds_up_the_writer(store: Store, tmp_path: Path) -> Non
     assert reader.execute("SELECT count(*) FROM entry").fetchone() == (20,)
     reader.close()
     assert verify(tmp_path).count == 220
+
+
+@pytest.mark.parametrize(
+    ("files", "mode", "after"),
+    [
+        ((), 0o755, 0o700),
+        (("operators-log.sqlite3", "notes.txt"), 0o750, 0o700),
+        (("notes.txt",), 0o755, 0o755),  # not the server's alone
+        ((), 0o1777, 0o1777),  # as /tmp
+    ],
+)
+def test_data_folder_that_others_can_read_is_closed_to_them(
+    tmp_path: Path, files: tuple[str, ...], mode: int, after: int
+) -> None:
+    path = tmp_path / "data"
+    path.mkdir()
+    for name in files:
+        (path / name).touch()
+    path.chmod(mode)
+    folder = DataDir(path)
+    folder.claim()
+    folder.release()
+    assert stat.S_IMODE(path.stat().st_mode) == after

@@ -3,8 +3,7 @@ allowed."""
 
 import re
 import tomllib
-from email.message import Message
-from importlib.metadata import metadata
+from importlib.metadata import PackageMetadata, metadata
 from typing import Final
 
 import pytest
@@ -15,19 +14,10 @@ LISTED: Final = tomllib.loads((ROOT / "deploy/licences.toml").read_text())
 # Of what a release installs: no duty beyond keeping the notices.
 ALLOWED: Final = frozenset(
     [
-        "0BSD",
-        "Apache-2.0",
-        "BSD-2-Clause",
-        "BSD-3-Clause",
-        "CC0-1.0",
-        "ISC",
-        "MIT",
-        "MIT-0",
-        "MIT-CMU",
-        "PSF-2.0",
-        "Zlib",
+        "0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "ISC", "MIT", "MIT-0",
+        "MIT-CMU", "PSF-2.0", "Zlib",
     ]
-)
+)  # fmt: skip
 # Of tests and tools, which are not distributed.
 ALLOWED_IN_TESTS: Final = ALLOWED | {"MPL-2.0"}
 # What older metadata says in place of an SPDX expression.
@@ -54,13 +44,15 @@ EXTRAS: Final = {"paho-mqtt", "rosbags", "apsw", "numpy", "ruamel-yaml"}  # with
 TESTS: Final = locked("tests/requirements.lock")
 
 
-def declared(about: Message) -> str:
+def declared(about: PackageMetadata) -> str:
     """The licence as a package declares it: an SPDX expression, or several by OR; "" for none."""
-    if expression := about["License-Expression"]:
-        return str(expression)
+    if expression := about.get_all("License-Expression"):
+        return str(expression[0])
     classifiers = about.get_all("Classifier") or []
     words = [line.split(" :: ")[-1] for line in classifiers if line.startswith("License ::")]
-    names = {WORDS[word] for word in words if word in WORDS} or {WORDS.get(about["License"] or "", "")}
+    if not set(words) & WORDS.keys():
+        words += about.get_all("License") or []
+    names = {WORDS[word] for word in words if word in WORDS}
     return " OR ".join(sorted(names))
 
 

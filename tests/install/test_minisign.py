@@ -87,7 +87,8 @@ def cut_off(wheel: Path, signature: Path) -> None:
 
 
 def of_another_file(wheel: Path, signature: Path) -> None:
-    wheel.write_bytes(make_wheel(wheel.parent / "x", "0.1.0").read_bytes())
+    other = make_wheel(wheel.parent / "x", "0.1.0", **{"zenoh.json5": "{}"})
+    wheel.write_bytes(other.read_bytes())
 
 
 def emptied(wheel: Path, signature: Path) -> None:
@@ -158,6 +159,7 @@ def test_a_signature_with_the_lines_of_windows_is_read(signer: Signer, wheel: Pa
 
 
 def pinned(root: Path, text: str) -> Host:
+    root.mkdir()
     host = Host(root)
     host.files.write(PINNED, text.encode())
     return host

@@ -13,6 +13,7 @@ from tests.support.sandbox import allowed_calls, mount_commands, setting
 from tests.support.servers import ready
 
 UNIT = ROOT / "deploy/operator-panel.service"
+TEMPORARY = "temporary"  # in place of the unit's own /tmp: the test's files are in that of the machine
 PANEL = """
 title = "Cell 1"
 [record]
@@ -46,7 +47,7 @@ label = "Boxes"
 def sandboxed(data: Path) -> list[str]:
     """The command before another one: read-only mounts, no capabilities, the unit's filter."""
     drop = "exec setpriv --bounding-set=-all --inh-caps=-all"
-    shell = f'{mount_commands(data)} && {drop} "$@"'
+    shell = f'{mount_commands(data, data.parent / TEMPORARY)} && {drop} "$@"'
     sandbox = [sys.executable, "-m", "tests.support.sandbox", str(UNIT)]
     return ["unshare", "--mount", "sh", "-c", shell, "sh", *sandbox]
 
@@ -54,6 +55,7 @@ def sandboxed(data: Path) -> list[str]:
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     (tmp_path / "data").mkdir(mode=0o700)
+    (tmp_path / TEMPORARY).mkdir()
     return tmp_path / "data"
 
 
@@ -95,6 +97,7 @@ def test_every_feature_works_under_the_restrictions(data: Path, tmp_path: Path) 
         Server(
             ROOT,
             before=sandboxed(data),
+            TMPDIR=str(tmp_path / TEMPORARY),
             KIOSK_DATA=str(data),
             KIOSK_PANEL=str(panel),
             KIOSK_MODE="demo",
@@ -111,6 +114,7 @@ def test_every_feature_works_under_the_restrictions(data: Path, tmp_path: Path) 
         assert http.get("/widgets/history/trend?span_s=60").status_code == 200
         assert http.post("/diagnostics/check", json={"id": "check-0001"}).status_code == 200
         until(lambda: findings(server), "the doctor has checked", within_s=120)
+        assert http.post("/diagnostics/bundle", timeout=120).content.startswith(b"PK")
     assert verify(data).fault == ""
     assert {"operators-log.sqlite3", "trends.sqlite3", "log-key.pem", "kept-files", "copy"} <= {
         path.name for path in data.iterdir()

@@ -3,8 +3,9 @@ tests.support.sandbox UNIT COMMAND…`, as root, in a mount namespace of its own
 
 By libseccomp and prctl: the unit's system calls (by the lists of `systemd-analyze syscall-filter`),
 RestrictAddressFamilies, RestrictNamespaces, RestrictRealtime, MemoryDenyWriteExecute, NoNewPrivileges.
-By mounts: ProtectSystem=strict, with the data folder writable. By setpriv: no capabilities. Not here:
-the user of its own, ProtectHome, ProtectProc, PrivateDevices, PrivateUsers, RestrictSUIDSGID.
+By mounts: ProtectSystem=strict, with the data folder and that of temporary files writable. By setpriv:
+no capabilities. Not here: the user of its own, ProtectHome, ProtectProc, PrivateDevices, PrivateUsers,
+RestrictSUIDSGID.
 """
 
 import ctypes
