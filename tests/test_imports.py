@@ -27,6 +27,7 @@ ROOMS = (
     "permission",
     "audit",
     "access",
+    "certificates",
     "trends",
     "alarms",
     "recipes",

@@ -27,7 +27,6 @@ Kind = Literal[
     "alarm",
     "diagnostics",
     "recipe",
-    "access",
     "removed",
     "resumed",
 ]

@@ -9,9 +9,18 @@ from collections.abc import Sequence
 from typing import Final
 
 from app.cli.parser import Parser
-from app.cli.peer_config import add_domain, add_options, listen_of, own_domain, robot_entry, write
+from app.cli.peer_config import (
+    add_domain,
+    add_options,
+    listen_of,
+    own_domain,
+    robot_entry,
+    tls_of,
+    write,
+)
 from app.dialect.dialect import WITHOUT_BRIDGE
 from app.errors import KioskError
+from app.interfaces import load_interfaces
 from app.interfaces.names import TOPIC
 from app.panel import load_panel
 from app.settings import Settings
@@ -29,10 +38,12 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     options = parser.parse_args(arguments)
     try:
         panel = load_panel(options.panel or Settings.from_environment().panel)
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
+        entry = robot_entry(parser, panel, options.robot)
+        tls = tls_of(options, panel, entry)
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
-    entry = robot_entry(parser, panel, options.robot)
     if (entry or panel).dialect in WITHOUT_BRIDGE:
         parser.error(NO_BRIDGE)
     bridge = BridgeOptions(
@@ -40,8 +51,9 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         listen=listen_of(options, entry, LISTEN),
         nodename=options.nodename,
         prefixed=options.prefixed,
+        tls=tls,
     )
-    return write(bridge_config(panel, entry, bridge), options)
+    return write(bridge_config(panel, interfaces, entry, bridge), options)
 
 
 def _node(text: str) -> str:
@@ -53,7 +65,8 @@ def _node(text: str) -> str:
 def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
-        description="Writes a configuration of the bridge that lets through what a panel needs.",
+        description="Writes a configuration of the bridge that lets through what a panel needs, and"
+        " lets the panel send its commands only.",
         epilog="Start the bridge with it: ROS_DISTRO=jazzy zenoh-bridge-ros2dds -c bridge.json5",
     )
     add_options(parser, listen=LISTEN[0])

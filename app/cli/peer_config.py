@@ -11,13 +11,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from app.certificates.folder import AUTHORITY, CertificateFolder, about
+from app.certificates.issuing import CertificateError
 from app.cli.arguments import PANEL_HELP
+from app.cli.cell_certificates import KIOSK, peer_files
 from app.cli.output import OutputError, add_force, draft_of
 from app.cli.parser import Parser
 from app.dialect.dialect import DOMAIN_MOST
 from app.panel import Panel
 from app.panel.base import ENDPOINT
 from app.panel.model import RobotEntry
+from app.transport.access_rules import TlsFiles, over_tls
 
 
 def robot_entry(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | None:
@@ -33,8 +37,23 @@ def robot_entry(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | 
 
 
 def listen_of(options: Any, entry: RobotEntry | None, default: Sequence[str]) -> tuple[str, ...]:
-    """Where the panel connects: by the command line, else by the panel file."""
-    return tuple(options.listen or (entry.connect if entry and entry.connect else default))
+    """Where the panel connects: by the command line, else by the panel file; over TLS with --tls."""
+    endpoints = tuple(options.listen or (entry.connect if entry and entry.connect else default))
+    return endpoints if options.tls is None else over_tls(endpoints)
+
+
+def tls_of(options: Any, panel: Panel, entry: RobotEntry | None) -> TlsFiles | None:
+    """The files of --tls; CertificateError if one of them is not there."""
+    if options.tls is None:
+        return None
+    folder = CertificateFolder(options.tls.resolve())
+    name = peer_files(panel, entry)
+    certificate, key = folder.certificate(name), folder.key(name)
+    about(certificate)
+    if not key.exists():
+        raise CertificateError(f"{key} is not there: `operator-panel pki new` makes it")
+    kiosk = about(folder.certificate(KIOSK))
+    return TlsFiles(about(folder.certificate(AUTHORITY)).file, certificate, key, kiosk.name)
 
 
 def write(text: str, options: Any) -> int:
@@ -64,6 +83,13 @@ def add_options(parser: Parser, *, listen: str) -> None:
         metavar="ENDPOINT",
         help="where the panel connects, such as tcp/192.0.2.10:7447; may be given several times;"
         f" default: the robot's `connect` in the panel file, else {listen}",
+    )
+    add(
+        "--tls",
+        type=Path,
+        metavar="FOLDER",
+        help="the folder with certificates, as `operator-panel pki new` makes it: only who has the"
+        " panel's certificate can send what the panel sends",
     )
     add("--robot", metavar="ID", help="which robot, of a panel with several")
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from app.cli.parser import Parser
-from app.cli.peer_config import add_domain, add_options, listen_of, robot_entry, write
+from app.cli.peer_config import add_domain, add_options, listen_of, robot_entry, tls_of, write
 from app.dialect.dialect import WITHOUT_ROUTER
 from app.errors import KioskError
 from app.interfaces import load_interfaces
@@ -24,6 +24,8 @@ NO_ROUTER: Final = (
     "this robot is behind a bridge, by the panel file: `operator-panel bridge-config` writes a"
     " configuration of the bridge"
 )
+NOT_TLS: Final = "--tls needs a place that has TLS: name it with --listen tls/192.0.2.10:7448"
+OVER_TLS: Final = ("tls/", "quic/")
 INTERFACE: Final = re.compile(r"[^\s/\"\\]{1,15}")  # as Linux names them
 
 
@@ -33,17 +35,21 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     try:
         panel = load_panel(options.panel or Settings.from_environment().panel)
         interfaces = load_interfaces(panel.distro, panel.interfaces)
+        entry = robot_entry(parser, panel, options.robot)
+        tls = tls_of(options, panel, entry)
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
-    entry = robot_entry(parser, panel, options.robot)
     if (entry or panel).dialect in WITHOUT_ROUTER:
         parser.error(NO_ROUTER)
     router = RouterOptions(
         domain=(entry or panel).domain if options.domain is None else options.domain,
         listen=listen_of(options, entry, LISTEN),
         nodes=tuple(options.nodes or NODES),
+        tls=tls,
     )
+    if tls is not None and not all(end.startswith(OVER_TLS) for end in router.listen):
+        parser.error(NOT_TLS)
     return write(router_config(panel, interfaces, entry, router), options)
 
 

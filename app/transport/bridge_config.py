@@ -7,11 +7,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from app.interfaces import Interfaces
 from app.interfaces.names import GLOBAL, ROSOUT_TOPIC, SHARED_TOPICS, key_of
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.panel.widgets.service_action import Action, Call, ServerCommand
 from app.printable import printable
+from app.transport.access_rules import TlsFiles, access_control, tls_link
+from app.transport.bridge_access import bridge_rules
 
 LISTEN: Final = ("tcp/127.0.0.1:7447",)
 TIMEOUT_S: Final = 5.0  # the bridge's own, for each query that is not listed
@@ -27,6 +30,7 @@ class BridgeOptions:
     listen: Sequence[str] = LISTEN
     nodename: str = "web_ui"
     prefixed: bool = False
+    tls: TlsFiles | None = None
 
 
 def allowed(panel: Panel) -> dict[str, list[str]]:
@@ -63,7 +67,9 @@ def timeouts(panel: Panel) -> tuple[dict[str, float], dict[str, float]]:
     return services, actions
 
 
-def bridge_config(panel: Panel, entry: RobotEntry | None, options: BridgeOptions) -> str:
+def bridge_config(
+    panel: Panel, interfaces: Interfaces, entry: RobotEntry | None, options: BridgeOptions
+) -> str:
     """The file's text, JSON5 with comments. `entry` is one of several robots."""
     namespace = entry.namespace if entry else panel.namespace
     names = _Names(namespace, options.prefixed)
@@ -75,7 +81,9 @@ def bridge_config(panel: Panel, entry: RobotEntry | None, options: BridgeOptions
             '  mode: "router",',
             f"  // Where the panel's server connects: `connect` in its Zenoh configuration.\n"
             f"  listen: {{ endpoints: {json.dumps(list(options.listen))} }},",
-            _LINK,
+            *_link(options.tls),
+            "  // What is not named here is denied: nobody else says what the robot says.",
+            *access_control(bridge_rules(panel, interfaces, entry), options.tls),
             "  plugins: {",
             "    ros2dds: {",
             "      // What `ros2 node list` shows.",
@@ -164,6 +172,14 @@ def _named(kind: str, names: Iterable[str]) -> Iterator[str]:
     yield "        ],"
 
 
+def _link(tls: TlsFiles | None) -> Iterator[str]:
+    yield _LINK
+    if tls is not None:
+        yield from tls_link(tls, "      ")
+    yield "    },"
+    yield "  },"
+
+
 _LINK: Final = """\
   scouting: {
     multicast: { enabled: false },
@@ -176,9 +192,7 @@ _LINK: Final = """\
         keep_alive: 4,
         // A panel that takes nothing for so long (µs; default: 5 s) is cut off, and locks.
         queue: { congestion_control: { block: { wait_before_close: 200000 } } },
-      },
-    },
-  },"""
+      },"""
 
 _BLOCKING: Final = """\
       // What a reliable publisher says reaches the panel, or the panel is cut off: with false the

@@ -7,14 +7,12 @@ denied, in both directions.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 from app.dialect.bridge_dialect import TOKENS as BRIDGE_TOKENS
 from app.dialect.dialect import any_hash
-from app.dialect.latched import caches
 from app.dialect.peer_traits import RMW_ZENOH_TRAITS
 from app.dialect.rmw_zenoh_dialect import RmwZenohDialect
 from app.dialect.rmw_zenoh_tokens import NODE_PARTS, PANEL_NODE, every_token
@@ -22,6 +20,8 @@ from app.interfaces import Interfaces
 from app.panel.model import Panel, RobotEntry
 from app.printable import printable
 from app.robot.state import RobotState
+from app.transport import access_rules
+from app.transport.access_rules import EVERYTHING, PanelUse, Rule, TlsFiles, access_control, tls_link
 from app.transport.declarations import declarations
 from app.transport.rmw_zenoh_node import panel_endpoints
 
@@ -32,7 +32,7 @@ NODES: Final = ("lo",)
 NODE_PROTOCOL: Final = "tcp"
 ANY_ADDRESS: Final = (f"tcp/0.0.0.0:{PORT}", f"tcp/[::]:{PORT}")
 # `**` stands for no part that begins with "@": the admin space, tokens, and the caches of publishers.
-EVERYTHING: Final = ("**", "@/**", "@ros2_lv/**", "**/@adv/**")
+EVERYWHERE: Final = ("**", "@/**", "@ros2_lv/**", "**/@adv/**")
 MESSAGES: Final = (
     "put",
     "delete",
@@ -56,16 +56,7 @@ class RouterOptions:
     domain: int = 0
     listen: Sequence[str] = LISTEN
     nodes: Sequence[str] = NODES
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """What a panel may do; `inward` is to the router. Nothing without key expressions."""
-
-    id: str
-    messages: tuple[str, ...]
-    inward: bool
-    expressions: tuple[str, ...]
+    tls: TlsFiles | None = None
 
 
 def panel_rules(
@@ -75,36 +66,16 @@ def panel_rules(
     hashes are left open: a node does not receive what has another one than its own."""
     dialect = RmwZenohDialect(domain, any_hash)
     robot = RobotState(panel, interfaces, dialect, RMW_ZENOH_TRAITS, entry=entry)
-    declared = declarations(panel, interfaces, robot)
     on_demand = (dialect.topic(robot.key(topic), name) for topic, name in panel.on_demand().items())
-    read = _sorted([*declared.subscribe.values(), *on_demand])
-    sent, asked = _sorted(declared.publish.values()), _sorted(declared.query.values())
-    read_caches = tuple(map(caches, read))
-    own_caches = _sorted(caches(declared.publish[key]) for key in declared.latched)
     own = dialect.node_tokens(ANY, PANEL_NODE, panel_endpoints(panel, robot.key))
-    graph = (every_token(domain), BRIDGE_TOKENS)  # a panel may look whether a bridge is there
-    inward, outward = partial(Rule, inward=True), partial(Rule, inward=False)
-    look = ("declare_liveliness_subscriber", "liveliness_query")
-    # A cache is asked by the name of its token, and answers by that of its topic.
-    return [
-        inward("commands", ("put", "reply"), expressions=sent),
-        outward("command_subscribers", ("declare_subscriber",), expressions=sent),
-        inward("requests", ("query",), expressions=(*asked, ROUTER)),
-        outward("answers", ("reply", "declare_queryable"), expressions=(*asked, ROUTER)),
-        inward("subscriptions", ("declare_subscriber",), expressions=read),
-        outward("values", ("put", "reply"), expressions=read),
-        inward("latched_requests", ("query", *look), expressions=read_caches),
-        outward("latched", ("declare_queryable", "liveliness_token"), expressions=read_caches),
-        inward("graph_requests", look, expressions=graph),
-        outward("graph", ("liveliness_token",), expressions=graph),
-        inward("tokens", ("liveliness_token",), expressions=_sorted(map(_pattern, own))),
-        inward("own_caches", ("declare_queryable", "liveliness_token"), expressions=own_caches),
-        outward("own_cache_requests", ("query", *look), expressions=own_caches),
-    ]
-
-
-def _sorted(expressions: Iterable[str]) -> tuple[str, ...]:
-    return tuple(sorted(set(expressions)))
+    use = PanelUse(
+        declared=declarations(panel, interfaces, robot),
+        on_demand=on_demand,
+        admin=(ROUTER,),
+        graph=(every_token(domain), BRIDGE_TOKENS),  # a panel may look whether a bridge is there
+        tokens=map(_pattern, own),
+    )
+    return access_rules.panel_rules(use)
 
 
 def _pattern(token: str) -> str:
@@ -123,6 +94,7 @@ def router_config(
 ) -> str:
     """The file's text, JSON5 with comments. `entry` is one of several robots."""
     rules = panel_rules(panel, interfaces, entry, options.domain)
+    nodes = {"interfaces": options.nodes, "link_protocols": [NODE_PROTOCOL]}
     return "\n".join(
         [
             f"// The Zenoh router of a robot on rmw_zenoh, for the panel {_comment(str(panel.title))}.",
@@ -132,20 +104,9 @@ def router_config(
             "  // The robot's nodes come to the first. The panel comes to the others: `connect` in its",
             "  // zenoh.json5.",
             f"  listen: {{ endpoints: {json.dumps(_listen(options))} }},",
+            *_link(options.tls),
             _SETTINGS,
-            "  access_control: {",
-            "    enabled: true,",
-            '    default_permission: "deny",',
-            "    rules: [",
-            *_rule(Rule("everything", MESSAGES, True, EVERYTHING), '["ingress", "egress"]'),
-            *(line for rule in rules if rule.expressions for line in _rule(rule, _flow(rule))),
-            "    ],",
-            *_subjects(options),
-            "    policies: [",
-            '      { rules: ["everything"], subjects: ["nodes"] },',
-            f'      {{ rules: {_ids(rules)}, subjects: ["panel"] }},',
-            "    ],",
-            "  },",
+            *access_control([EVERYTHING_RULE, *rules], options.tls, nodes),
             "}",
             "",
         ]
@@ -161,43 +122,19 @@ def _comment(text: str) -> str:
     return printable(text).replace("\n", " ")
 
 
-def _flow(rule: Rule) -> str:
-    return '["ingress"]' if rule.inward else '["egress"]'
+def _link(tls: TlsFiles | None) -> Iterator[str]:
+    if tls is not None:
+        yield "  transport: {"
+        yield "    link: {"
+        yield from tls_link(tls, "      ")
+        yield "    },"
+        yield "  },"
 
 
-def _rule(rule: Rule, flows: str) -> Iterator[str]:
-    yield "      {"
-    yield f'        id: "{rule.id}",'
-    yield '        permission: "allow",'
-    yield f"        flows: {flows},"
-    yield f"        messages: {json.dumps(rule.messages)},"
-    yield "        key_exprs: ["
-    yield from (f"          {json.dumps(expression)}," for expression in rule.expressions)
-    yield "        ],"
-    yield "      },"
-
-
-def _ids(rules: Iterable[Rule]) -> str:
-    return json.dumps([rule.id for rule in rules if rule.expressions])
-
-
-def _subjects(options: RouterOptions) -> Iterator[str]:
-    yield "    subjects: ["
-    yield "      // The robot's nodes, by the way on which they come."
-    yield (
-        f'      {{ id: "nodes", interfaces: {json.dumps(list(options.nodes))},'
-        f' link_protocols: ["{NODE_PROTOCOL}"] }},'
-    )
-    yield "      // Everyone."
-    yield '      { id: "panel" },'
-    yield "    ],"
-
-
+EVERYTHING_RULE: Final = Rule(EVERYTHING, MESSAGES, True, EVERYWHERE)
 _SETTINGS: Final = """\
   scouting: {
     multicast: { enabled: false },
   },
   // The panel asks it to see whether the router responds.
-  adminspace: { enabled: true, permissions: { read: true, write: false } },
-  // As in rmw_zenoh's own configuration: nodes connect to each other.
-  routing: { router: { peers_failover_brokering: false } },"""
+  adminspace: { enabled: true, permissions: { read: true, write: false } },"""

@@ -7,7 +7,6 @@ from typing import Annotated
 from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
 
-from app.access.access import Access
 from app.audit import NullLog, OperatorLog
 from app.commands.press_limits import PressLimits
 from app.commands.receipts import Receipt
@@ -33,7 +32,6 @@ class AppState:
     log: OperatorLog | NullLog
     limits: PressLimits
     doctor: DoctorProcess
-    access: Access
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
 

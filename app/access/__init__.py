@@ -1,1 +1,0 @@
-"""Who a client is: users, roles, sign-in, sessions and tokens of programs."""
