@@ -107,8 +107,12 @@ class KeptFiles:
                 yield about.st_mtime, about.st_size, path
 
 
+def list_text(files: Iterable[tuple[str, str]]) -> bytes:
+    """What `sha256sum` prints for files, by the order of their names: (name, hash) of each."""
+    return "".join(f"{digest}  {name}\n" for name, digest in sorted(files)).encode()
+
+
 def list_digest(files: Iterable[tuple[str, str]]) -> str:
-    """One hash for files, by their names and hashes: SHA-256 of what `sha256sum` prints for them, by
-    the order of their names. "" without files."""
-    lines = [f"{digest}  {name}\n" for name, digest in sorted(files)]
-    return sha256("".join(lines).encode()) if lines else ""
+    """One hash for files: that of their list. "" without files."""
+    text = list_text(files)
+    return sha256(text) if text else ""

@@ -130,7 +130,7 @@ def read_files(folder: Path, run: Run) -> Iterator[tuple[str, bytes | LogError]]
     """Path below a folder, and content, of every file of a start that is kept, or why it is not."""
     manifest = read_manifest(folder, run)
     yield "manifest.json", manifest.as_json()
-    for group in KEPT:
+    for group in (*KEPT, "program"):
         for name, digest in manifest.files.get(group, {}).items():
             path = Path(Path(name).name) if group == PANEL else Path(group, *_below(name))
             try:

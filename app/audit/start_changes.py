@@ -14,7 +14,7 @@ MOST_ENTRIES: Final = 10  # of one start; the rest is counted
 ARROW: Final = "→"
 ABSENT: Final = "–"
 MORE: Final = "… more"
-# The groups of files whose changes are named by file; the program's are many, and named as one.
+# The groups of files whose changes are named by file; the program's are many, and its list is one.
 BY_FILE: Final = ("templates", "styles", "definitions", "catalogues", "pictures")
 
 
@@ -94,7 +94,7 @@ def changes(
         result |= {f"{group}: {name}": text for name, text in files.items()}
     for group in ("zenoh", "program"):
         if before.get(group) != after.get(group):
-            result[group] = f"{_count(before, group)} {ARROW} {_count(after, group)}"
+            result[group] = f"{_hash(before, group)} {ARROW} {_hash(after, group)}"
     return result
 
 
@@ -114,10 +114,9 @@ def _short_hashes(files: Mapping[str, Mapping[str, str]], group: str) -> dict[st
     return {name: digest[:12] for name, digest in files.get(group, {}).items()}
 
 
-def _count(files: Mapping[str, Mapping[str, str]], group: str) -> str:
-    from app.audit.kept_files import list_digest
-
-    return list_digest(files.get(group, {}).items())[:12] or ABSENT
+def _hash(files: Mapping[str, Mapping[str, str]], group: str) -> str:
+    """The hash of a group with one file."""
+    return "".join(digest[:12] for digest in files.get(group, {}).values()) or ABSENT
 
 
 def in_entries(changed: Mapping[str, str]) -> Sequence[dict[str, str]]:

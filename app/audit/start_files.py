@@ -1,13 +1,14 @@
 """The files and settings that a server starts with, by their hashes: its manifest."""
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from app.audit.kept_files import list_digest, sha256
+from app.audit.kept_files import list_digest, list_text, sha256
 from app.i18n.catalogue import files as catalogues
 from app.settings import PACKAGE, Settings, shipped_path
 from app.version import installed_version
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
 
 DEFINITIONS: Final = re.compile(r".*\.(msg|srv|action)")
 MOST_DEFINITIONS: Final = 2000
-PROGRAM: Final = re.compile(r".*\.(py|po|json|toml|html|js|css|svg)")
+PROGRAM: Final = (".py", ".po", ".json", ".toml", ".html", ".js", ".css", ".svg")
 SECRET: Final = re.compile(r"(?i)password|passwd|secret|token|\bpin\b|_pin\b|private|credential")
 USER_IN_URL: Final = re.compile(r"(?<=//)[^/@\s]+@")
 HIDDEN: Final = "…"
 
 # The groups of files, in the order in which they are kept. The Zenoh file may have a password and the
-# program is in its wheel: of these only the hash is.
+# program is in its wheel: of the one only the hash is, of the other the list of hashes.
 PANEL: Final = "panel"
 KEPT: Final = (PANEL, "templates", "styles", "definitions", "catalogues", "pictures")
 GROUPS: Final = (*KEPT, "zenoh", "program")
@@ -43,10 +44,10 @@ class Manifest:
 
     def digests(self) -> dict[str, str]:
         """One hash for the settings and for each group with files: that of the file itself for the
-        panel file and the Zenoh file, else that of their list."""
+        panel file and the Zenoh file, else that of their list; of the program, that list is a file."""
         own: dict[str, str] = {}
         for group, files in self.files.items():
-            alone = group in (PANEL, "zenoh") and len(files) == 1
+            alone = group in (PANEL, "zenoh", "program") and len(files) == 1
             own[group] = next(iter(files.values())) if alone else list_digest(files.items())
         text = "".join(f"{name}={value}\n" for name, value in sorted(self.settings.items()))
         return {name: digest for name, digest in own.items() if digest} | {
@@ -85,6 +86,9 @@ def read_start_files(settings: Settings, panel: "Panel", mode: str) -> StartFile
         files.setdefault(group, {})[name] = digest
         if group in KEPT:
             contents[digest] = data
+    program = list_text(_program())
+    files["program"] = {"sha256sum": sha256(program)}
+    contents[sha256(program)] = program
     return StartFiles(Manifest(installed_version(), settings_text(settings, mode), files), contents)
 
 
@@ -127,10 +131,20 @@ def _paths(settings: Settings, panel: "Panel") -> Iterator[tuple[str, str, Path]
         yield "catalogues", f"{tag}.po", Path(path)
     yield from (("pictures", name, path) for name, path in panel.picture_files.items())
     yield "zenoh", settings.zenoh.name, settings.zenoh
-    for root in (PACKAGE, shipped_path("templates"), shipped_path("static")):
-        for path in sorted(root.rglob("*")):
-            if PROGRAM.fullmatch(path.name) and path.is_file():
-                yield "program", f"{root.name}/{path.relative_to(root)}", path
+
+
+def _program() -> Iterator[tuple[str, str]]:
+    """Name and hash of each file of the program. Plain calls of the system: there are many files, and
+    the server waits for them."""
+    beside = (shipped_path("templates"), shipped_path("static"))  # in the package, unless a checkout
+    for root in map(str, (PACKAGE, *(path for path in beside if not path.is_relative_to(PACKAGE)))):
+        for folder, _, names in os.walk(root):
+            for name in names:
+                if name.endswith(PROGRAM):
+                    path = f"{folder}/{name}"
+                    with open(path, "rb", buffering=0) as file:
+                        digest = sha256(file.readall())
+                    yield f"{os.path.basename(root)}{path.removeprefix(root)}", digest
 
 
 def _name(path: Path, beside: Path) -> str:

@@ -262,6 +262,8 @@ def test_all_files_of_a_start_are_written_and_none_outside(
     assert (to / "catalogues/ja.po").is_file()
     assert json.loads((to / "manifest.json").read_text())["settings"]["KIOSK_MODE"] == "demo"
     assert not (to / "zenoh").exists()
+    check = ["sha256sum", "--check", "--quiet", str(to / "program/sha256sum")]
+    assert subprocess.run(check, cwd=ROOT, capture_output=True).returncode == 0
     capsys.readouterr()
 
 
