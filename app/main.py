@@ -225,7 +225,9 @@ async def _app_state(
         limits = PressLimits(partial(oplog.suppress, limited=True))
         doctor = _doctor(settings, server)
         async with open_fleet(settings, panel, revision, oplog, in_process, doctor) as fleet:
-            metrics = Metrics(fleet, lambda: oplog.left_out, lambda: limits.refused)
+            metrics = Metrics(
+                fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
+            )
             made = PageTemplates(templates, page_parts(panel))
             try:
                 yield AppState(fleet, assets, made, metrics, oplog, limits, doctor)

@@ -9,7 +9,7 @@ own thread, so that no press waits for the sync of another. Nothing here blocks 
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, contextmanager, suppress
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Final
 from app.audit.data_dir import DataDir
 from app.audit.database import Head
 from app.audit.entry import Entry, Origin
+from app.audit.log_copier import LogCopier, log_copiers
 from app.audit.log_writer import LogWriter
 from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
@@ -27,6 +28,7 @@ from app.audit.start_record import StartRecord
 from app.audit.ticket import Limits, Results, Ticket
 from app.errors import LogError
 from app.i18n import ENGLISH, TextLike, number, say
+from app.settings import Settings
 
 log = logging.getLogger("kiosk.log")
 
@@ -47,6 +49,7 @@ class OperatorLog:
         signs: bool = False,
     ) -> None:
         self.folder = folder
+        self.copiers: tuple[LogCopier, ...] = ()
         self._limits = limits
         self._folder = DataDir(folder)
         self._listeners: set[Callable[[], None]] = set()
@@ -67,12 +70,19 @@ class OperatorLog:
         self._writer.start()
         await self._wait_on_thread(self._writer.wait_until_tried)
 
+    def start_copies(self, settings: Settings) -> None:
+        """Copies the log to where the settings say, until it stops."""
+        self.copiers = log_copiers(settings, self.folder, lambda: self._writer.synced_seq)
+        for copier in self.copiers:
+            copier.start()
+
     async def stop(self) -> None:
-        """Writes the waiting entries and releases the folder."""
+        """Writes the waiting entries, also to the copies, and releases the folder."""
         if self._summary_timer is not None:
             self._summary_timer.cancel()
             self._write_summary()
         await self._wait_on_thread(self._writer.stop)
+        await asyncio.gather(*(asyncio.to_thread(copier.stop) for copier in self.copiers))
         self._readers.stop()
         self._folder.release()
 
@@ -95,9 +105,9 @@ class OperatorLog:
         return self._writer.head
 
     @property
-    def synced_seq(self) -> int:
-        """Entries up to this number are on the disk."""
-        return self._writer.synced_seq
+    def uncopied(self) -> Mapping[str, int]:
+        """How many entries each copy lacks, by what it is: `file`, `syslog`."""
+        return {copier.place: copier.uncopied for copier in self.copiers}
 
     @property
     def key(self) -> str:

@@ -16,6 +16,8 @@ TAIL_BYTES: Final = 65_536
 class CopyFile:
     """Appends entries to a file that only its user can read."""
 
+    kind: Final = "file"
+
     def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
         self.name = str(path)
         self._path = path

@@ -32,6 +32,10 @@ class Place(Protocol):
 
     name: str
 
+    @property
+    def kind(self) -> str:
+        """What it is: `file` or `syslog`."""
+
     def open(self) -> Entry | None:
         """Opens it; returns the newest entry there, None if that is not known."""
 
@@ -70,10 +74,10 @@ class LogCopier:
     """Copies from `start` to `stop`. `synced` is the number of the newest entry that is on the disk."""
 
     def __init__(
-        self, folder: Path, place: Place, synced: Callable[[], int], position: Position | None = None
+        self, folder: Path, where: Place, synced: Callable[[], int], position: Position | None = None
     ) -> None:
         self._folder = folder
-        self._place = place
+        self._where = where
         self._synced = synced
         self._position = position
         self._at = position.load() if position else (0, "")
@@ -82,6 +86,16 @@ class LogCopier:
         self._failures = 0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="operators-log-copy", daemon=True)
+
+    @property
+    def place(self) -> str:
+        """What it copies to: `file` or `syslog`."""
+        return self._where.kind
+
+    @property
+    def uncopied(self) -> int:
+        """How many entries the copy lacks."""
+        return max(0, self._synced() - self._at[0])
 
     def start(self) -> None:
         self._thread.start()
@@ -103,7 +117,7 @@ class LogCopier:
             else:
                 return
             finally:
-                self._place.close()
+                self._where.close()
                 self._save()
             delay = RETRY_DELAYS_S[min(self._failures, len(RETRY_DELAYS_S) - 1)]
             self._failures += 1
@@ -112,11 +126,11 @@ class LogCopier:
 
     def _copy(self) -> None:
         """Copies until the end."""
-        newest = self._place.open()
+        newest = self._where.open()
         if newest is not None:
             self._at = newest.seq, newest.hash
         if self._is_away:
-            log.info("the operator's log is copied to %s again", self._place.name)
+            log.info("the operator's log is copied to %s again", self._where.name)
         self._is_away = False
         while True:
             is_last = self._ended.is_set()
@@ -124,14 +138,14 @@ class LogCopier:
                 entries = self._next()
                 if not entries:
                     break
-                self._place.write(entries)
+                self._where.write(entries)
                 self._at, self._failures = (entries[-1].seq, entries[-1].hash), 0
                 if self._at[0] - self._saved >= SAVE_AFTER:
                     self._save()
             if is_last:
                 return
             if not self._ended.wait(POLL_S):
-                self._place.check()
+                self._where.check()
 
     def _is_cut(self) -> bool:
         """Whether the log ends before what was copied already."""
@@ -145,7 +159,7 @@ class LogCopier:
         if self._is_cut() or (last and last[0].hash != digest):
             log.error(
                 "the operator's log is not the one that was copied to %s: entry %d there is not in it",
-                self._place.name,
+                self._where.name,
                 seq,
             )
             self._at = 0, ""
@@ -153,7 +167,7 @@ class LogCopier:
 
     def _report_away(self, error: Exception) -> None:
         if not self._is_away:
-            log.error("the operator's log is not copied to %s: %s", self._place.name, error)
+            log.error("the operator's log is not copied to %s: %s", self._where.name, error)
         self._is_away = True
 
     def _save(self) -> None:
@@ -175,7 +189,7 @@ def _read(folder: Path, after: int, until: int) -> list[Entry]:
     return [Entry(*row) for row in rows]
 
 
-def log_copiers(settings: Settings, folder: Path, synced: Callable[[], int]) -> list[LogCopier]:
+def log_copiers(settings: Settings, folder: Path, synced: Callable[[], int]) -> tuple[LogCopier, ...]:
     """The copiers that the settings ask for."""
     copiers: list[LogCopier] = []
     if settings.log_copy is not None:
@@ -183,4 +197,4 @@ def log_copiers(settings: Settings, folder: Path, synced: Callable[[], int]) -> 
     if settings.syslog is not None:
         sink = SyslogSink(*settings.syslog, settings.syslog_ca)
         copiers.append(LogCopier(folder, sink, synced, Position(folder / "log-sent.json")))
-    return copiers
+    return tuple(copiers)

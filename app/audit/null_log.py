@@ -2,9 +2,10 @@
 another server has the folder."""
 
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 from app.audit.data_dir import DataDir
 from app.audit.database import Head
@@ -25,7 +26,7 @@ class NullLog:
     lock: TextLike = ""
     head: Head | None = None
     key = ""
-    synced_seq = 0
+    uncopied: Mapping[str, int] = MappingProxyType({})
     left_out = 0
 
     def __init__(self, folder: Path | None = None) -> None:

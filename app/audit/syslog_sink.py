@@ -31,6 +31,8 @@ class SyslogSink:
     """A connection to a syslog server. The protocol has no acknowledgement: over a new connection the
     last entries are sent again, and a collector knows them by their numbers."""
 
+    kind: Final = "syslog"
+
     def __init__(self, host: str, port: int, ca: Path | None) -> None:
         self.name = f"{host}:{port}"
         self._address = (host, port)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from app.alarms.state_times import NAME as STATES
 from app.audit import Limits, NullLog, OperatorLog
 from app.audit.kept_files import KeptFiles
-from app.audit.log_copier import log_copiers
 from app.audit.start_files import read_start_files
 from app.audit.start_record import StartRecord
 from app.panel import Panel
@@ -56,14 +55,12 @@ async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLo
         record = StartRecord(KeptFiles(folder), read, panel.revision)
         oplog = OperatorLog(folder, limits, mode, record, signs=True)
     await oplog.start()
-    copiers = log_copiers(settings, folder, lambda: oplog.synced_seq) if rules.enabled else []
-    for copier in copiers:
-        copier.start()
+    if isinstance(oplog, OperatorLog):
+        oplog.start_copies(settings)
     try:
         yield oplog
     finally:
         await oplog.stop()
-        await asyncio.gather(*(asyncio.to_thread(copier.stop) for copier in copiers))
 
 
 @asynccontextmanager

@@ -1,7 +1,7 @@
 """Counters since the start. app/web/prometheus.py exports them."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -39,13 +39,15 @@ class Metrics:
         fleet: Fleet | None = None,
         left_out: Callable[[], int] = lambda: 0,
         limited: Callable[[], int] = lambda: 0,
+        uncopied: Callable[[], Mapping[str, int]] = dict,
     ) -> None:
         """Reports the links and topics of the fleet's robots. `left_out` is how many refusals the
         operator's log only counts, `limited` how many presses, holds and cancels were more than their
-        limit."""
+        limit, `uncopied` how many of its entries each copy of it lacks."""
         self.fleet = fleet
         self.left_out = left_out
         self.limited = limited
+        self.uncopied = uncopied
         self.presses: dict[str, Count] = {}  # by outcome
         self.streams = Open()
 

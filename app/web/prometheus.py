@@ -38,6 +38,11 @@ class _Of(Collector):
         yield CounterMetricFamily("kiosk_refusals_left_out", about, value=metrics.left_out())
         about = "Presses, holds and cancels over their limit, answered 429"
         yield CounterMetricFamily("kiosk_presses_limited", about, value=metrics.limited())
+        about = "Entries of the operator's log that a copy of it lacks"
+        uncopied = GaugeMetricFamily("kiosk_log_uncopied", about, labels=["copy"])
+        for place, entries in metrics.uncopied().items():
+            uncopied.add_metric([place], entries)
+        yield uncopied
         presses = CounterMetricFamily("kiosk_presses", "Presses by outcome", labels=["outcome"])
         for outcome, count in metrics.presses.items():
             presses.add_metric([outcome], count.value, created=count.since)

@@ -415,6 +415,8 @@ def test_a_server_signs_copies_and_ends_with_a_signature(tmp_path: Path, collect
         KIOSK_SYSLOG_CA=str(collector.ca),
     ) as server:
         assert server.press("start", inputs={}).json()["outcome"] == "published"
+        until(lambda: 'log_uncopied{copy="file"} 0.0' in server.http.get("/metrics").text, "copied")
+        assert 'log_uncopied{copy="syslog"}' in server.http.get("/metrics").text
         assert "log is signed with the key" in server.http.get("/help").text
     copied_entries: list[Entry] = list(read_copy(copy))
     assert {"began", "pressed", "closed", "signed"} <= {entry.kind for entry in copied_entries}
