@@ -17,6 +17,8 @@ from starlette.middleware.gzip import GZipMiddleware
 from uvicorn import Config as ServerConfig
 
 from app import ros_logging
+from app.access.access import Access
+from app.access.users_file import UsersFile
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
@@ -28,13 +30,14 @@ from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.repeated_records import RepeatedRecords
-from app.runtime.assembly import check_zenoh, open_fleet, open_log
+from app.runtime.assembly import check_zenoh, data_folder, open_fleet, open_log
 from app.runtime.doctor_process import DoctorProcess
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets, require_files
+from app.web.bearer_guard import BearerGuard
 from app.web.connections import Connection
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
@@ -65,6 +68,7 @@ from app.web.routes import (
     presses,
     recipes,
     recordings,
+    session,
     static,
     trends,
 )
@@ -72,6 +76,7 @@ from app.web.routes import audit_log as log_routes
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, urls
+from app.web.session_end import release_control
 from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
@@ -125,6 +130,7 @@ def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None
     app.add_middleware(LanguageHeaders)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(RequestGuard, hosts=settings.hosts, embed=embed)
+    app.add_middleware(BearerGuard)
     app.add_middleware(Turns)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
@@ -136,7 +142,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    further = (diagnostics, recordings, help, static, health, display, description)
+    further = (diagnostics, recordings, help, session, static, health, display, description)
     for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, *further):
         app.include_router(routes.router)
     if dev:
@@ -163,6 +169,7 @@ async def _lifespan(
     """From the start of the server to its end."""
     async with _app_state(settings, panel, app.state.server) as state:
         app.state.app_state = state
+        state.access.on_end(partial(release_control, state))
         ports: set[int] = set()
         watchdog = _watchdog(state)
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
@@ -171,6 +178,7 @@ async def _lifespan(
                 _log_urls(app.state.server, ports, settings.hosts),
                 pages.compiled(state.templates.environment(panel.language)),
                 count_repeated(repeated),
+                state.access.watch(),
             )
             tasks = [asyncio.create_task(work) for work in works]
             try:
@@ -229,9 +237,12 @@ async def _app_state(
                 fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
             )
             made = PageTemplates(templates, page_parts(panel))
+            access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
+            await access.reload()
             try:
-                yield AppState(fleet, assets, made, metrics, oplog, limits, doctor)
+                yield AppState(fleet, assets, made, metrics, oplog, limits, doctor, access)
             finally:
+                access.close()
                 await doctor.stop()
 
 

@@ -27,6 +27,7 @@ Kind = Literal[
     "alarm",
     "diagnostics",
     "recipe",
+    "access",
     "removed",
     "resumed",
 ]

@@ -52,6 +52,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "doctor": Command("find out what is wrong between a panel, this machine and the robot", "doctor"),
     "support": Command("collect what support needs to know in a zip file", "support"),
     "recipes": Command("list, export and import the recipes of a panel", "recipes"),
+    "users": Command("add, change and list users and tokens of programs", "users"),
     "bridge-config": Command("write a configuration of the bridge that fits a panel", "bridge_config"),
     "interfaces": Command("copy the definitions of ROS packages beside a panel", "interfaces"),
     "router-config": Command(

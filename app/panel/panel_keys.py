@@ -25,7 +25,15 @@ from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.machine_state import StateRules
 from app.panel.recipe import RecipeSet
 from app.panel.robot_entry import Domain, RobotEntry
-from app.panel.rules import BrandRules, ControlRules, DiagnosticRules, EmbedRules, LogRules, RecordRules
+from app.panel.rules import (
+    AccessRules,
+    BrandRules,
+    ControlRules,
+    DiagnosticRules,
+    EmbedRules,
+    LogRules,
+    RecordRules,
+)
 from app.panel.screen import Keyboard, ScreenRules
 from app.panel.source import Source
 from app.panel.stories import StoryName
@@ -58,6 +66,7 @@ class PanelKeys(Description):
     frame: Frame = Frame.model_validate({})
     state: StateRules | None = None
     control: ControlRules = ControlRules(required=False)
+    access: AccessRules = AccessRules()
     embed: EmbedRules = EmbedRules()
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")

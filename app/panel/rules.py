@@ -1,12 +1,32 @@
-"""The tables `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]` and `[record]` of a panel
-file."""
+"""The tables `[access]`, `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]` and `[record]`
+of a panel file."""
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Note, Seconds, TopicName
+from app.panel.base import Description, Id, Note, Seconds, TopicName
 from app.pictures import PICTURE
+from app.roles import ENGINEER, ROLES
+
+
+def _not_a_role(group: str) -> str:
+    if group in ROLES:
+        raise ValueError(f'"{group}" is a role: a group has another name, such as "quality"')
+    return group
+
+
+class AccessRules(Description):
+    """Who may use the panel. `open`: without users, everybody may do everything. A user is signed out
+    after `idle_s` seconds without a touch; 0: never. `groups` are the panel's own, beside the roles.
+    Signed-in users and programs on other machines have at most the role `remote`."""
+
+    open: bool = True
+    idle_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 600.0
+    groups: Annotated[
+        tuple[Annotated[Id, AfterValidator(_not_a_role)], ...], Field(strict=False, max_length=20)
+    ] = ()
+    remote: Literal["viewer", "operator", "maintenance", "engineer"] = ENGINEER
 
 
 class BrandRules(Description):

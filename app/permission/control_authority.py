@@ -229,12 +229,12 @@ class ControlAuthority:
         self._on_hand_over(hand_over)
 
     def _update(self, who: Principal, updated: Callable[[Party], Party]) -> None:
-        """Updates the parties that are this client."""
+        """Updates the parties that are this client: the user there may be another one now."""
         holder, requester = self._recorded.holder, self._recorded.requester
         if holder and same_client(who, holder.who):
-            self._recorded = self._recorded._replace(holder=updated(holder))
+            self._recorded = self._recorded._replace(holder=updated(holder)._replace(who=who))
         elif requester and same_client(who, requester.who):
-            self._recorded = self._recorded._replace(requester=updated(requester))
+            self._recorded = self._recorded._replace(requester=updated(requester)._replace(who=who))
 
     def _party(self, who: Principal, life_s: float) -> Party:
         return Party(who, self._now(), self._now() + life_s, life_s == LIFE_S)

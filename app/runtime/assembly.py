@@ -5,6 +5,7 @@ import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.alarms.state_times import NAME as STATES
@@ -36,6 +37,11 @@ def mode_of(settings: Settings, panel: Panel) -> Mode:
     return settings.mode or panel.mode
 
 
+def data_folder(settings: Settings, panel: Panel) -> Path:
+    """The data folder of a server with this panel."""
+    return settings.data_folder(mode_of(settings, panel))
+
+
 def check_zenoh(settings: Settings, panel: Panel) -> None:
     """KioskError if the Zenoh configuration can't be used."""
     if mode_of(settings, panel) == "live":
@@ -47,7 +53,7 @@ def check_zenoh(settings: Settings, panel: Panel) -> None:
 async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | NullLog]:
     """The operator's log; FolderInUse if another server has its folder."""
     mode, rules = mode_of(settings, panel), panel.log
-    folder = settings.data_folder(mode)
+    folder = data_folder(settings, panel)
     oplog: OperatorLog | NullLog = NullLog(folder)
     if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
 
+from app.access.access import Access
 from app.audit import NullLog, OperatorLog
 from app.commands.press_limits import PressLimits
 from app.commands.receipts import Receipt
@@ -32,6 +33,7 @@ class AppState:
     log: OperatorLog | NullLog
     limits: PressLimits
     doctor: DoctorProcess
+    access: Access
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
 

@@ -1,7 +1,8 @@
-"""The client of a request, by a cookie that the server sets. Its token is in no path."""
+"""The client of a request, by a cookie that the server sets, and its session, by another. No token is
+in a path."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from fastapi import Request
@@ -9,33 +10,57 @@ from fastapi.responses import Response
 from starlette.requests import HTTPConnection
 
 from app.permission.client_places import client_key
-from app.permission.clients import TOKEN, anonymous, new_client, new_token
+from app.permission.clients import TOKEN, Client, anonymous, new_client, new_token
 from app.permission.principal import Principal
 from app.web.app_state import AppState, site_of
 
 COOKIE: Final = "panel_browser"
+SESSION: Final = "panel_session"
+BEARER: Final = re.compile(r"Bearer +(?P<token>[A-Za-z0-9._~+/-]{1,200}=*) *", re.IGNORECASE)
 KEPT_S: Final = 365 * 86_400
 OTHER_SITES: Final = frozenset({"cross-site", "same-site"})
 
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """The client of a connection; `token` is "" without a valid cookie."""
+    """The client of a connection; `token` is "" without a valid cookie, `session` the id of a session,
+    `bearer` the token of a program, "" without them."""
 
     token: str
     address: str
+    session: str = field(default="", repr=False)
+    bearer: str = field(default="", repr=False)
 
     def principal(self, state: AppState) -> Principal:
         """The principal at this moment; an anonymous one without a token."""
+        return state.access.principal(self.client(state), self.session, self.bearer)
+
+    def client(self, state: AppState) -> Client:
         if not self.token:
-            return Principal(anonymous(self.address))
-        return Principal(state.clients.identify(self.token, self.address))
+            return anonymous(self.address)
+        return state.clients.identify(self.token, self.address)
 
 
 def caller(request: HTTPConnection) -> Caller:
     token = request.cookies.get(COOKIE, "")
     address = request.client.host if request.client else ""
-    return Caller(token if TOKEN.fullmatch(token) else "", address)
+    session = request.cookies.get(session_cookie(request), "")
+    own = token if TOKEN.fullmatch(token) else ""
+    return Caller(own, address, session, bearer_of(request.headers.get("authorization", "")))
+
+
+def bearer_of(authorization: str) -> str:
+    """The token of a program in the header Authorization; "" without one."""
+    match = BEARER.fullmatch(authorization)
+    return match["token"] if match else ""
+
+
+def session_cookie(request: HTTPConnection) -> str:
+    """The name of the cookie of a session. Over HTTPS its prefix binds it to this host (RFC 6265bis);
+    below a root path to HTTPS only, as another panel may be at the same host."""
+    if request.url.scheme not in ("https", "wss"):
+        return SESSION
+    return f"__Secure-{SESSION}" if site_of(request).root else f"__Host-{SESSION}"
 
 
 def client_of(connection: HTTPConnection) -> str:
@@ -61,8 +86,10 @@ def principal_with_new_token(
         return who, ""
     token = new_token()
     if opened_by_person(request):
-        return Principal(state.clients.identify(token, who.client.address)), token
-    return Principal(new_client(token, who.client.address)), token
+        client = state.clients.identify(token, who.client.address)
+    else:
+        client = new_client(token, who.client.address)
+    return state.access.principal(client, bearer=caller(request).bearer), token
 
 
 def set_client_cookie(response: Response, request: Request, token: str) -> Response:
@@ -77,6 +104,21 @@ def set_client_cookie(response: Response, request: Request, token: str) -> Respo
             samesite="strict",
             secure=request.url.scheme == "https",
         )
+    return response
+
+
+def set_session_cookie(response: Response, request: Request, session_id: str) -> Response:
+    """The response, with the cookie of a session, which the browser drops when it ends. "" drops it
+    now."""
+    response.set_cookie(
+        session_cookie(request),
+        session_id,
+        max_age=None if session_id else 0,
+        path=site_of(request).root or "/",
+        httponly=True,
+        samesite="strict",
+        secure=request.url.scheme == "https",
+    )
     return response
 
 

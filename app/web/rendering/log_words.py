@@ -16,8 +16,8 @@ from app.printable import printable
 
 OUTCOMES: Final = (
     "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
-    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "recipe", "began", "changed",
-    "signed", "resumed", "removed",
+    "refused", "unknown", "pressed", "control", "alarm", "diagnostics", "recipe", "access", "began",
+    "changed", "signed", "resumed", "removed",
 )  # fmt: skip
 HASH: Final = re.compile(r"[0-9a-f]{64}")
 HASH_SHOWN: Final = 12  # characters; the CSV has all

@@ -1,0 +1,1 @@
+"""Who a client is: users, roles, sign-in, sessions and tokens of programs."""

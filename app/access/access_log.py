@@ -1,0 +1,151 @@
+"""Entries of sign-ins and of changes of users for the operator's log. No secret gets here."""
+
+import json
+import logging
+import secrets
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from app.access.secrets_hash import Way
+from app.access.sessions import Session
+from app.access.users import Change, UserBook
+from app.audit.entry import Entry, Origin, new_entry
+from app.audit.press_record import origin_of
+from app.errors import LogError
+from app.i18n import TextLike, say
+from app.permission.clients import Client
+from app.permission.principal import Principal
+
+log = logging.getLogger("kiosk.access")
+
+STATE: Final = "users.logged"  # what the operator's log has of the users' file
+USED_EVERY_S: Final = 3600.0  # the last use of a token is kept this coarsely
+ACTS: Final = (
+    "add", "role", "groups", "pin", "password", "badge", "disable", "enable", "remove", "token",
+    "revoke",
+)  # fmt: skip
+
+
+class AccessLog(Protocol):
+    """The operator's log as sign-ins use it."""
+
+    def add(self, entry: Entry) -> None: ...
+    def allowed(self, origin: Origin) -> bool: ...
+    def suppress(self, origin: Origin, limited: bool = False) -> None: ...
+    async def closed(self, entry: Entry) -> TextLike: ...
+
+
+@dataclass(slots=True)
+class _State:
+    """The number of the last logged change, and when tokens were last used (ISO 8601, whole hours)."""
+
+    logged: int
+    used: dict[str, str]
+
+
+class AccessLogWriter:
+    """Writes the entries; keeps in the data folder up to which change they are written."""
+
+    def __init__(self, oplog: AccessLog, folder: Path, wall: Callable[[], float] = time.time) -> None:
+        self._log = oplog
+        self._path = folder / STATE
+        self._wall = wall
+        self._state = _read(self._path)
+        self._used_at: dict[str, float] = {}
+        self._places: dict[str, Origin] = {}
+
+    def signed_in(self, who: Principal, way: Way) -> None:
+        origin = origin_of(who)
+        self._places[who.client.id] = origin
+        reason = say(f"log_signed_in_{way}", name=who.user)
+        self._add(
+            new_entry(
+                "access", origin, {"role": who.role}, reason, action="sign_in", outcome="accepted"
+            )
+        )
+
+    def signed_out(self, session: Session, reason: str) -> None:
+        origin = self._places.pop(session.client.id, None) or origin_of(Principal(session.client))
+        sentence = say(f"log_signed_out_{reason}", name=session.user)
+        self._add(new_entry("access", origin, reason=sentence, action="sign_out", outcome="accepted"))
+
+    def _add(self, entry: Entry) -> None:
+        try:
+            self._log.add(entry)
+        except LogError as error:
+            log.warning("%s is not in the operator's log: %s", entry.reason, error)
+
+    async def failed(self, client: Client, user: str, code: str) -> None:
+        """A failed sign-in, if the quota of refusals permits an entry. `user` is the name of a user
+        that exists, else "": what was typed as a name may be a secret."""
+        origin = origin_of(Principal(client))
+        if not self._log.allowed(origin):
+            self._log.suppress(origin)
+            return
+        about = {"user": user} if user else {}
+        await self._log.closed(
+            new_entry("access", origin, about, say(code), action="sign_in", outcome="refused")
+        )
+
+    def changes(self, book: UserBook) -> None:
+        """Writes the changes that are not written yet."""
+        new = [change for change in book.changes if change.number > self._state.logged]
+        if not new:
+            return
+        if new[0].number > self._state.logged + 1 and self._state.logged:
+            log.warning("%d changes of users are not in the operator's log", new[0].number - 1)
+        for change in new:
+            try:
+                self._log.add(_entry(change))
+            except LogError:
+                break  # the rest later
+            self._state.logged = change.number
+        self._write()
+
+    def token_used(self, name: str) -> None:
+        """Keeps the hour of the use of a token."""
+        now = self._wall()
+        if now - self._used_at.get(name, 0.0) < USED_EVERY_S:
+            return
+        self._used_at[name] = now
+        self._state.used[name] = time.strftime("%Y-%m-%dT%H:00Z", time.gmtime(now))
+        self._write()
+
+    def _write(self) -> None:
+        draft = self._path.with_name(f".{self._path.name}.{secrets.token_hex(4)}")
+        text = json.dumps({"logged": self._state.logged, "used": self._state.used})
+        try:
+            draft.touch(mode=0o600)
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(self._path)
+        except OSError as error:
+            log.warning("%s can not be written: %s", self._path, error)
+            with suppress(OSError):
+                draft.unlink()
+
+
+def last_uses(folder: Path) -> dict[str, str]:
+    """When each token was last used, by its name, in whole hours."""
+    return _read(folder / STATE).used
+
+
+def _entry(change: Change) -> Entry:
+    act = change.act if change.act in ACTS else "role"
+    reason: TextLike = say(
+        f"log_users_{act}", name=change.name, detail=change.detail, by=change.by, at=change.at
+    )
+    origin = Origin(address="", who=change.by)
+    values = {"user": change.name, "detail": change.detail, "at": change.at}
+    return new_entry("access", origin, values, reason, action=f"users_{act}", outcome="accepted")
+
+
+def _read(path: Path) -> _State:
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+        return _State(int(content["logged"]), {str(k): str(v) for k, v in content["used"].items()})
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return _State(0, {})

@@ -1,0 +1,297 @@
+"""`operator-panel users`: users, roles and tokens of programs, in the data folder.
+
+A running server takes a change within a second. Exit status: 0 done, 1 refused, 2 the data folder or
+its users' file can't be used. Secrets come from standard input only.
+"""
+
+import getpass
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from app.access.access_log import last_uses
+from app.access.secrets_hash import (
+    LONGEST,
+    WAYS,
+    Way,
+    badge_hash,
+    cost_of_machine,
+    fault_of,
+    hashed,
+    memory_of_machine,
+    new_api_token,
+    token_hash,
+)
+from app.access.users import (
+    ApiToken,
+    User,
+    UserBook,
+    UsersError,
+    check_group,
+    check_name,
+    check_role,
+)
+from app.access.users_file import UsersFile
+from app.cli.arguments import environment
+from app.cli.parser import Parser
+from app.errors import KioskError
+from app.panel import load_panel
+from app.roles import ROLES
+from app.settings import Settings
+
+PROG: Final = "python -m app.cli users"
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    options = make_parser(prog).parse_args(arguments)
+    try:
+        file = UsersFile(_folder(options))
+    except (KioskError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    try:
+        status: int = options.run(options, file)
+    except UsersError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"{file.path}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return status
+
+
+def _folder(options: Any) -> Path:
+    """The data folder; the panel is read only if it decides which."""
+    settings = Settings.from_environment({**os.environ, **environment(options)})
+    if settings.data is not None:
+        return settings.data
+    return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
+
+
+def _change(options: Any, file: UsersFile, edit: Callable[[UserBook], UserBook], detail: str) -> None:
+    """Changes the file, with the change for the operator's log."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    act, name, by = options.act, options.name, os.environ.get("SUDO_USER") or getpass.getuser()
+    file.edit(lambda book: edit(book).noted(now, act, name, detail, by))
+
+
+def _user(book: UserBook, name: str) -> User:
+    user = book.user(name)
+    if user is None:
+        there = ", ".join(other.name for other in book.users) or "none yet: `users add` adds them"
+        raise UsersError(f'there is no user "{name}"; there is {there}')
+    return user
+
+
+def _secrets(options: Any) -> dict[Way, str]:
+    """The secrets that the options name, a line of standard input each, in the order of `WAYS`."""
+    secrets: dict[Way, str] = {}
+    for way in WAYS:
+        if not getattr(options, f"{way}_stdin", False):
+            continue
+        prompt = f"{way}: "
+        if sys.stdin.isatty():
+            line = getpass.getpass(prompt)
+        else:
+            line = sys.stdin.readline(4 * LONGEST).rstrip("\r\n")
+        if fault := fault_of(way, line):
+            raise UsersError(fault)
+        secrets[way] = line
+    return secrets
+
+
+def _hashes(secrets: dict[Way, str], book: UserBook, name: str) -> dict[Way, str]:
+    """The hashes of secrets by way; UsersError if another user has the badge."""
+    cost = cost_of_machine(memory_of_machine())
+    hashes: dict[Way, str] = {}
+    for way, secret in secrets.items():
+        if way == "badge":
+            hashes[way] = badge_hash(secret, book.badge_salt)
+            other = book.user_of_badge(hashes[way])
+            if other is not None and other.name.casefold() != name.casefold():
+                raise UsersError(f'this badge is that of "{other.name}": a badge has one user')
+        else:
+            hashes[way] = hashed(secret, cost)
+    return hashes
+
+
+def _add(options: Any, file: UsersFile) -> int:
+    name, groups = check_name(options.name), tuple(map(check_group, options.group))
+    secrets = _secrets(options)
+    if not secrets:
+        raise UsersError(
+            "a user needs a PIN, a password or a badge: --pin-stdin, --password-stdin or --badge-stdin"
+        )
+
+    def edit(book: UserBook) -> UserBook:
+        if book.user(name) is not None:
+            raise UsersError(f'there is a user "{name}": `users pin` or `users role` changes it')
+        user = User(name, options.role, groups)
+        return book.with_user(user.with_hashes(_hashes(secrets, book, name)), _now())
+
+    _change(options, file, edit, ", ".join((options.role, *groups)))
+    print(f'"{name}" can sign in as {options.role} with {" or ".join(secrets)}')
+    return 0
+
+
+def _role(options: Any, file: UsersFile) -> int:
+    groups = None if options.group is None else tuple(map(check_group, filter(None, options.group)))
+
+    def edit(book: UserBook) -> UserBook:
+        user = _user(book, options.name)
+        changed = replace(user, role=options.role)
+        if groups is not None:
+            changed = replace(changed, groups=groups)
+        return book.with_user(changed, _now())
+
+    _change(options, file, edit, ", ".join((options.role, *(groups or ()))))
+    return 0
+
+
+def _secret(way: Way, options: Any, file: UsersFile) -> int:
+    if options.none:
+        secrets: dict[Way, str] = {}
+    else:
+        setattr(options, f"{way}_stdin", True)
+        secrets = _secrets(options)
+
+    def edit(book: UserBook) -> UserBook:
+        user = _user(book, options.name)
+        changed = user.with_hashes(_hashes(secrets, book, user.name) or {way: ""})
+        if not changed.ways:
+            raise UsersError(f'"{user.name}" could not sign in any more: `users disable` says so')
+        return book.with_user(changed, _now())
+
+    _change(options, file, edit, "removed" if options.none else "changed")
+    return 0
+
+
+def _disabled(disabled: bool, options: Any, file: UsersFile) -> int:
+    def edit(book: UserBook) -> UserBook:
+        return book.with_user(replace(_user(book, options.name), disabled=disabled), _now())
+
+    _change(options, file, edit, options.act)
+    return 0
+
+
+def _remove(options: Any, file: UsersFile) -> int:
+    _change(
+        options, file, lambda book: book.without_user(_user(book, options.name).name), "with all rights"
+    )
+    return 0
+
+
+def _list(options: Any, file: UsersFile) -> int:
+    book = file.read()
+    rows: list[dict[str, Any]] = [
+        {
+            "name": user.name,
+            "role": user.role,
+            "groups": list(user.groups),
+            "signs_in_with": list(user.ways),
+            "disabled": user.disabled,
+            "created": user.created,
+            "changed": user.changed,
+        }
+        for user in book.users
+    ]
+    if options.json:
+        print(json.dumps(rows, ensure_ascii=False, indent=1))
+        return 0
+    for row in rows:
+        groups = f" ({', '.join(row['groups'])})" if row["groups"] else ""
+        off = ", disabled" if row["disabled"] else ""
+        print(f"{row['name']}: {row['role']}{groups}, {' or '.join(row['signs_in_with'])}{off}")
+    if not rows:
+        print(f"no users in {file.folder}: everybody at this machine may do everything")
+    return 0
+
+
+def _token(options: Any, file: UsersFile) -> int:
+    name, token = check_name(options.name, "token"), new_api_token()
+
+    def edit(book: UserBook) -> UserBook:
+        if any(known.name == name for known in book.tokens):
+            raise UsersError(f'there is a token "{name}": `users revoke` removes it')
+        made = ApiToken(name, check_role(options.role), token_hash(token), _now())
+        return replace(book, tokens=(*book.tokens, made))
+
+    _change(options, file, edit, options.role)
+    print(token)
+    print("this token is shown only now: Authorization: Bearer <token>", file=sys.stderr)
+    return 0
+
+
+def _tokens(options: Any, file: UsersFile) -> int:
+    used = last_uses(file.folder)
+    rows = [
+        {
+            "name": token.name,
+            "role": token.role,
+            "created": token.created,
+            "last_used": used.get(token.name),
+        }
+        for token in file.read().tokens
+    ]
+    if options.json:
+        print(json.dumps(rows, ensure_ascii=False, indent=1))
+        return 0
+    for row in rows:
+        print(f"{row['name']}: {row['role']}, last used {row['last_used'] or 'never'}")
+    return 0
+
+
+def _revoke(options: Any, file: UsersFile) -> int:
+    def edit(book: UserBook) -> UserBook:
+        if all(token.name != options.name for token in book.tokens):
+            there = ", ".join(token.name for token in book.tokens) or "none"
+            raise UsersError(f'there is no token "{options.name}"; there is {there}')
+        return replace(book, tokens=tuple(t for t in book.tokens if t.name != options.name))
+
+    _change(options, file, edit, "revoked")
+    return 0
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def make_parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog, description="The users of a panel. Secrets are read from standard input."
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(act: str, about: str, run: Callable[[Any, UsersFile], int], name: str = "NAME") -> Parser:
+        command: Parser = commands.add_parser(act, help=about)
+        if name:
+            command.add_argument("name", metavar=name, help="as it is shown, and typed at a sign-in")
+        command.add_argument("--data", metavar="FOLDER", help="the data folder (KIOSK_DATA)")
+        command.add_argument("--panel", metavar="PANEL", help="the panel whose data folder it is")
+        command.set_defaults(run=run, act=act)
+        return command
+
+    added = add("add", "add a user", _add)
+    roles = add("role", "change a user's role and groups", _role)
+    tokens = add("token", "make a token for a program, and print it once", _token)
+    for command in (added, roles, tokens):
+        command.add_argument("--role", choices=ROLES, required=True)
+    added.add_argument("--group", action="append", default=[], help="a group of [access]; repeatable")
+    roles.add_argument("--group", action="append", help='instead of the groups so far; "" for none')
+    for way in WAYS:
+        added.add_argument(f"--{way}-stdin", action="store_true", help=f"the next line is the {way}")
+        changed = add(way, f"change a user's {way}, from standard input", partial(_secret, way))
+        changed.add_argument("--none", action="store_true", help=f"no {way} any more")
+    add("disable", "a user can't sign in, and is signed out", partial(_disabled, True))
+    add("enable", "a disabled user can sign in again", partial(_disabled, False))
+    add("remove", "remove a user", _remove)
+    add("revoke", "remove a token", _revoke)
+    for act, about, run in (("list", "list the users", _list), ("tokens", "list the tokens", _tokens)):
+        add(act, about, run, "").add_argument("--json", action="store_true", help="as JSON")
+    return parser

@@ -1,0 +1,16 @@
+"""What follows when a user is no longer signed in at a browser."""
+
+from app.access.access import EndReason
+from app.access.sessions import Session
+from app.permission.principal import Principal
+from app.web.app_state import AppState
+
+
+def release_control(state: AppState, session: Session, reason: EndReason) -> None:
+    """A browser where nobody is signed in has no control; a hand-over passes it to the next user."""
+    if reason == "hand_over":
+        return
+    who = Principal(session.client)
+    for robot in state.fleet.sessions:
+        if robot.control.rules.required and not robot.control.release(who):
+            robot.show()
