@@ -14,6 +14,7 @@ from app.panel.base import (
     Description,
     File,
     Id,
+    NodeName,
     Seconds,
     TopicName,
     TopicQos,
@@ -26,7 +27,6 @@ from app.panel.number_format import Factor
 from app.panel.widgets.displays import StateValue
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
-from app.panel.widgets.parameter import NodeName
 from app.panel.widgets.table import MAX_ENTRIES, READ_BY_DEFAULT, ListPath
 
 Priority = Annotated[int, Field(ge=1, le=4)]

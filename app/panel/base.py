@@ -72,6 +72,18 @@ def _check_service_type(type_name: str) -> str:
     return type_name
 
 
+def _check_message_or_service_type(type_name: str) -> str:
+    return _check_service_type(type_name) if "/srv/" in type_name else _check_message_type(type_name)
+
+
+def _check_node(name: str) -> str:
+    if not is_absolute_name(name):
+        raise ValueError(
+            f"{format_value(name)} is not the absolute name of a ROS 2 node: it must be like /cell1/arm"
+        )
+    return name
+
+
 def _check_action_type(type_name: str) -> str:
     if not ACTION_TYPE.fullmatch(type_name):
         raise ValueError(
@@ -226,6 +238,9 @@ Span = Annotated[int, Field(ge=1, le=12)]
 TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_check_message_type)]
 ServiceType = Annotated[str, AfterValidator(_check_service_type)]
+MessageOrServiceType = Annotated[str, AfterValidator(_check_message_or_service_type)]
+NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
+ParameterName = Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
 ActionType = Annotated[str, AfterValidator(_check_action_type)]
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]

@@ -23,6 +23,8 @@ from app.panel.widgets.families import (
     TopicSource,
     TopicWidget,
 )
+from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.listed_parameter import listed_parameter
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, EVENTS_QOS, Parameter
 from app.panel.widgets.parts import parts_of
@@ -211,6 +213,8 @@ class Panel(PanelKeys):
     def parameters(self) -> Iterator[Parameter]:
         yield from (w for w in self.widgets() if isinstance(w, Parameter))
         yield from (parameter for load in self.recipe_loads for parameter in load.reads)
+        selects = (w for w in self.widgets() if isinstance(w, SelectInput))
+        yield from filter(None, map(listed_parameter, selects))
 
     def logs(self) -> dict[str, int]:
         """Topic → number of lines to keep, of all logs that the panel shows."""

@@ -9,6 +9,8 @@ from app.panel.base import (
     Id,
     Interlocks,
     Label,
+    NodeName,
+    ParameterName,
     Seconds,
     TopicName,
     TopicQos,
@@ -16,13 +18,11 @@ from app.panel.base import (
     non_empty,
 )
 from app.panel.field_paths import FieldPath, MessageField
-from app.panel.widgets.parameter import NodeName
 
 MAX_FIELDS: Final = 60
 
 ParameterKind = Literal["bool", "integer", "double", "string"]
-Name = Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
-Names = Annotated[dict[Id, Name], Field(max_length=MAX_FIELDS)]
+Names = Annotated[dict[Id, ParameterName], Field(max_length=MAX_FIELDS)]
 Paths = Annotated[dict[Id, FieldPath], Field(max_length=MAX_FIELDS)]
 Kinds = Annotated[dict[Id, ParameterKind], Field(max_length=MAX_FIELDS)]
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from app.panel.model import Panel
 from app.panel.stories import STORIES, Story, Use
+from app.panel.used_options import listing_services
 from app.panel.widgets.service_action import ServerCommand
 
 
@@ -11,12 +12,12 @@ def used_names(panel: Panel) -> Mapping[Use, Mapping[str, str]]:
     """Use → name → type. A topic is one that the panel listens to, a publication one that it
     publishes."""
     servers = [widget for widget in panel.senders() if isinstance(widget, ServerCommand)]
+    listed = {service.name: service.type for service in listing_services(panel)}
     return {
         "topic": panel.listened(),
         "publication": panel.publications(),
-        "service": {
-            server.server_name: server.type for server in servers if server.server_role == "SS"
-        },
+        "service": listed
+        | {server.server_name: server.type for server in servers if server.server_role == "SS"},
         "action": {server.server_name: server.type for server in servers if server.server_role == "AS"},
     }
 

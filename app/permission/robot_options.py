@@ -1,13 +1,20 @@
 """The options of a select that the robot has: what they are now, and the lock while they are not known.
 Pure, from (select, robot, time)."""
 
+import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from app.i18n import number
+from app.panel.widgets.families import TopicSource
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.robot_options import MOST, RobotOptions
+from app.panel.widgets.listed_parameter import listed_parameter
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.robot_options import MOST, ListingService, RobotOptions
 from app.permission.mismatches import topic_mismatch
-from app.permission.verdict import Verdict, locked
+from app.permission.servers import parameters_offered, server_offered, unsettable
+from app.permission.verdict import PERMITTED, Verdict, locked
+from app.robot.parameter_state import UNKNOWN
 from app.robot.state import RobotState
 
 
@@ -18,22 +25,63 @@ class OptionsNow(NamedTuple):
     verdict: Verdict
 
 
+class _Listed(NamedTuple):
+    """A list as the robot gave it, and when (monotonic seconds); `lock` where there is none."""
+
+    texts: Iterable[str] = ()
+    at: float = math.inf
+    lock: Verdict | None = None
+
+
 def options_now(select: SelectInput, source: RobotOptions, robot: RobotState, now: float) -> OptionsNow:
-    """The options at `now` (monotonic seconds): those of the newest message, each once."""
-    reading = robot.reading(source.topic)
-    if topic_mismatch("MS", source, robot) is not None or reading.status != "message":
-        return OptionsNow((), locked("options_unknown", label=select.label))
-    listed = reading.value(source.field)
-    texts = tuple(dict.fromkeys(text for text in listed or () if text))[:MOST]
+    """The options at `now` (monotonic seconds): those of the newest list, each once."""
+    listed = _listed(select, source, robot)
+    if listed.lock is not None:
+        return OptionsNow((), listed.lock)
+    texts = tuple(dict.fromkeys(text for text in listed.texts if text))[:MOST]
     if not texts:
         return OptionsNow((), locked("options_empty", label=select.label))
-    if source.max_age_s is None:
-        return OptionsNow(texts, Verdict(True))
-    stale_at = reading.at + source.max_age_s
+    if source.limit_s is None:
+        return OptionsNow(texts, PERMITTED)
+    stale_at = listed.at + source.limit_s
     if now >= stale_at:
-        limit = number(f"{source.max_age_s:g}")
+        limit = number(f"{source.limit_s:g}")
         return OptionsNow((), locked("options_old", label=select.label, limit=limit))
     return OptionsNow(texts, Verdict(True, until=stale_at))
+
+
+def _listed(select: SelectInput, source: RobotOptions, robot: RobotState) -> _Listed:
+    unknown = locked("options_unknown", label=select.label)
+    if (topic := source.source) is not None:
+        return _of_topic(topic, robot, unknown)
+    if (service := source.listing) is not None:
+        return _of_service(service, robot, unknown)
+    parameter = listed_parameter(select)
+    return _Listed(lock=unknown) if parameter is None else _of_parameter(parameter, robot)
+
+
+def _of_topic(source: TopicSource, robot: RobotState, unknown: Verdict) -> _Listed:
+    reading = robot.reading(source.topic)
+    if topic_mismatch("MS", source, robot) is not None or reading.status != "message":
+        return _Listed(lock=unknown)
+    return _Listed(reading.value(source.fields[0]) or (), reading.at)
+
+
+def _of_service(service: ListingService, robot: RobotState, unknown: Verdict) -> _Listed:
+    if (lock := server_offered("SS", service.name, service.type, robot)) is not None:
+        return _Listed(lock=lock)
+    answer = robot.option_lists.get(service)
+    return _Listed(lock=unknown) if answer is None else _Listed(answer.texts, answer.at)
+
+
+def _of_parameter(parameter: Parameter, robot: RobotState) -> _Listed:
+    """A node reports each change: its list is of now while its state is known."""
+    known = robot.parameters.get(parameter.id, UNKNOWN)
+    lock = parameters_offered(parameter.node, robot)
+    if lock is None and known.state != "live":
+        lock = unsettable(parameter, known, robot.traits.sentences.timeout_hint)
+    texts = known.value if isinstance(known.value, tuple) else ()
+    return _Listed(map(str, texts), lock=lock)
 
 
 def options_verdict(widget_id: str, robot: RobotState, now: float) -> Verdict | None:

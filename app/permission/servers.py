@@ -23,21 +23,25 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
     """Why a service may not be called or a goal not be sent: no server has its name and type, or
     a response is awaited."""
     role, name = call.server_role, call.server_name
-    key = robot.key(name)
-    robot_type = robot.graph.server_type(role, key)
-    if robot_type is None:
-        return locked("service_unavailable", name=name)
-    if robot_type != call.type:
-        return locked("topic_wrong_type", topic=name, found=robot_type, wanted=call.type)
-    if mismatch := _unfit(role, name, robot):
+    if mismatch := server_offered(role, name, call.type, robot):
         return mismatch
-    ready_at = robot.graph.since(role, key) + robot.traits.server_settle_s
+    ready_at = robot.graph.since(role, robot.key(name)) + robot.traits.server_settle_s
     if now < ready_at:
         return Verdict(False, "service_connecting", say("service_connecting", name=name), ready_at)
     known = robot.command_status.get(call.id, IDLE)
     if not known.busy:
         return None
     return locked("goal_may_be_running") if known.outcome == "unknown" else locked("press_in_progress")
+
+
+def server_offered(role: ServerRole, name: str, type_name: str, robot: RobotState) -> Verdict | None:
+    """Why a service or an action can't be used, by what the graph shows."""
+    robot_type = robot.graph.server_type(role, robot.key(name))
+    if robot_type is None:
+        return locked("service_unavailable", name=name)
+    if robot_type != type_name:
+        return locked("topic_wrong_type", topic=name, found=robot_type, wanted=type_name)
+    return _unfit(role, name, robot)
 
 
 def _unfit(role: ServerRole, name: str, robot: RobotState) -> Verdict | None:

@@ -21,6 +21,7 @@ from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.panel.used_options import selects_by_command
 from app.panel.widgets.parameter import GET
+from app.panel.widgets.robot_options import ListingService
 from app.robot.alarm_action import AlarmAction
 from app.robot.alarmed import NO_ALARMED, AlarmSelection
 from app.robot.camera_topic import CameraTopicState
@@ -29,6 +30,7 @@ from app.robot.definitions import Difference, difference
 from app.robot.graph import LiveGraph
 from app.robot.history import History
 from app.robot.log_lines import LogLines
+from app.robot.option_list import OptionList
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.replayed import ReplayedMessages
@@ -105,6 +107,7 @@ class RobotState:
         self.reliable_readers: set[str] = set()  # keys of subscriptions that began as reliable
         self.command_status = CommandStatuses()  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
+        self.option_lists: dict[ListingService, OptionList] = {}
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
         self.camera_topics: dict[str, CameraTopicState] = {}  # by the key of a camera's topic
         self.switched_to: dict[str, bool] = {}  # by switch id: the position that was sent last

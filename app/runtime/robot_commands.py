@@ -10,6 +10,7 @@ from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
 from app.commands.holds.messages import HoldMessages
+from app.commands.option_lists import OptionLists
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_guard import PressGuard
 from app.commands.press_judge import PendingSamples, PressJudge
@@ -43,6 +44,7 @@ class RobotCommands:
         self.actions = GoalTracker(interfaces, robot, link, changed)
         self.confirmations = Confirmations(robot, changed)
         self.parameters = ParameterSync(panel, interfaces, robot, link, self.calls, changed)
+        self.option_lists = OptionLists(panel, interfaces, robot, link, changed)
         self.sample_handlers = SampleHandlers()
         self.actions.register(self.sample_handlers, panel.actions())
         self.confirmations.register(self.sample_handlers, panel.confirmations())
@@ -87,6 +89,7 @@ class RobotCommands:
         self.calls.on_graph_change()
         self.actions.on_graph_change()
         self.parameters.on_graph_change()
+        self.option_lists.on_graph_change()
 
     def close(self) -> None:
         """Ends holds, while their stop messages can still be sent, and refuses presses."""
@@ -98,3 +101,4 @@ class RobotCommands:
         await self._recovery.stop()
         await self.actions.stop()
         await self.parameters.stop()
+        await self.option_lists.stop()

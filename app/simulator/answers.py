@@ -12,6 +12,7 @@ from app.simulator.values.messages import DEEPEST, plausible
 from app.simulator.values.paths import Fields, merged, put
 
 DONE: Final = "done"
+CHOICES: Final = ("demo 1", "demo 2", "demo 3")
 # Whole numbers for a status: zero is success.
 STATUS: Final = re.compile(r"error|code|status|result|reason|flag|id$", re.IGNORECASE)
 LEFT: Final = re.compile(r"remain|left|to_go|todo", re.IGNORECASE)

@@ -7,6 +7,7 @@ from app.i18n import render
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.number_range import Range
 from app.panel.widgets import parameter as widgets
+from app.simulator.answers import CHOICES
 from app.simulator.parameters import Parameter
 from app.simulator.values.guesses import span_of
 
@@ -64,6 +65,8 @@ def _limits(widget: widgets.Parameter) -> Range | None:
 def _value(widget: widgets.Parameter, limits: Range | None, options: tuple[Any, ...]) -> Any:
     if options:
         return options[0]
+    if widget.type == "string[]":
+        return list(CHOICES)
     value = _single(widget, limits)
     return [value] * LENGTH if widget.is_list else value
 

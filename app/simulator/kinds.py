@@ -20,9 +20,11 @@ from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, Input, PublishCommand, TopicField
 from app.panel.widgets.figure import Figure, TargetField
 from app.panel.widgets.gauge import Gauge, SetpointField
+from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.kinds import find_row, require_rows
+from app.panel.widgets.listed_parameter import listed_parameter
 from app.panel.widgets.log_view import LogView
 from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
@@ -227,10 +229,20 @@ def _parameter(parameter: Parameter, _: Interfaces) -> Iterator[Need]:
     yield Declared(widget=parameter)
 
 
+def _select(select: SelectInput, _: Interfaces) -> Iterator[Need]:
+    """The list of its options; a topic has texts of its type."""
+    source = select.options_from
+    if source is not None and (service := source.listing) is not None:
+        yield Served(service=service.name, type=service.type, listed=service.field)
+    if (parameter := listed_parameter(select)) is not None:
+        yield Declared(widget=parameter)
+
+
 # None: it needs no topic, or its topics need no more than values of their types.
 SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[Need]] | None]] = {
     Static: None,
     Input: None,
+    SelectInput: _select,
     Display: lambda display, _: _shown(display),
     Readout: _readout,
     Indicator: _indicator,

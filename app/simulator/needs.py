@@ -42,12 +42,14 @@ class Published:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Served:
-    """A service that the panel calls; `success` and `message` are paths in its response."""
+    """A service that the panel calls; `success`, `message` and `listed` (texts to choose from) are
+    paths in its response."""
 
     service: str
     type: str
     success: str | None = None
     message: str | None = None
+    listed: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

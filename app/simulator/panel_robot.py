@@ -15,7 +15,7 @@ from app.interfaces.names import Qos
 from app.panel.demo import NO_ENTRY
 from app.panel.model import Panel
 from app.panel.used_names import played_names
-from app.simulator.answers import DONE, feedback_at, good_response
+from app.simulator.answers import CHOICES, DONE, feedback_at, good_response
 from app.simulator.declared import declared_by
 from app.simulator.goals import ActionServer, CountAction, SimulatedAction
 from app.simulator.kinds import needs_of
@@ -237,7 +237,7 @@ class PanelRobot:
             if SERVES.get(need.service) == need.type and not entry.response and self._permits_known():
                 continue
             response = self._interfaces.service_types(need.type)[1]
-            paths = {need.success or "": True, need.message or "": DONE}
+            paths = {need.success or "": True, need.message or "": DONE, need.listed or "": CHOICES}
             paths.pop("", None)
             made = good_response(response, self._interfaces, entry.response, paths)
             responses[need.service] = need.type, made

@@ -16,11 +16,15 @@ def select(widget: SelectInput, robot: RobotState, now: float) -> tuple[dict[str
     if source is None:
         return {}, math.inf
     known = options_now(widget, source, robot, now)
-    field = FieldOf(source.topic, source.type, source.qos, source.field, source.max_age_s)
+    if source.source is None or source.type is None:
+        attributes: dict[str, Any] = {"options": list(known.texts), "note": known.verdict.reason or ""}
+        return {**attributes, "state": "live" if known.texts else "missing"}, known.verdict.until
+    field = FieldOf(*source.source[:3], source.field, source.max_age_s)
     shown = field_state(field, robot, now)
     note = "" if known.texts else known.verdict.reason
     if shown.state != "live" and not known.texts:
         note = shown.note
     state = "live" if known.texts else shown.state if shown.state != "live" else "missing"
-    attributes = {"options": list(known.texts), "state": state, "note": note}
-    return attributes, min(known.verdict.until, shown.until)
+    return {"options": list(known.texts), "state": state, "note": note}, min(
+        known.verdict.until, shown.until
+    )

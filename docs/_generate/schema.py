@@ -40,6 +40,7 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "node": ("node name", TOPIC.pattern),
     "type": ("message type", MESSAGE_TYPE.pattern),
     "switch.type": ("message or service type", ""),
+    "options_from.type": ("message or service type", ""),
     "recipe.type": ("message or service type", ""),
     "recipe.fields": ("id of an input", ""),
     "call.type": ("service type", SERVICE_TYPE.pattern),

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
+from app.dialect.endpoint import Role
 from app.errors import Fault, InputError
 from app.i18n import Text, say
 from app.i18n.values import alike
@@ -100,8 +101,12 @@ class SelectInput(DisplayWidget, Input):
     default: Any = None
 
     def sources(self) -> Iterator[TopicSource]:
+        if self.options_from is not None and (source := self.options_from.source) is not None:
+            yield source
+
+    def endpoints(self) -> Iterator[tuple[Role, str]]:
         if self.options_from is not None:
-            yield self.options_from.source()
+            yield from self.options_from.endpoints()
 
     @property
     def own_options(self) -> tuple[Option, ...]:
@@ -127,7 +132,7 @@ class SelectInput(DisplayWidget, Input):
     @property
     def comment(self) -> str:
         if self.options_from is not None:
-            return f"one of the texts that {self.options_from.topic} lists"
+            return f"one of the texts that {self.options_from.list_name} lists"
         return f"one of {', '.join(format_value(option.value) for option in self.own_options)}"
 
     @property

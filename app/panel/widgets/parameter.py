@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
 from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from app.dialect.endpoint import Role
 from app.errors import Fault
@@ -14,7 +14,15 @@ from app.i18n.values import numbers, with_unit
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import PARAMETER_EVENTS
 from app.interfaces.validation import format_value
-from app.panel.base import SaidLabel, Seconds, Span, TopicQos, catalogue_default, is_absolute_name
+from app.panel.base import (
+    NodeName,
+    ParameterName,
+    SaidLabel,
+    Seconds,
+    Span,
+    TopicQos,
+    catalogue_default,
+)
 from app.panel.number_range import Range, decimal_text, step_fault
 from app.panel.values import join_list, number_text, quote_element, same_value
 from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand
@@ -44,17 +52,6 @@ TYPE_TEXTS: Final[Mapping[str, str]] = {
 }
 
 
-def _check_node(name: str) -> str:
-    if not is_absolute_name(name):
-        raise ValueError(
-            f"{format_value(name)} is not the absolute name of a ROS 2 node: it must be like /cell1/arm"
-        )
-    return name
-
-
-NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
-
-
 class Parameter(SteppedWidget, EntryWidget, PressCommand):
     """A parameter of a node; `min`, `max` and `step` narrow the range that the node describes.
 
@@ -63,7 +60,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     kind: Literal["parameter"]
     node: NodeName
-    parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
+    parameter: ParameterName
     type: Literal["bool", "integer", "double", "string", "bool[]", "integer[]", "double[]", "string[]"]
     unit: Unit = ""
     options: Annotated[tuple[Option, ...], Field(strict=False)] = ()

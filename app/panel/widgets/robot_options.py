@@ -1,37 +1,157 @@
-"""Where the options of a select come from, if the robot has them: a list of texts on a topic."""
+"""Where the options of a select come from, if the robot has them: a list of texts on a topic, in a
+service's answer, or in a parameter."""
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Annotated, Final, NamedTuple
 
-from app.errors import Fault
+from pydantic import Field
+
+from app.dialect.endpoint import Role
+from app.errors import Fault, InterfaceError
 from app.interfaces import STRING_TYPES, Interfaces
-from app.panel.base import Description, Seconds, TopicName, TopicQos, Type
-from app.panel.checks.types import field_faults
+from app.panel.base import (
+    Description,
+    MessageOrServiceType,
+    NodeName,
+    ParameterName,
+    Seconds,
+    TopicName,
+    TopicQos,
+)
+from app.panel.checks.types import field_faults, type_fault
 from app.panel.field_paths import MessageField
 from app.panel.widgets.families import TopicSource
 
 MOST: Final = 200  # options that are shown; a press with a later one is refused
 KEY: Final = "options_from"
+PARAMETER_SERVICES: Final = ("get_parameters", "describe_parameters", "set_parameters")
+SOURCES: Final = ("topic", "service", "parameter")
+LATE_S: Final = 10.0  # a list of a service is known for so long after its next answer was due
+OF_PARAMETERS: Final = "is for topic or service: a node says itself when a parameter changes"
+NO_SOURCE: Final = (
+    'names no list: write topic or service with their type, as in { topic = "/stations", type = '
+    '"cell_msgs/msg/Names" }, or node and parameter'
+)
+
+
+class ListedParameter(NamedTuple):
+    """A parameter whose texts are the options."""
+
+    node: str
+    name: str
+
+
+class ListingService(NamedTuple):
+    """A service that is called again and again: the `field` of its answer has the texts."""
+
+    name: str
+    type: str
+    field: str
 
 
 class RobotOptions(Description):
-    """A field of a topic that is a list of texts. Older than `max_age_s` it is not known."""
+    """A list of texts of the robot: a field of a topic or of a service's answer, or a parameter.
 
-    topic: TopicName
-    type: Type
+    Older than `max_age_s` it is not known. A service is called every `every_s`.
+    """
+
+    topic: TopicName | None = None
+    service: TopicName | None = None
+    node: NodeName | None = None
+    parameter: ParameterName | None = None
+    type: MessageOrServiceType | None = None
     field: MessageField = "data"
+    every_s: Annotated[Seconds, Field(ge=1.0)] = 10.0
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
 
-    def source(self) -> TopicSource:
-        """Its topic."""
+    @property
+    def source(self) -> TopicSource | None:
+        """Its topic, None without."""
+        if self.topic is None or self.type is None:
+            return None
         return TopicSource(self.topic, self.type, self.qos, (self.field,), KEY)
 
+    @property
+    def listing(self) -> ListingService | None:
+        """Its service, None without."""
+        if self.service is None or self.type is None:
+            return None
+        return ListingService(self.service, self.type, self.field)
+
+    @property
+    def listed(self) -> ListedParameter | None:
+        """Its parameter, None without."""
+        if self.node is None or self.parameter is None:
+            return None
+        return ListedParameter(self.node, self.parameter)
+
+    @property
+    def limit_s(self) -> float | None:
+        """How old a list may be, in seconds; None: of any age."""
+        if self.max_age_s is not None or self.service is None:
+            return self.max_age_s
+        return self.every_s + LATE_S
+
+    @property
+    def list_name(self) -> str:
+        """The name of what has the list."""
+        return self.topic or self.service or f"{self.parameter} of {self.node}"
+
+    def endpoints(self) -> Iterator[tuple[Role, str]]:
+        """The server that the robot must have, as (role, ROS name)."""
+        if self.service is not None:
+            yield "SS", self.service
+        if self.node is not None:
+            yield from (("SS", f"{self.node}/{service}") for service in PARAMETER_SERVICES)
+
     def faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
-        """Faults of a field that is no list of texts."""
-        faults = list(field_faults(place, self.type, self.field, interfaces))
+        """Faults of keys that do not belong together, and of a field that is no list of texts."""
+        named = [key for key in SOURCES if getattr(self, key) is not None]
+        if not named and self.node is None:
+            yield Fault(place, NO_SOURCE)
+        elif len(named) > 1:
+            yield Fault(f"{place}.{named[1]}", f"stands beside {named[0]}: write the one or the other")
+        elif self.node is not None or self.parameter is not None:
+            yield from self._parameter_faults(place)
+        else:
+            yield from self._type_faults(place, interfaces)
+
+    def _parameter_faults(self, place: str) -> Iterator[Fault]:
+        for key, other in (("node", "parameter"), ("parameter", "node")):
+            if getattr(self, key) is None:
+                yield Fault(f"{place}.{key}", f"is missing beside {other}")
+        for key in ("type", "field", "every_s", "max_age_s", "qos"):
+            if key in self.model_fields_set:
+                yield Fault(f"{place}.{key}", OF_PARAMETERS)
+
+    def _type_faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
+        kind = "service" if self.service is not None else "topic"
+        if self.type is None:
+            yield Fault(f"{place}.type", f"is missing beside {kind}")
+            return
+        if ("/srv/" in self.type) != (kind == "service"):
+            right = "std_srvs/srv/Trigger" if kind == "service" else "std_msgs/msg/String"
+            message = f'"{self.type}" is no type of a {kind}: it must be like {right}'
+            yield Fault(f"{place}.type", message)
+            return
+        for key in ("qos",) if kind == "service" else ("every_s",):
+            if key in self.model_fields_set:
+                yield Fault(f"{place}.{key}", f"is for a {'topic' if kind == 'service' else 'service'}")
+        yield from self._field_faults(place, self.type, interfaces)
+
+    def _field_faults(self, place: str, type_name: str, interfaces: Interfaces) -> Iterator[Fault]:
+        if self.service is not None:
+            try:
+                type_name = interfaces.service_types(type_name)[1]
+            except InterfaceError as error:
+                yield type_fault(f"{place}.type", error)
+                return
+        faults = list(field_faults(place, type_name, self.field, interfaces))
         yield from faults
-        kind = None if faults else interfaces.type_at(self.type, self.field)
-        if kind is not None and (kind.container == "one" or kind.name not in STRING_TYPES):
-            message = f'"{self.field}" is {kind}: options are a list of texts, like string[]'
+        field_type = None if faults else interfaces.type_at(type_name, self.field)
+        if field_type is not None and (
+            field_type.container == "one" or field_type.name not in STRING_TYPES
+        ):
+            message = f'"{self.field}" is {field_type}: options are a list of texts, like string[]'
             yield Fault(f"{place}.field", message)
