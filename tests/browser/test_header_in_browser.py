@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN
@@ -22,13 +23,16 @@ logo = "acme.svg"
 text = "ACME"
 colour = "#0b6b57"
 """
+LINE_PX: Final = 14  # the height of a line of who has control
 CONTROL: Final = """
 [control]
 required = true
 """
 # Parts of the header that are beyond it or over one another.
 CROWDED: Final = """() => {
-  const parts = [...document.querySelectorAll("header > *")].filter((part) => part.checkVisibility());
+  const all = document.querySelectorAll("header > :not(.control), .control > *");
+  const isSeen = (part) => part.checkVisibility() && getComputedStyle(part).clipPath === "none";
+  const parts = [...all].filter(isSeen);
   const boxes = parts.map((part) => [part.className || part.tagName, part.getBoundingClientRect()]);
   return boxes.flatMap(([name, { left, right }], number) => {
     const before = number ? boxes[number - 1][1].right : 0;
@@ -52,6 +56,17 @@ def controlled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel = PALLETIZER.read_text() + CONTROL
     path = written(tmp_path_factory.mktemp("controlled"), panel)
     with ready(Server(ROOT, KIOSK_PANEL=str(path))) as mine:
+        yield mine
+
+
+@pytest.fixture
+def story(tmp_path: Path) -> Iterator[Server]:
+    """All that a header may have: brand, state with details, who has control. No browser has it yet."""
+    folder = tmp_path
+    (folder / "pictures").mkdir()
+    (folder / "pictures/acme.svg").write_text(LOGO)
+    panel = SHIPPED.read_text().replace("distro", 'pictures = "pictures"\ndistro', 1) + BRAND + CONTROL
+    with ready(Server(ROOT, KIOSK_PANEL=str(written(folder, panel)))) as mine:
         yield mine
 
 
@@ -83,6 +98,28 @@ def test_who_has_control_is_said_in_words_of_their_own_width(controlled: Server,
     who = page.locator(".control > div").bounding_box()
     assert who is not None
     assert who["width"] > 100
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_who_has_control_is_beside_the_state_and_not_cut(
+    story: Server, chromium: Browser, language: str
+) -> None:
+    """The first browser has control, the second may take it. A robot that is not simulated leaves room
+    for the whole sentence."""
+    with closing(chromium.new_context()) as first, closing(chromium.new_context()) as second:
+        for context, role in ((first, "holding"), (second, "over")):
+            context.add_cookies([{"name": "kiosk_language", "value": language, "url": story.url}])
+            page = context.new_page()
+            page.goto(story.url)
+            expect(page.locator(f".control[data-role={role}]")).to_be_visible()
+            for width, height in SIZES:
+                sized(page, width, height).evaluate(DRAWN)
+                assert page.evaluate(CROWDED) == [], (role, width)
+                expect(page.locator(".menu-key")).to_be_in_viewport(ratio=1)
+            page.locator("#banner").evaluate("(banner) => (banner.hidden = true)")
+            who = page.locator(".who")
+            cut = who.evaluate("(who) => who.scrollHeight - who.clientHeight")
+            assert role == "holding" or cut < LINE_PX / 2, who.inner_text()
 
 
 def test_the_brands_colour_is_in_its_corner_only(branded: Server, page: Page) -> None:
