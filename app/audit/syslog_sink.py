@@ -16,6 +16,7 @@ from app.audit.entry import Entry
 
 PRIORITY: Final = 13 * 8 + 6  # facility "log audit", severity "informational"
 TIMEOUT_S: Final = 5.0
+ENDS_WITHIN_S: Final = 0.5
 REPEATED: Final = 100  # entries that are sent again over a new connection
 BOM: Final = "\ufeff"
 
@@ -81,6 +82,9 @@ class SyslogSink:
 
     def close(self) -> None:
         if self._socket is not None:
+            with suppress(OSError, ValueError):
+                self._socket.settimeout(ENDS_WITHIN_S)
+                self._socket.unwrap()  # says that nothing was cut off
             with suppress(OSError):
                 self._socket.close()
             self._socket = None
