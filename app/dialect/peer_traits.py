@@ -60,6 +60,7 @@ class PeerTraits:
     stamped_by_peer: bool
     # For commands on a terminal, in English.
     title: str
+    answering: str  # what answers for the nodes
     start_hint: str  # what to do if there is none
     elsewhere_hint: str  # more to do if it is on another machine; "" for none
     sentences: PeerSentences
@@ -78,6 +79,7 @@ BRIDGE_TRAITS: Final = PeerTraits(
     token_delay_latched_s=5.0,
     stamped_by_peer=True,
     title="bridge to ROS 2",
+    answering="bridge",
     start_hint="start zenoh-bridge-ros2dds on the robot, or name its place with --connect"
     " tcp/HOST:7447",
     elsewhere_hint=". As shipped, the bridge accepts connections from its own machine only: put this"
@@ -112,6 +114,7 @@ RMW_ZENOH_TRAITS: Final = PeerTraits(
     token_delay_latched_s=0.5,
     stamped_by_peer=False,
     title="ROS 2 node on rmw_zenoh",
+    answering="Zenoh router",
     start_hint="start the Zenoh router and the robot's nodes (RMW_IMPLEMENTATION=rmw_zenoh_cpp), or"
     " name their place with --connect tcp/HOST:7447; the panel's `domain` must be their ROS_DOMAIN_ID",
     elsewhere_hint="",

@@ -24,8 +24,10 @@ from app.install.release import (
     remove_old,
     wheel_in,
 )
+from app.install.router import ROUTER, router_unit
 from app.install.step import apply
 
+UNITS: Final = "/etc/systemd/system"
 COMES_WITHIN_S: Final = 60.0
 STAYS_S: Final = 3.0
 POLL_S: Final = 0.5
@@ -104,9 +106,12 @@ class Updater:
 
     def _start(self, name: str, was_ready: bool) -> str:
         """Starts a release; why it is not good, "" if it is."""
-        screen = self.host.files.exists(f"/etc/systemd/system/{SCREEN}")
+        screen = self.host.files.exists(f"{UNITS}/{SCREEN}")
         try:
-            files = own_files(Assets(BytesIO(wheel_in(self.host, name))), screen)
+            assets = Assets(BytesIO(wheel_in(self.host, name)))
+            files = own_files(assets, screen)
+            if self.host.files.exists(f"{UNITS}/{ROUTER}"):
+                files.append(router_unit(assets))
             apply([*files, Current(name, removes_old=False)], self.host, self.say)
             self.services.restart()
         except (SettingsError, OSError) as error:

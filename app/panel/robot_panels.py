@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from app.panel.layout import Group, Page
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, Input
+from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.static import Static
 
 
@@ -50,7 +51,10 @@ def opened_page(panel: Panel, robot_id: str) -> Page:
 
 
 def is_shared(widget: BaseWidget) -> bool:
-    """Whether it is of no robot: an input, whose value goes to any, or a text."""
+    """Whether it is of no robot: an input, whose value goes to any, or a text. A select whose options a
+    robot has is that robot's."""
+    if isinstance(widget, SelectInput) and widget.options_from is not None:
+        return False
     return isinstance(widget, Input | Static)
 
 

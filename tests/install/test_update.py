@@ -12,6 +12,7 @@ import pytest
 from app.cli.command import main
 from app.install.host import Host, StepFailed
 from app.install.release import RELEASES, Current, link_to, linked, release_name
+from app.install.router import ROUTER
 from app.install.update import Updater
 from tests.install.test_plan import make_wheel, path_on
 
@@ -207,3 +208,13 @@ def test_an_address_that_is_none_is_named(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit):
         main(["update", "--url", "127.0.0.1:8000"])
     assert '"127.0.0.1:8000" is not the address of a server, like http://' in capsys.readouterr().err
+
+
+def test_the_unit_of_the_router_is_renewed_where_there_is_one(tmp_path: Path) -> None:
+    machine = Machine(tmp_path, UP)
+    unit = path_on(machine.host, f"/etc/systemd/system/{ROUTER}")
+    machine.update()
+    assert not unit.exists()
+    unit.write_text("[Unit]\nDescription=of an earlier release\n")
+    machine.update()
+    assert "zenohd --config" in unit.read_text()

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.errors import PanelError
+from app.panel.load import load_panel
 from tests.support.parts import ROOT, Bridge, RosNode, Server, has_heard, http_client, live, until
 from tests.support.servers import ready
 
@@ -53,6 +55,22 @@ id = "note"
 kind = "text"
 label = "Note"
 default = "seam"
+
+[[page.widget]]
+id = "frame"
+kind = "select"
+label = "Frame"
+robot = "right"
+options_from = {{ node = "/rail", parameter = "frames" }}
+
+[[page.widget]]
+id = "go"
+kind = "publish"
+label = "Go"
+robot = "right"
+topic = "/go"
+type = "std_msgs/msg/String"
+message = {{ data = "{{frame}}" }}
 
 [[page.group]]
 title = "Left"
@@ -163,6 +181,26 @@ def test_an_input_of_the_page_goes_to_any_robot(simulated: Server) -> None:
     right = simulated.robot("right")
     until(lambda: enabled(right, "weld"), "permitted")
     assert right.press("weld", inputs={"note": "long seam"}).json()["outcome"] == "published"
+
+
+def test_the_options_of_a_select_are_those_of_its_own_robot(simulated: Server) -> None:
+    left = simulated.robot("left")
+    until(lambda: enabled(left, "go"), "the list of the right arm is known")
+    shown = left.snapshot()["widgets"]
+    assert shown["frame"]["options"] == ["demo 1", "demo 2", "demo 3"]
+    seen = left.snapshot()["id"]
+    receipt = left.press("go", inputs={"frame": "demo 2"}, seen=seen).json()
+    assert receipt["outcome"] == "published"
+    gone = left.press("go", inputs={"frame": "demo 9"}, seen=seen).json()
+    assert gone["code"] == "input_option_gone"
+
+
+def test_a_choice_of_another_robots_list_is_a_fault(tmp_path: Path) -> None:
+    text = panel_file(tmp_path).read_text()
+    path = tmp_path / "mixed.toml"
+    path.write_text(text.replace('robot = "right"\ntopic = "/go"', 'robot = "left"\ntopic = "/go"'))
+    with pytest.raises(PanelError, match='sends "frame", which "right" lists'):
+        load_panel(path)
 
 
 def test_a_page_of_one_robot_is_only_its(simulated: Server) -> None:

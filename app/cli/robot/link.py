@@ -196,7 +196,7 @@ async def opened(place: Place) -> AsyncIterator[tuple[RobotObserver, GraphSnapsh
             hint = traits.start_hint
             raise LinkError(f"Zenoh answers at {where}, but no {traits.title} is there: {hint}")
         if not any(robot.answers for robot in graph.robots):
-            raise LinkError(f"the bridge at {where} does not answer: it hangs; restart it")
+            raise LinkError(f"the {traits.answering} at {where} does not answer: it hangs; restart it")
         yield observer, graph
     finally:
         await observer.close()

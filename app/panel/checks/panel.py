@@ -13,6 +13,7 @@ from app.panel.checks.names import spelling_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.recipes import recipe_faults
 from app.panel.checks.robots import (
+    choice_faults,
     duplicate_ids,
     figure_faults,
     overview_faults,
@@ -54,6 +55,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from robot_faults(panel)
     yield from robot_name_faults(panel)
     yield from overview_faults(panel)
+    yield from choice_faults(panel)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
     yield from duplicate_ids("page", [page.id for page in panel.pages])

@@ -9,7 +9,10 @@ from app.errors import Fault
 from app.i18n.values import alike
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.model import Panel, RobotEntry
-from app.panel.widgets.families import CheckContext
+from app.panel.robot_panels import widget_robots
+from app.panel.template import input_ids
+from app.panel.widgets.families import CheckContext, Command
+from app.panel.widgets.inputs import SelectInput
 
 OF_ONE_ROBOT: Final = "is of the one robot: with [[robot]] each has its own"
 
@@ -62,6 +65,27 @@ def overview_faults(panel: Panel) -> Iterator[Fault]:
             if value:
                 message = "has no meaning on an overview: it has a tile for each robot, and no more"
                 yield Fault(f"{place}.{key}", message, cause="robot overview")
+
+
+def choice_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of commands that send what is chosen from another robot's list."""
+    robots = widget_robots(panel)
+    selects = {
+        widget.id: robots[widget.id]
+        for widget in panel.widgets()
+        if isinstance(widget, SelectInput) and widget.options_from and widget.id in robots
+    }
+    for p, page in enumerate(panel.pages):
+        for place, widget, robot in page.robots() if selects else ():
+            if not isinstance(widget, Command):
+                continue
+            for name in input_ids(widget):
+                if name in selects and robot != selects[name]:
+                    message = (
+                        f'sends "{name}", which "{selects[name]}" lists: its options are of that robot,'
+                        f' so write robot = "{selects[name]}" here too'
+                    )
+                    yield Fault(f"page[{p}].{place}", message, cause=f"robot {name}")
 
 
 def figure_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:
