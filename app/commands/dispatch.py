@@ -85,6 +85,7 @@ class Dispatcher:
         """`flushed` returns whether everything sent so far has reached the peer."""
         self._flushed = flushed
         self._widgets = {w.id: w for w in panel.widgets()}
+        self._of_others = panel.inputs_of_others
         self._input_ids = {
             id: input_ids(w) for id, w in self._widgets.items() if isinstance(w, PressCommand)
         }
@@ -278,7 +279,7 @@ class Dispatcher:
     def check_inputs(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values to be sent of the inputs with these ids, checked; InputError for bad or missing
         ones."""
-        for name in inputs:
+        for name in inputs.keys() - self._of_others:
             if not isinstance(self._widgets.get(name), EntryWidget):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 NOT_WRITTEN: Final = (
     "revision",
     "copies",
+    "inputs_of_others",
     "of_others",
 )  # fields of a panel that are no keys of its file
 

@@ -84,7 +84,8 @@ class PanelKeys(Description):
     recipes: Annotated[tuple[RecipeSet, ...], Field(strict=False)] = Field((), alias="recipe")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Not of the file: its revision (other pages are out of date), the places of `same` widgets and, in
-    # the panel of one robot, the conditions of others that its widgets name.
+    # the panel of one robot, the inputs of others, and the conditions of others that its widgets name.
     revision: Annotated[str, Field(exclude=True)] = ""
     copies: Annotated[frozenset[str], Field(exclude=True)] = frozenset()
+    inputs_of_others: Annotated[frozenset[str], Field(exclude=True)] = frozenset()
     of_others: Annotated[tuple[NamedCondition, ...], Field(exclude=True)] = ()

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from app.panel.layout import Group, Page
 from app.panel.model import Panel
-from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, Input
+from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, EntryWidget, Input
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.static import Static
 
@@ -92,6 +92,11 @@ def panel_of(panel: Panel, robot_id: str | None) -> Panel:
         "pages": tuple(pages),
         "frame": frame,
         "copies": frozenset(),
+        "inputs_of_others": frozenset(
+            widget.id
+            for widget in panel.widgets()
+            if isinstance(widget, EntryWidget) and robots.get(widget.id) not in (None, robot_id)
+        ),
         "interlocks": tuple(i for i in panel.interlocks if i.robot in (None, robot_id)),
         "recipes": tuple(r for r in panel.recipes if robot_id in recipes.get(r.id, {robot_id})),
         "own_conditions": tuple(c for c in panel.own_conditions if c.robot in (None, robot_id)),

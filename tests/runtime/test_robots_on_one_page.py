@@ -191,6 +191,8 @@ def test_the_options_of_a_select_are_those_of_its_own_robot(simulated: Server) -
     seen = left.snapshot()["id"]
     receipt = left.press("go", inputs={"frame": "demo 2"}, seen=seen).json()
     assert receipt["outcome"] == "published"
+    other = left.press("start_left", inputs={"frame": "demo 2"}, seen=seen).json()
+    assert other["outcome"] == "published"  # a page sends all of its inputs
     gone = left.press("go", inputs={"frame": "demo 9"}, seen=seen).json()
     assert gone["code"] == "input_option_gone"
 
