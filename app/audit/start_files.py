@@ -4,13 +4,13 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from app.audit.kept_files import list_digest, list_text, sha256
 from app.i18n.catalogue import files as catalogues
-from app.settings import PACKAGE, Settings, shipped_path
+from app.settings import PACKAGE, PREFIX, Settings, shipped_path
 from app.version import installed_version
 
 if TYPE_CHECKING:
@@ -94,21 +94,23 @@ def read_start_files(settings: Settings, panel: "Panel", mode: str) -> StartFile
 
 def settings_text(settings: Settings, mode: str) -> dict[str, str]:
     """The settings in force as text, by the names of their variables; secrets are hidden."""
-    values = {
-        "KIOSK_PANEL": settings.panel,
-        "KIOSK_ZENOH": settings.zenoh,
-        "KIOSK_MODE": mode,
-        "KIOSK_DATA": settings.data or "",
-        "KIOSK_HOSTS": ",".join(settings.hosts),
-        "KIOSK_PROXIES": ",".join(settings.proxies),
-        "KIOSK_ROOT_PATH": settings.root_path,
-        "KIOSK_LOG_LEVEL": settings.log_level,
-        "KIOSK_DEV": "1" if settings.dev else "",
-        "KIOSK_LOG_COPY": settings.log_copy or "",
-        "KIOSK_SYSLOG": ":".join(map(str, settings.syslog or ())),
-        "KIOSK_SYSLOG_CA": settings.syslog_ca or "",
-    }
-    return {name: without_secret(name, str(value)) for name, value in values.items()}
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)} | {"mode": mode}
+    names = ((f"{PREFIX}{name.upper()}", value) for name, value in values.items())
+    return {name: without_secret(name, _as_text(value)) for name, value in names}
+
+
+def _as_text(value: object) -> str:
+    """A setting as its variable would have it."""
+    match value:
+        case None | False:
+            return ""
+        case True:
+            return "1"
+        case (str(host), int(port)):
+            return f"{host}:{port}"
+        case tuple():
+            return ",".join(map(str, value))
+    return str(value)
 
 
 def without_secret(name: str, text: str) -> str:
