@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
+from bench import flood
 from bench.kiosk import Kiosk
 from bench.peer import Peer
 from bench.peers import PEERS
@@ -82,6 +83,13 @@ class Run:
             with timed(f"growth: {axis}"), self._store.faults(f"growth: {axis}"):
                 self._store.add("growth", 0, axis, {"points": measure()})
 
+    def flood(self) -> None:
+        """Presses of this panel beside a flood of alarms."""
+        self._store.begin("flood")
+        with timed("flood"), self._store.faults("flood"):
+            for name, figures in flood.steps():
+                self._store.add("flood", 0, name, figures)
+
     def _shown(self) -> list[tuple[str, Peer]]:
         """The peers whose pages show texts, each event stream once."""
         return [(p.id, p) for p in self._peers if p.button and p.id not in SAME_STREAM]
@@ -99,7 +107,7 @@ class Run:
                     self._store.add(phase, turn, name, measure(self._rig, peer))
 
 
-PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth")
+PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth", "flood")
 
 
 @contextmanager

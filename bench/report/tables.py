@@ -46,6 +46,7 @@ def whole(results: Results, titles: Titles) -> str:
         "A browser that stands still": stalled_table(results, titles),
         "Start": start_table(results, titles),
         "Growth of this panel": growth_table(results),
+        "A flood of alarms on this panel": flood_table(results),
         "Not measured": faults(results, titles),
     }
     sections = [f"## {title}\n\n{part}" for title, part in parts.items() if part]
@@ -187,6 +188,24 @@ def growth_table(results: Results) -> str:
         for growth in grown(results)
     ]
     head = ["what grows", "at", "server CPU %", "slope", "MiB", "slope", "linear or better"]
+    return table([head, *rows]) if rows else ""
+
+
+def flood_table(results: Results) -> str:
+    """What presses take beside each kind of flood."""
+    rounds = results.get("flood", {}).get("rounds") or [{}]
+    rows = [
+        [
+            name,
+            f"{figures['presses']:g}",
+            f"{figures['p50']:.1f}",
+            f"{figures['longest']:.0f}",
+            f"{figures['cpu_percent']:.0f}",
+            f"{figures['rss_mib']:.0f}",
+        ]
+        for name, figures in rounds[0].items()
+    ]
+    head = ["10,000 alarms, and", "presses", "p50 in ms", "longest in ms", "server CPU %", "MiB"]
     return table([head, *rows]) if rows else ""
 
 
