@@ -69,6 +69,7 @@ from app.web.routes import (
     recipes,
     recordings,
     session,
+    signin,
     static,
     trends,
 )
@@ -142,7 +143,7 @@ def _add_routes(app: FastAPI, dev: bool) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
-    further = (diagnostics, recordings, help, session, static, health, display, description)
+    further = (diagnostics, recordings, help, session, signin, static, health, display, description)
     for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, *further):
         app.include_router(routes.router)
     if dev:

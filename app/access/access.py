@@ -26,6 +26,10 @@ log = logging.getLogger("kiosk.access")
 
 TOKEN_QUOTA: Final = Quota(100, 50)
 WATCHED_EVERY_S: Final = 0.5
+DIGITS: Final = frozenset("0123456789")
+MOST_DIGITS: Final = 12
+TYPED_KEPT_S: Final = 60.0
+TYPED_KEPT: Final = 100  # browsers
 EndReason = Literal["sign_out", "hand_over", "idle", "changed"]
 
 
@@ -70,6 +74,8 @@ class Access:
         self.book = UserBook()
         self.file = file
         self._stamp: Stamp | None = None
+        self._monotonic = monotonic
+        self._typed: dict[str, tuple[str, str, float]] = {}
         self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
 
@@ -199,6 +205,26 @@ class Access:
         self.log.signed_out(session, reason)
         for listener in self._listeners:
             listener(session, reason)
+
+    def typed_digits(self, client: str, user: str) -> str:
+        """The digits that a browser without scripts has typed for this user."""
+        name, digits, at = self._typed.get(client, ("", "", 0.0))
+        return digits if name == user and self._monotonic() - at < TYPED_KEPT_S else ""
+
+    def type_digit(self, client: str, user: str, digit: str) -> None:
+        """A digit, "delete" or "clear" of a browser without scripts."""
+        digits = self.typed_digits(client, user)
+        self._typed.pop(client, None)
+        if digit == "delete":
+            digits = digits[:-1]
+        elif digit in DIGITS:
+            digits = (digits + digit)[:MOST_DIGITS]
+        else:
+            digits = ""
+        if client and digits:
+            self._typed[client] = (user, digits, self._monotonic())
+        while len(self._typed) > TYPED_KEPT:
+            self._typed.pop(next(iter(self._typed)))
 
     async def watch(self) -> None:
         """Reads changes of the users' file and signs out idle users, until it is cancelled."""

@@ -22,7 +22,7 @@ class FramedPage(NamedTuple):
     the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
     for another page. `is_help`: it is the page of help. `vary` names the request header by which the
     address has another content. `recipes_page` is the path and query of the page of recipes, `entries`
-    is what is entered on it."""
+    is what is entered on it. `own_path` is the path of another page, such as that of sign-in."""
 
     template: str
     title: Text
@@ -33,6 +33,7 @@ class FramedPage(NamedTuple):
     vary: str = ""
     recipes_page: str | None = None
     entries: Sequence[BaseWidget] = ()
+    own_path: str = ""
 
 
 def framed_page(
@@ -55,6 +56,7 @@ def framed_page(
         diagnostics_query=page.diagnostics_query,
         is_help=page.is_help,
         recipes_page=page.recipes_page,
+        own_path=page.own_path,
     )
     html = state.templates.render(page.template, language_of(request), **frame, **context)
     headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})

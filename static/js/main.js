@@ -7,7 +7,6 @@ import { Source } from "./source.js";
 const AT_REST_MS = 4000; // after the first snapshot
 /** @type {(data?: Data) => void} */
 const noop = () => {};
-
 // What is shown of a section that is the same on every page.
 const COMMON = { link: showLink, notice: showNotice, state: showState, robots: showRobots };
 
@@ -77,6 +76,7 @@ class Screen {
     }
     if (document.querySelector(".alarm-line"))
       source.load(import("./alarm-line.js"), ({ AlarmLine }) => (this.#alarms = new AlarmLine(source)));
+    if (document.querySelector("a.who")) import("./session.js").catch(pageGuard.fail);
     if (document.querySelector("[data-recipes]"))
       source.load(import("./recipes.js"), (recipes) => (this.#recipes = recipes));
     if (document.querySelector(".group-tab")) source.load(import("./tabs.js"), noop);

@@ -40,6 +40,7 @@ PREFIXES = (
     "log_signed_out_",
     "log_users_",
     "sign_in_wrong_",
+    "signin_",
     "log_done_",
     "log_page_",
     "log_outcome_",

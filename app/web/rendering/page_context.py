@@ -41,6 +41,7 @@ from app.web.rendering.display_choice import (
 )
 from app.web.rendering.page_data import page_json, panel_data
 from app.web.rendering.page_words import page_words
+from app.web.rendering.sign_in_words import SignedIn, signed_in
 
 TOO_SOON: Final = say("press_too_soon")
 RELOADED: Final = "reloaded"  # by itself, without a tap
@@ -84,6 +85,8 @@ class PageContext(TypedDict):
     refused: TextLike
     back: str
     alarm_refused: TextLike
+    own_path: str
+    me: SignedIn
 
 
 def page_context(
@@ -98,11 +101,12 @@ def page_context(
     diagnostics_query: str | None = None,
     is_help: bool = False,
     recipes_page: str | None = None,
+    own_path: str = "",
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
     `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
     query of the page of diagnostics, for that page; `is_help`: it is the page of help;
-    `recipes_page` as `alarms_page`, for recipes.
+    `recipes_page` as `alarms_page`, for recipes; `own_path`: the path of a page like that of sign-in.
     `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = _faded(state.fleet.receipt(session, request.query_params.get("receipt", "")))
@@ -119,7 +123,7 @@ def page_context(
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
     is_recipes = recipes_page is not None
-    is_other = is_alarms or is_diagnostics or is_help or is_recipes
+    is_other = is_alarms or is_diagnostics or is_help or is_recipes or bool(own_path)
     is_log = page.id == FRAME_ONLY and not is_other
     back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
     if is_diagnostics:
@@ -128,6 +132,8 @@ def page_context(
         back = f"{state.root}/help"
     if is_recipes:
         back = f"{session.base}/{recipes_page}"
+    if own_path:
+        back = f"{state.root}{own_path}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -149,6 +155,8 @@ def page_context(
         is_diagnostics=is_diagnostics,
         is_help=is_help,
         is_recipes=is_recipes,
+        own_path=own_path,
+        me=signed_in(state, who),
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

@@ -23,7 +23,7 @@ from app.i18n import TextLike, localized, say
 from app.panel.widgets.hold import HoldCommand
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import principal_of
+from app.web.client_cookie import caller
 from app.web.hold_protocol import END_REASONS, Beat, Begin, End, HoldMessage, Message, read_message
 from app.web.language import language_of
 from app.web.request_body import received
@@ -46,9 +46,12 @@ CLOSE: Final[Mapping[str, int]] = {
 async def hold(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
     command = session.holds.widget(widget)
     await socket.accept()
-    press = Press(secrets.token_hex(8), command, {}, principal_of(socket, state))
+    who = caller(socket)
+    user_session = state.access.sessions.get(who.session, who.client(state).id)
+    press = Press(secrets.token_hex(8), command, {}, who.principal(state))
     served = _HoldSocket(socket, state, session, press)
-    with suppress(WebSocketDisconnect), state.in_flight.track():
+    holding = state.access.sessions.holding(user_session)
+    with suppress(WebSocketDisconnect), state.in_flight.track(), holding:
         receipt = await served.run()
         if receipt.cause != "limit":
             state.metrics.pressed(receipt.outcome)

@@ -41,6 +41,7 @@ OTHER_PAGES = (
     "gallery.html",
     "log.html",
     "help.html",
+    "signin.html",
     "recipes.html",
     "alarms.html",
     "alarm-history.html",

@@ -2,6 +2,7 @@
 
 import secrets
 from typing import Annotated, Any, Final
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
@@ -207,9 +208,13 @@ def _refused(
     request: Request, state: AppState, checked: Checked, attempt: Attempt, form: bool
 ) -> Response:
     if form:
-        return RedirectResponse(f"{state.root}/signin?refused={checked.code}", status_code=303)
+        query = urlencode({"user": attempt.name, "refused": checked.code})
+        return RedirectResponse(f"{state.root}/signin?{query}", status_code=303)
+    reason, left = checked.reason, checked.tries_left
+    if left:
+        reason = say("signin_tries_left", why=reason, count=str(left))
     content = {
-        "error": render(checked.reason, language_of(request)),
+        "error": render(reason, language_of(request)),
         "code": checked.code,
         "tries_left": checked.tries_left,
     }

@@ -1,0 +1,114 @@
+"""The page of sign-in, and its pad for browsers without scripts."""
+
+from typing import Annotated, Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+
+from app.access.access import Attempt
+from app.access.secrets_hash import LONGEST
+from app.access.users import LONGEST_NAME, User
+from app.i18n import TextLike, say
+from app.permission.client_places import client_key
+from app.web.app_state import AppState, CurrentState
+from app.web.client_cookie import caller, principal_of
+from app.web.framed_page import FramedPage, framed_page
+from app.web.openapi_parts import described_body, errors, fields
+from app.web.rendering.sign_in_words import ROLE_WORDS, initials, sign_in_words
+from app.web.request_body import body_of, form_of
+from app.web.routes.session import signed_in
+
+router = APIRouter()
+
+PIN_MOST: Final = 12
+WRONG: Final = ("sign_in_wrong_pin", "sign_in_wrong_password", "sign_in_wrong_badge")
+Name = Annotated[str, Query(max_length=LONGEST_NAME)]
+
+
+@router.get(
+    "/signin",
+    response_class=HTMLResponse,
+    summary="The page on which users sign in",
+    responses=errors(403, 404, 422),
+)
+async def page(
+    request: Request,
+    state: CurrentState,
+    user: Name = "",
+    other: bool = False,
+    password: bool = False,
+    refused: Annotated[str, Query(max_length=40)] = "",
+) -> Response:
+    """`user` is the chosen user. Names of users are shown at the kiosk's own machine only: elsewhere
+    they are typed."""
+    who, book = principal_of(request, state), state.access.book
+    here = who.client.local
+    users = [known for known in book.users if here and not known.disabled]
+    chosen = book.user(user) if here and user else None
+    typed = not here or other
+    ways = chosen.ways if chosen else ()
+    by_password = typed or bool(chosen and (password or "pin" not in ways))
+    context: dict[str, Any] = {
+        "users": [_tile(known) for known in users],
+        "chosen": chosen.name if chosen and not typed else "",
+        "other": typed,
+        "by_password": by_password,
+        "can_pin": "pin" in ways,
+        "can_password": "password" in ways,
+        "has_badges": any(known.badge for known in book.users),
+        "typed": len(state.access.typed_digits(who.client.id, chosen.name)) if chosen else 0,
+        "failed": _said(state, refused, chosen.name if chosen else "", who.client.address, here),
+        "words_of": sign_in_words() | {"secret_of": _title(chosen, by_password, typed)},
+    }
+    framed = FramedPage("signin.html", say("signin_sign_in"), own_path="/signin")
+    return framed_page(request, state, framed, context)
+
+
+@router.post(
+    "/session/pad",
+    status_code=303,
+    response_class=RedirectResponse,
+    summary="A digit of a PIN, by a form without scripts",
+    responses=errors(403, 408, 413, 422, 503) | {401: {"description": "never of a form"}},
+    openapi_extra=described_body(
+        None,
+        fields(user={"maxLength": LONGEST_NAME}, pin={"maxLength": LONGEST}, digit={"maxLength": 8}),
+        required=True,
+    ),
+)
+async def pad(request: Request, state: CurrentState) -> Response:
+    """The server keeps the digits until the PIN is complete: no page has them."""
+    form = form_of(await body_of(request), 8)
+    user, digit, client = form.get("user", ""), form.get("digit", ""), caller(request).client(state)
+    if digit == "enter":
+        pin = form.get("pin", "") or state.access.typed_digits(client.id, user)
+        state.access.type_digit(client.id, user, "clear")
+        if pin:
+            return await signed_in(
+                request, state, Attempt(user[:LONGEST_NAME], "pin", pin[:LONGEST]), True
+            )
+    else:
+        state.access.type_digit(client.id, user, digit)
+    return RedirectResponse(f"{state.root}/signin?{urlencode({'user': user[:LONGEST_NAME]})}", 303)
+
+
+def _tile(user: User) -> dict[str, TextLike]:
+    return {"name": user.name, "role": ROLE_WORDS[user.role], "initials": initials(user.name)}
+
+
+def _title(chosen: User | None, by_password: bool, typed: bool) -> TextLike:
+    if typed or chosen is None:
+        return say("signin_sign_in")
+    return say("signin_password_of" if by_password else "signin_pin_of", name=chosen.name)
+
+
+def _said(state: AppState, refused: str, user: str, address: str, here: bool) -> TextLike:
+    """Why the last sign-in failed, by its code; how many tries are left."""
+    key = "127.0.0.1" if here else client_key(address)
+    if wait_s := state.access.delays.wait_s(user, key):
+        return say("sign_in_wait", seconds=str(wait_s)) if refused else ""
+    if refused not in WRONG:
+        return ""
+    left = str(state.access.delays.tries_left(user, key))
+    return say("signin_tries_left", why=say(refused), count=left)

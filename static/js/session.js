@@ -1,0 +1,36 @@
+// The user who is signed in: touches put off the sign-out after idle time, which is announced before it comes.
+import { find } from "./show.js";
+
+const EVERY_MS = 5000;
+const WARNED_S = 30;
+
+const who = find(document, "a.who");
+let touched = true;
+for (const name of ["pointerdown", "keydown"]) addEventListener(name, () => (touched = true), { passive: true });
+
+async function report() {
+  const body = JSON.stringify({ touched });
+  touched = false;
+  try {
+    const headers = { "content-type": "application/json" };
+    const answer = await fetch(`${who.dataset.here}`, { method: "POST", headers, body });
+    if (!answer.ok) return;
+    const session = await answer.json();
+    if (session.user !== who.dataset.user) return location.assign(who.href);
+    warn(session.left_s !== null && session.left_s < WARNED_S);
+  } catch {
+    touched ||= body.includes("true");
+  }
+}
+
+/** @param {boolean} soon */
+function warn(soon) {
+  const note = find(document, "#idle");
+  if (soon === note.hidden) note.hidden = !soon;
+}
+
+if (document.querySelector("main.sign-in")) import("./signin.js").catch(pageGuard.fail);
+if (who.dataset.user) {
+  setInterval(() => void report(), EVERY_MS);
+  find(document, "#idle").addEventListener("click", () => void report());
+}

@@ -1,0 +1,136 @@
+"""Sign-in with a finger on the pad, with a badge, hand-over, and the sign-out after idle time."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
+from tests.support.users import add_user
+
+SIZES = ((1280, 800), (1024, 600), (800, 480))
+PIN_IS = {"M. Sato": "2580", "K. Novak": "1470"}
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    data = tmp_path_factory.mktemp("data")
+    add_user(data, "M. Sato", "operator", pin="2580", badge="04A2B3")
+    add_user(data, "K. Novak", "maintenance", pin="1470")
+    add_user(data, "J. Brandt", "engineer", password="long enough")
+    panel = tmp_path_factory.mktemp("panel") / "panel.toml"
+    panel.write_text((ROOT / "tests/reference.toml").read_text() + "\n[access]\nidle_s = 36\n")
+    with ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_MODE="demo", KIOSK_PANEL=str(panel))) as mine:
+        yield mine
+
+
+def signed_in_by_pad(page: Page, server: Server, user: str, pin: str) -> None:
+    """From the header, with two touches and the digits."""
+    page.locator("a.who").click()
+    page.locator(".tile", has_text=user).click()
+    for digit in pin:
+        page.locator(f".pad button[value='{digit}']").click()
+    page.locator(".sign-in-key").click()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_user_signs_in_on_the_pad_and_hands_over(
+    own_page: Page, kiosk: Server, size: tuple[int, int]
+) -> None:
+    page = own_page
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.goto(kiosk.url)
+    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+    for user, pin in PIN_IS.items():
+        signed_in_by_pad(page, kiosk, user, pin)
+        expect(page.locator("a.who")).to_have_attribute("data-user", user)
+    page.locator("a.who").click()
+    page.locator("form[action$='/session/end'] button").click()
+    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("language", ["en", "de", "ja"])
+def test_everything_of_the_page_is_within_the_screen(
+    own_page: Page, kiosk: Server, size: tuple[int, int], language: str
+) -> None:
+    page = own_page
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.set_extra_http_headers({"accept-language": language})
+    page.goto(f"{kiosk.url}/signin?user=M.+Sato")
+    for selector in (".tile", ".pad button", ".sign-in-key", ".badge-form", "a.who"):
+        for part in page.locator(selector).all():
+            box = part.bounding_box()
+            assert box is not None, selector
+            assert box["x"] >= 0, selector
+            assert box["y"] >= 0, selector
+            assert box["x"] + box["width"] <= size[0], selector
+            assert box["y"] + box["height"] <= size[1], selector
+            assert min(box["width"], box["height"]) >= 40, selector
+
+
+def test_a_wrong_pin_says_so_and_is_not_kept(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    page.goto(kiosk.url)
+    signed_in_by_pad(page, kiosk, "K. Novak", "1471")
+    expect(page.locator("p.said")).to_contain_text("The user or the PIN is wrong. Tries left:")
+    expect(page.locator("input[name=pin]")).to_have_value("")
+    assert "1471" not in page.content()
+
+
+def test_a_badge_is_read_without_a_touch_and_never_shown(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    page.goto(f"{kiosk.url}/signin")
+    expect(page.locator("#badge")).to_be_focused()
+    expect(page.locator("#badge")).to_have_attribute("type", "password")
+    page.keyboard.type("04A2B3")
+    page.keyboard.press("Enter")
+    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    assert "04A2B3" not in page.content() + page.url
+
+
+def test_a_password_signs_in(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    page.goto(f"{kiosk.url}/signin?user=J.+Brandt")
+    page.locator("#password").fill("long enough")
+    page.locator(".sign-in-key").click()
+    expect(page.locator("a.who")).to_have_attribute("data-user", "J. Brandt")
+
+
+def test_without_a_touch_a_warning_comes_which_a_touch_ends(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    page.goto(kiosk.url)
+    signed_in_by_pad(page, kiosk, "M. Sato", "2580")
+    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    expect(page.locator("#idle")).to_be_visible(timeout=20_000)
+    page.locator("#idle").click()
+    expect(page.locator("#idle")).to_be_hidden()
+
+
+def test_idle_time_ends_in_the_page_of_sign_in(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    page.goto(kiosk.url)
+    signed_in_by_pad(page, kiosk, "M. Sato", "2580")
+    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    page.wait_for_url(f"{kiosk.url}/signin", timeout=60_000)
+    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+
+
+def test_without_scripts_the_pad_works_and_no_page_has_the_pin(
+    own_page: Page, kiosk: Server, tmp_path: Path
+) -> None:
+    browser = own_page.context.browser
+    assert browser is not None
+    with browser.new_context(java_script_enabled=False, base_url=kiosk.url) as context:
+        page = context.new_page()
+        page.goto("/signin")
+        page.locator(".tile", has_text="K. Novak").click()
+        for digit in "147":
+            page.locator(f".pad button[value='{digit}']").click()
+        expect(page.locator(".dots")).to_have_text("●●●")
+        assert "147" not in page.content() + page.url
+        page.locator(".pad button[value='0']").click()
+        page.locator(".sign-in-key").click()
+        expect(page.locator("a.who")).to_have_attribute("data-user", "K. Novak")
