@@ -1,13 +1,16 @@
-"""Recipes loaded into a node on Cyclone DDS and read back, through the real bridge."""
+"""Recipes loaded into nodes and read back, through the real bridge: by parameters and a service of a
+node on Cyclone DDS, and by a message to an rclpy node."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 from tests.support.cyclone import CycloneRobot
-from tests.support.parts import Bridge, Server, until
+from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 
 PANEL: Final = """
@@ -87,3 +90,103 @@ def test_what_the_node_does_not_take_is_named_and_nothing_is_claimed(
     assert "Limit" in receipt["reason"]
     assert robot.parameters()["limit"] == 10
     assert not marked(cell)
+
+
+OF_TOPIC: Final = """
+title = "Cell"
+mode = "live"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "length"
+kind = "number"
+label = "Length"
+unit = "mm"
+send_unit = "m"
+min = 0
+max = 600
+[[page.widget]]
+id = "speed"
+kind = "number"
+label = "Speed"
+min = 0.0
+max = 100.0
+[[recipe]]
+id = "boxes"
+label = "Boxes"
+fields = ["length", "speed"]
+topic = "/test_recipe"
+type = "geometry_msgs/msg/Vector3"
+message = { x = "{length}", y = "{speed}" }
+confirm_s = 10.0
+[recipe.readback]
+topic = "/test_recipe_now"
+type = "geometry_msgs/msg/Vector3"
+fields = { length = "x", speed = "y" }
+"""
+OF_SERVICE: Final = """
+[[recipe]]
+id = "tunes"
+label = "Tunes"
+fields = ["enabled"]
+service = "/set_enabled"
+type = "std_srvs/srv/SetBool"
+request = { data = "{enabled}" }
+"""
+BOX: Final = {"length": 400, "speed": 80.0}
+
+
+@pytest.fixture
+def boxes(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
+    node.subscribe("/test_recipe", "geometry_msgs/msg/Vector3")
+    node.advertise("/test_recipe_now", "geometry_msgs/msg/Vector3")
+    with live_server(bridge, tmp_path, OF_TOPIC) as mine:
+        until(lambda: mine.widget("boxes")["enabled"], "the node hears")
+        until(lambda: node.endpoints("/test_recipe"), "the node sees who publishes")
+        until(lambda: node.subscribers("/test_recipe_now"), "the panel listens")
+        yield mine
+        node.withdraw("/test_recipe_now")
+
+
+def loaded(cell: Server, node: RosNode, reported: dict[str, float]) -> dict[str, Any]:
+    """The receipt of a load: the node reports these values when it has heard the message."""
+    made = cell.http.post("/recipes/boxes/create", json={"name": "Box", "values": BOX})
+    assert made.json()["done"], made.text
+    press = {"inputs": {"boxes": "box@1"}}
+    before = len(node.heard("/test_recipe"))
+    with ThreadPoolExecutor() as pool:
+        pressed = pool.submit(partial(cell.http.post, "/widgets/boxes", json=press))
+        until(lambda: len(node.heard("/test_recipe")) > before, "the node heard the recipe")
+        node.publish("/test_recipe_now", reported)
+        receipt: dict[str, Any] = pressed.result().json()
+    return receipt
+
+
+def test_a_recipe_is_sent_in_one_message_and_read_back_on_a_topic(boxes: Server, node: RosNode) -> None:
+    receipt = loaded(boxes, node, {"x": 0.4, "y": 80.0, "z": 0.0})
+    assert (receipt["outcome"], receipt["code"]) == ("confirmed", "recipe_loaded"), receipt
+    assert node.heard("/test_recipe")[-1] == {"x": 0.4, "y": 80.0, "z": 0.0}
+
+
+def test_a_value_that_the_node_reports_otherwise_is_named(boxes: Server, node: RosNode) -> None:
+    receipt = loaded(boxes, node, {"x": 0.4, "y": 60.0, "z": 0.0})
+    assert receipt["outcome"] != "confirmed", receipt
+    assert "Speed" in receipt["reason"]
+    assert "Length" not in receipt["reason"]
+
+
+def test_a_recipe_is_loaded_by_a_call(
+    cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path
+) -> None:
+    panel = PANEL.partition("[[recipe]]")[0] + OF_SERVICE
+    with live_server(cyclone_bridge, tmp_path, panel) as mine:
+        until(lambda: mine.widget("tunes")["enabled"], "the service can be called")
+        make(mine, "Slow", {"enabled": True})
+        receipt = load(mine, "slow@1")
+        assert (receipt["outcome"], receipt["code"]) == ("succeeded", "recipe_sent"), receipt
+        assert robot.requests("/set_enabled") == [{"data": True}]
+        robot.answer_set_enabled(success=False, message="the door is open")
+        refused = load(mine, "slow@1")
+        assert refused["outcome"] == "rejected", refused
+        assert "the door is open" in refused["reason"]
