@@ -18,7 +18,7 @@ from uvicorn import Config as ServerConfig
 
 from app import ros_logging
 from app.access.access import Access
-from app.access.users_file import UsersFile
+from app.access.users_file import UsersFile, users_configured
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
@@ -30,7 +30,7 @@ from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.repeated_records import RepeatedRecords
-from app.runtime.assembly import check_zenoh, data_folder, open_fleet, open_log
+from app.runtime.assembly import check_zenoh, data_folder, mode_of, open_fleet, open_log
 from app.runtime.doctor_process import DoctorProcess
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
@@ -76,7 +76,7 @@ from app.web.routes import (
 from app.web.routes import audit_log as log_routes
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
-from app.web.serving import check_port, urls
+from app.web.serving import check_port, check_protected, urls
 from app.web.session_end import release_control
 from app.web.turns import Turns
 
@@ -213,6 +213,7 @@ async def _app_state(
     Connection.proxies.name(settings.proxies)
     async with open_log(settings, panel) as oplog:
         check_port(server)
+        _check_protected(settings, panel, server)
         # In development the gallery shows all kinds.
         used = {widget.kind for widget in panel.widgets()} & KINDS.keys()  # the state has no row
         kinds = {*KINDS} if settings.dev else used
@@ -245,6 +246,12 @@ async def _app_state(
             finally:
                 access.close()
                 await doctor.stop()
+
+
+def _check_protected(settings: Settings, panel: Panel, server: ServerConfig | None) -> None:
+    """SettingsError if a live panel would be open to the network. A demo moves nothing."""
+    if mode_of(settings, panel) == "live":
+        check_protected(server, users_configured(data_folder(settings, panel)), settings.without)
 
 
 def _doctor(settings: Settings, server: ServerConfig | None) -> DoctorProcess:

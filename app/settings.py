@@ -35,7 +35,9 @@ VARIABLES = (
     "LOG_COPY",
     "SYSLOG",
     "SYSLOG_CA",
+    "WITHOUT",
 )
+PROTECTIONS = ("tls", "users")  # that a server which listens beyond loopback has
 
 
 def shipped_path(name: str) -> Path:
@@ -60,6 +62,7 @@ class Settings:
     log_copy: Path | None = None
     syslog: tuple[str, int] | None = None
     syslog_ca: Path | None = None
+    without: tuple[str, ...] = ()
 
     def data_folder(self, mode: Mode) -> Path:
         """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""
@@ -87,6 +90,7 @@ class Settings:
             log_copy=_parse_path(env, "KIOSK_LOG_COPY", None),
             syslog=_parse_syslog(env.get("KIOSK_SYSLOG", "")),
             syslog_ca=_parse_path(env, "KIOSK_SYSLOG_CA", None),
+            without=tuple(_parse_without(env.get("KIOSK_WITHOUT", ""))),
         )
 
 
@@ -151,6 +155,16 @@ def _parse_proxies(text: str) -> Iterator[str]:
                 "127.0.0.1 or 192.0.2.0/24"
             ) from None
         yield proxy
+
+
+def _parse_without(text: str) -> Iterator[str]:
+    for protection in _split_list(text):
+        if protection not in PROTECTIONS:
+            raise SettingsError(
+                f'KIOSK_WITHOUT has "{protection}": {" or ".join(PROTECTIONS)}, or both with a comma'
+                " between"
+            )
+        yield protection
 
 
 def _parse_syslog(text: str) -> tuple[str, int] | None:

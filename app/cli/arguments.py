@@ -21,6 +21,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "proxies": "KIOSK_PROXIES",
     "root_path": "KIOSK_ROOT_PATH",
     "log_level": "KIOSK_LOG_LEVEL",
+    "without": "KIOSK_WITHOUT",
 }
 
 

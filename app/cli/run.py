@@ -15,7 +15,7 @@ from app.cli.arguments import add_settings, environment, port_to_listen
 from app.cli.parser import Parser
 from app.errors import KioskError
 from app.process.listen_sockets import check_port_free
-from app.settings import LOG_LEVELS, Settings
+from app.settings import LOG_LEVELS, PROTECTIONS, Settings
 from app.web.serving import OPTIONS
 
 PROG = "python -m app.cli run"
@@ -82,6 +82,13 @@ def make_parser(prog: str) -> Parser:
         "--root-path",
         metavar="PATH",
         help="the path below which a proxy shows the panel, such as /cell1 (KIOSK_ROOT_PATH)",
+    )
+    add(
+        "--without",
+        action="append",
+        choices=PROTECTIONS,
+        help="listen beyond this machine without TLS or without users, as behind a proxy of your own"
+        " (KIOSK_WITHOUT)",
     )
     add("--log-level", choices=LOG_LEVELS, help="default: info (KIOSK_LOG_LEVEL)")
     add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")

@@ -4,7 +4,10 @@
 started without them gets them as the application starts, before it listens.
 """
 
-from collections.abc import Sequence
+import os
+import socket
+from collections.abc import Collection, Sequence
+from ipaddress import ip_address
 from typing import Any, Final
 
 from starlette.types import Receive
@@ -12,6 +15,7 @@ from uvicorn import Config
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.errors import SettingsError
 from app.permission.client_places import ClientPlaces, shares
 from app.process.listen_sockets import check_port_free
 from app.web.connections import Connection, connections_most, raise_file_limit
@@ -64,6 +68,45 @@ def urls(
         names = hosts if host in ("0.0.0.0", "::") else [f"[{host}]" if ":" in host else host]
         sockets += [f"{scheme}://{name}:{port}" for name in names]
     return sockets
+
+
+def check_protected(server: Config | None, has_users: bool, without: Collection[str]) -> None:
+    """SettingsError if the server will listen beyond this machine and lacks TLS or users, and the
+    setting does not say that it goes without."""
+    if server is None or not _beyond_loopback(server):
+        return
+    missing = [
+        (name, remedy)
+        for name, is_there, remedy in (
+            ("tls", server.is_ssl, "TLS (--ssl-certfile and --ssl-keyfile)"),
+            ("users", has_users, "users (`operator-panel users`)"),
+        )
+        if not is_there and name not in without
+    ]
+    if missing:
+        lacks = " and ".join(remedy for _, remedy in missing)
+        names = ",".join((*without, *(name for name, _ in missing)))
+        raise SettingsError(
+            f"to listen on {server.host}, beyond this machine, the panel needs {lacks}: everybody on"
+            " the network could press. Listen on 127.0.0.1, or set KIOSK_WITHOUT="
+            f"{names} if a proxy of your own protects it"
+        )
+
+
+def _beyond_loopback(server: Config) -> bool:
+    """Whether other machines can reach it. A socket that it was given is asked itself."""
+    if server.fd is not None:
+        with socket.socket(fileno=os.dup(server.fd)) as accepted:
+            is_local = accepted.family == socket.AF_UNIX
+            hosts = [] if is_local else [accepted.getsockname()[0]]
+    elif server.uds:
+        return False
+    else:
+        infos = socket.getaddrinfo(
+            server.host or None, server.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )
+        hosts = [str(info[4][0]) for info in infos]
+    return any(not ip_address(host.partition("%")[0]).is_loopback for host in hosts)
 
 
 def check_port(server: Config | None) -> None:

@@ -42,6 +42,11 @@ ABOUT: Final = {
         "The certificate authority of that server, as a PEM file.",
         "the system's authorities",
     ),
+    "WITHOUT": (
+        "`tls`, `users` or `tls,users`: listen beyond this machine without them, as behind a proxy of "
+        "your own.",
+        "none",
+    ),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "
         "in a checkout `/gallery` shows each widget in each state.",

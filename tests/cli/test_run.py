@@ -102,6 +102,7 @@ def test_faults_of_a_panel_file_are_reported_with_their_places(tmp_path: Path) -
         ("--ssl-certfile a.pem", 2, "--ssl-certfile and --ssl-keyfile are given together"),
         ("--ssl-certfile /none --ssl-keyfile /none", 1, "No such file or directory: '/none'"),
         ("--name http://cell1", 1, 'KIOSK_HOSTS has "http://cell1": names or addresses'),
+        ("--without cookies", 2, "argument --without: invalid choice: 'cookies'"),
         ("--host 192.0.2.1", 1, "can't listen on 192.0.2.1 port 8000: cannot assign"),
     ],
 )
