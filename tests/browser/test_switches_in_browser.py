@@ -7,7 +7,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.support.browser.pages import place, widget
+from tests.support.browser.pages import place, press_button, widget
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 
@@ -31,6 +31,18 @@ on_message = {{ data = true }}
 off_message = {{ data = false }}
 confirm_s = 2.0
 reported = {{ topic = "{REPORTED}", type = "{BOOL}" }}
+
+[[page.widget]]
+id = "servo"
+kind = "publish"
+label = "Servo on"
+topic = "{SET}"
+type = "{BOOL}"
+message = {{ data = true }}
+lamp = {{ topic = "{REPORTED}", type = "{BOOL}", states = [
+  {{ value = true, text = "On", shape = "circle" }},
+  {{ value = false, text = "Off", shape = "square" }},
+] }}
 """
 
 
@@ -111,3 +123,21 @@ def test_without_scripts_each_position_is_a_form(
     assert node.heard_data(SET)[before:] == [True]
     report(cell, node, "on")
     context.close()
+
+
+def test_the_lamp_of_a_pressed_button_shows_what_the_robot_reports(
+    cell: Server, node: RosNode, page: Page
+) -> None:
+    report(cell, node, "off")
+    page.goto(cell.url)
+    servo = widget(page, "servo")
+    lamp = servo.locator(".lamped")
+    expect(lamp).to_have_text("Off")
+    before = len(node.heard(SET))
+    press_button(page, "servo").click()
+    until(lambda: has_heard(node, SET, before + 1), "it is sent")
+    expect(servo.locator(".receipt")).not_to_be_empty()
+    expect(lamp).to_have_text("Off")
+    report(cell, node, "on")
+    expect(lamp).to_have_text("On")
+    expect(servo).to_have_attribute("data-shape", "circle")
