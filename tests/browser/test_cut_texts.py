@@ -1,4 +1,4 @@
-"""No text of the shipped panel and of the example is cut or broken inside a word, at any size and in
+"""No text of the shipped panel and of the examples is cut or broken inside a word, at any size and in
 any language."""
 
 from collections.abc import Iterator
@@ -17,13 +17,16 @@ PANELS: Final = {
     "shipped": SHIPPED,
     "example": ROOT / "docs/examples/palletizer.toml",
     "plan": ROOT / "docs/examples/plan/panel.toml",
+    "gripper": ROOT / "docs/examples/lab-gripper/panel.toml",
+    "mobile": ROOT / "docs/examples/mobile-robot/panel.toml",
+    "welding": ROOT / "docs/examples/welding-cell/panel.toml",
 }
 # Texts beyond the box that cuts them, and tabs that are broken inside a word. Left out: what a touch
-# shows whole (reasons and receipts), a title beside a long state, limits of parameters, words of
-# gauges, cells of tables, all but the first line of an alarm's action.
+# shows whole (reasons and receipts), who has control beside its sign, a title beside a long state,
+# limits of parameters, words of gauges, cells of tables, all but the first line of an alarm's action.
 CUT: Final = """() => {
   const LEFT_OUT =
-    "h1, .why, .reasons, .receipt, .result, [data-kind=parameter] .limits, .said, td, " +
+    "h1, .who, .why, .reasons, .receipt, .result, [data-kind=parameter] .limits, .said, td, " +
     ".alarm-line [data-text=action], script, template";
   const found = [];
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
