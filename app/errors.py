@@ -7,6 +7,7 @@
     ├── InterfaceError         –    a ROS 2 type or field does not exist in the definitions
     ├── FieldError             422  a field does not accept a value; `field` is its path
     ├── InputError             422  a request is malformed
+    ├── RoleNeeded             403  the client has not the role or group that it needs
     ├── NotFound               404  a page or widget does not exist
     ├── PressRefused           409  the permission was lost right before the message was sent
     ├── TooSlow                408  a request body took too long
@@ -34,7 +35,7 @@ from app.i18n import Text, TextLike, say
 from app.printable import printable
 
 # The cause of a refusal, as a receipt has it.
-Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
+Cause = Literal["", "interlock", "input", "link", "log", "time", "limit", "role"]
 
 # The codes of the system's errors that an operator may read, such as a disk that is full.
 OS_ERRORS: Final[Mapping[int, str]] = {
@@ -154,6 +155,16 @@ class InputError(KioskError):
 
 class NotFound(KioskError):
     status = 404
+
+
+class RoleNeeded(KioskError):
+    """`needs` is the role or group."""
+
+    status = 403
+
+    def __init__(self, message: TextLike, needs: str) -> None:
+        super().__init__(message)
+        self.needs = needs
 
 
 class PressRefused(KioskError):

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+ANYBODY: Final = ""  # a need that everybody meets
 VIEWER: Final = "viewer"
 OPERATOR: Final = "operator"
 MAINTENANCE: Final = "maintenance"

@@ -10,7 +10,7 @@ import asyncio
 import hashlib
 import logging
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
@@ -22,8 +22,10 @@ from app.errors import Cause, NotFound
 from app.i18n import Text, TextLike, say
 from app.permission.press_permission import cause_of
 from app.permission.principal import Principal
+from app.permission.role_locks import role_verdict
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.command_status import OutcomeCode
+from app.roles import OPERATOR
 from app.ros_logging import RobotLog
 
 LONGEST_KEPT: Final = 500  # characters of a value of an earlier act
@@ -80,12 +82,14 @@ class Act(Generic[Subject, Result]):
     """A row of a table of acts on a subject.
 
     `permission` returns whether the server permits it now. `apply` does it; done twice, it changes
-    nothing more. `entry` is the sentence of the log for what was done.
+    nothing more. `entry` is the sentence of the log for what was done. `needs` is the role that it
+    needs; an object may need a further one.
     """
 
     permission: Callable[[ActGuard, ActRequest], Verdict]
     apply: Callable[[Subject, ActRequest], Result]
     entry: Callable[[Result], TextLike]
+    needs: str = OPERATOR
 
 
 def server_permits(guard: ActGuard, request: ActRequest) -> Verdict:
@@ -151,12 +155,14 @@ class ActRunner(Generic[Subject]):
         acts: Mapping[str, Act[Subject, Any]],
         subject: Subject,
         context: ActContext,
+        further_needs: Callable[[str], Collection[str]] = lambda _: (),
     ) -> None:
         """`kind` is that of the log entries; with the act's name it is their action, such as
-        "control_take"."""
+        "control_take". `further_needs` returns the roles and groups that acts on an object need."""
         self._kind = kind
         self._acts = acts
         self._subject = subject
+        self._further_needs = further_needs
         self._context = context
         self._press_log = context.press_log
         self._log = RobotLog(logging.getLogger(f"kiosk.{kind}"), context.robot)
@@ -201,7 +207,8 @@ class ActRunner(Generic[Subject]):
     def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike, Finish | None]:
         """The receipt, the sentence of the log, and what ends the act."""
         act = self._acts[request.act]
-        verdict = act.permission(self._context.guard, request)
+        needs = {act.needs, *self._further_needs(request.object)}
+        verdict = role_verdict(needs, request.who) or act.permission(self._context.guard, request)
         if not verdict.permitted:
             reason = verdict.reason or ""
             return _refused(request, act_id, verdict.code, reason), reason, None

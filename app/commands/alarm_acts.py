@@ -26,6 +26,7 @@ from app.alarms.status import (
 from app.commands.acts import Act, ActRequest, Applied, server_and_control_permit
 from app.errors import InputError
 from app.i18n import Text, TextLike, say
+from app.roles import MAINTENANCE
 
 LONGEST_REASON: Final = 200
 
@@ -94,23 +95,32 @@ def _entry(code: str) -> Callable[[AlarmChange], Text]:
     return lambda change: say(code, name=change.name)
 
 
+def needs_of_alarm(engine: AlarmEngine, alarm_id: str) -> tuple[str, ...]:
+    """The roles and groups that acts on this alarm need beside those of the act."""
+    alarm = engine.alarms.get(alarm_id)
+    needs = alarm.definition.alarm.needs if alarm else None
+    return (needs,) if needs else ()
+
+
 ALARM_ACTS: Final[Mapping[str, Act[AlarmEngine, AlarmChange]]] = {
     "acknowledge": Act(
         server_and_control_permit, _changes(_acknowledge), _entry("log_done_acknowledge")
     ),
-    "shelve": Act(server_and_control_permit, _changes(_shelve), _entry("log_done_shelve")),
+    "shelve": Act(server_and_control_permit, _changes(_shelve), _entry("log_done_shelve"), MAINTENANCE),
     "unshelve": Act(
         server_and_control_permit,
         _changes(lambda status, definition, _, now: unshelve(status, definition.rules, now)),
         _entry("log_done_unshelve"),
+        MAINTENANCE,
     ),
     "out_of_service": Act(
-        server_and_control_permit, _changes(_remove), _entry("log_done_out_of_service")
+        server_and_control_permit, _changes(_remove), _entry("log_done_out_of_service"), MAINTENANCE
     ),
     "in_service": Act(
         server_and_control_permit,
         _changes(lambda status, definition, _, now: return_to_service(status, definition.rules, now)),
         _entry("log_done_in_service"),
+        MAINTENANCE,
     ),
     "reset": Act(
         server_and_control_permit,

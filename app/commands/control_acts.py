@@ -10,6 +10,7 @@ from app.i18n import Text, say
 from app.permission.control_authority import LIFE_S, ControlAuthority, ControlRefusal
 from app.permission.control_parties import HandOver
 from app.permission.principal import Principal
+from app.roles import ANYBODY
 
 # A page without scripts shows that it is open by its reload, at the latest after this time.
 FORM_LIFE_S: Final = 35.0
@@ -86,7 +87,7 @@ CONTROL_ACTS: Final[Mapping[str, Act[ControlAuthority, ControlChange]]] = {
     "keep": Act(
         server_permits, _changes(lambda c, r: c.keep(r.who, r.object)), _answered("log_done_keep")
     ),
-    "release": Act(always, _changes(lambda c, r: c.release(r.who)), _released),
+    "release": Act(always, _changes(lambda c, r: c.release(r.who)), _released, ANYBODY),
 }
 
 

@@ -5,6 +5,7 @@ from typing import Final, Protocol
 
 from app.commands.acts import Act, ActRequest, Applied, server_permits
 from app.i18n import Text, say
+from app.roles import MAINTENANCE
 
 
 class Doctor(Protocol):
@@ -43,6 +44,6 @@ def _entry(code: str) -> Callable[[Applied], Text]:
 
 
 DIAGNOSTIC_ACTS: Final[Mapping[str, Act[Doctor, Applied]]] = {
-    "check": Act(server_permits, _check, _entry("log_done_check")),
-    "bundle": Act(server_permits, _bundle, _entry("log_done_bundle")),
+    "check": Act(server_permits, _check, _entry("log_done_check"), MAINTENANCE),
+    "bundle": Act(server_permits, _bundle, _entry("log_done_bundle"), MAINTENANCE),
 }

@@ -20,6 +20,7 @@ from app.permission.verdict import PERMITTED, Verdict, locked
 from app.view.publisher import ViewPublisher
 
 MAX_AHEAD_S: Final = 1.0  # tolerance for a press time in the future: rounding and drift
+NO_NEEDS: Final[Mapping[str, frozenset[str]]] = {}
 _is_event_id: Final = re.compile(EVENT_ID).fullmatch
 
 
@@ -37,10 +38,11 @@ class PressGuard:
         inhibited: Callable[[], Mapping[str, Verdict]] = dict,
         shared: Collection[str] = (),
         publisher_by_id: Callable[[str], ViewPublisher | None] = lambda _: None,
+        needs: Mapping[str, frozenset[str]] = NO_NEEDS,
     ) -> None:
         """`instance_ids`: those of the views of all robots. A press with another robot's is refused,
         unless its widget is on the pages of all (`shared`). `inhibited` returns the locks by alarms, by
-        the widgets' ids."""
+        the widgets' ids; `needs` has the roles and groups that a command needs, by its id."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
@@ -49,6 +51,7 @@ class PressGuard:
         self._inhibited = inhibited
         self._shared = shared
         self._publisher_by_id = publisher_by_id
+        self._needs = needs
         self._ended = False
 
     def close(self) -> None:
@@ -65,7 +68,7 @@ class PressGuard:
     def conditions(self, who: Principal) -> ServerConditions:
         """The server's own locks for a client: shutdown, log, control, alarms."""
         control, lock = self._control.verdict(who), self._log.lock
-        return ServerConditions(control, lock, self._ended, who, self._inhibited())
+        return ServerConditions(control, lock, self._ended, who, self._inhibited(), self._needs)
 
     def stale_reason(self, press: Press[Command]) -> TextLike:
         """Why the view that the operator saw is stale, "" if it is not. It is not if the press has

@@ -15,6 +15,7 @@ from app.i18n import Text, TextLike, joined, number, say
 from app.recipes.book import Author, Change, ImportChange, RecipeBook
 from app.recipes.csv_text import read_rows
 from app.recipes.field_text import differences_text
+from app.roles import MAINTENANCE
 
 MOST_BAD: Final = 5  # rows that a sentence names
 
@@ -126,7 +127,7 @@ def _entry(code: str) -> Callable[[RecipeChange], Text]:
 
 
 def _row(plan: Plan, code: str) -> Act[RecipeBooks, RecipeChange]:
-    return Act(server_and_control_permit, _changes(plan), _entry(code))
+    return Act(server_and_control_permit, _changes(plan), _entry(code), MAINTENANCE)
 
 
 RECIPE_ACTS: Final[Mapping[str, Act[RecipeBooks, RecipeChange]]] = {

@@ -122,7 +122,8 @@ class Alarm(Description):
     """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
     publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
     the value times `scale`. `state` is the machine's state while it is active. `ack_command` is the
-    control that is pressed when it is acknowledged, with its name or code in `ack_input`."""
+    control that is pressed when it is acknowledged, with its name or code in `ack_input`. `needs`: the
+    role or group that acts on it need."""
 
     id: Id
     robot: Id | None = None
@@ -138,6 +139,7 @@ class Alarm(Description):
     ack: Literal["required", "none"] = "required"
     inhibits: Widgets = ()
     state: StateValue | None = None
+    needs: Id | None = None
     ack_command: Id | None = None
     ack_input: Id | None = None
     on_delay_s: Delay = 0.0

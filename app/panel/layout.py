@@ -36,11 +36,13 @@ Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(_che
 
 class Group(Description):
     """A part of a page with a heading and a grid of `columns`; `span` is its width in twelfths of the
-    page. Without `columns` its widgets' spans are twelfths of the group."""
+    page. Without `columns` its widgets' spans are twelfths of the group. `needs`: the role or group of
+    users that its commands need."""
 
     title: Label | None = None
     note: Label | None = None
     robot: Id | None = None
+    needs: Id | None = None
     columns: Annotated[int, Field(ge=1, le=COLUMNS)] | None = None
     span: Span = COLUMNS
     widgets: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
@@ -110,12 +112,14 @@ def _places(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]
 
 class Page(Description):
     """A page of the panel; with `fit` it never scrolls. An `overview` has a tile for each robot. With a
-    `template` (Jinja) that one places the widgets; `styles` is appended to the panel's stylesheet."""
+    `template` (Jinja) that one places the widgets; `styles` is appended to the panel's stylesheet.
+    Clients without the role or group `needs` do not see it."""
 
     id: Id
     title: Label
     icon: Icon | None = None
     robot: Id | None = None
+    needs: Id | None = None
     overview: bool = False
     fit: bool = False
     template: File | None = None

@@ -11,6 +11,7 @@ from app.panel.base import TopicQos
 from app.panel.condition import Condition, NamedCondition
 from app.panel.interlock import Interlock
 from app.panel.layout import FRAME_ONLY, Page
+from app.panel.needs import PanelNeeds, needs_of
 from app.panel.panel_keys import PanelKeys
 from app.panel.robot_entry import RobotEntry as RobotEntry
 from app.panel.texts import panel_texts
@@ -131,6 +132,11 @@ class Panel(PanelKeys):
     @cached_property
     def stops(self) -> tuple[Command, ...]:  # those that stop the machine
         return tuple(widget for widget in self.commands if is_stop(widget))
+
+    @cached_property
+    def needs(self) -> PanelNeeds:
+        """The roles and groups that its pages, commands and alarms need."""
+        return needs_of(self)
 
     @cached_property
     def uniform_buttons(self) -> UniformButtons:

@@ -25,6 +25,7 @@ from app.permission.interlocks import (
 )
 from app.permission.principal import Principal
 from app.permission.robot_options import options_verdict
+from app.permission.role_locks import ROLE_LOCK, role_verdict
 from app.permission.verdict import PERMITTED, WITHOUT_CONTROL, Verdict, locked, with_advice
 from app.robot.state import RobotState
 
@@ -35,7 +36,7 @@ class ServerConditions:
 
     `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
     whether the client has control. `who` is None in a question for all clients. `inhibited`: the locks
-    by alarms, by the widgets' ids.
+    by alarms, by the widgets' ids. `needs`: the roles and groups that a command needs, by its id.
     """
 
     control: Verdict = PERMITTED
@@ -43,6 +44,7 @@ class ServerConditions:
     ending: bool = False
     who: Principal | None = None
     inhibited: Mapping[str, Verdict] = field(default_factory=dict, hash=False)
+    needs: Mapping[str, frozenset[str]] = field(default_factory=dict, hash=False)
 
 
 NO_CONDITIONS: Final = ServerConditions()
@@ -71,6 +73,15 @@ class Check(NamedTuple):
     alike: bool = False
 
 
+def _role(request: PermissionRequest) -> Verdict | None:
+    """Locks for a client without a role or group that the command needs. What all clients see is
+    locked for those in the view of their audience."""
+    who = request.grounds.who
+    if who is None:
+        return None
+    return role_verdict(request.grounds.needs.get(request.widget.id, ()), who)
+
+
 def _ending(request: PermissionRequest) -> Verdict | None:
     return locked("server_shutting_down") if request.grounds.ending else None
 
@@ -86,6 +97,7 @@ def _control(request: PermissionRequest) -> Verdict:
 
 
 CHECKS: Final = (
+    Check("role", _role, alike=True),
     Check("link", lambda request: request.link, alike=True),
     Check("ending", _ending, alike=True),
     Check("log", _log, alike=True),
@@ -125,6 +137,7 @@ CAUSES: Final[Mapping[str, Cause]] = {
         "link",
     ),
     "log": "log",
+    ROLE_LOCK: "role",
 }
 
 

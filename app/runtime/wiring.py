@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from app.alarms.published import PublishedAlarms
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
-from app.commands.alarm_acts import ALARM_ACTS
+from app.commands.alarm_acts import ALARM_ACTS, needs_of_alarm
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
@@ -83,7 +83,7 @@ def wire_session(
     several robots, `entry` is this one and `others` gives access to all of them."""
     panel, operators_log = server.panel, server.operators_log
     robots = widget_robots(panel)
-    pages = panel.widgets_by_page
+    pages, needs = panel.widgets_by_page, panel.needs
     panel = panel_of(panel, entry.id if entry else None)
     context = _context(server, panel, config, access, entry)
     robot, link, signals = context.robot, context.link, context.signals
@@ -107,6 +107,7 @@ def wire_session(
         robot_alarms.inhibited,
         recipes.revisions,
         pages,
+        needs,
     )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
@@ -119,6 +120,7 @@ def wire_session(
         robot_alarms.inhibited,
         robots,
         others.publisher,
+        needs.commands,
     )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
     act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)
@@ -148,7 +150,9 @@ def wire_session(
         operators_log=operators_log,
         control=control,
         control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
-        alarm_acts=ActRunner("alarm", ALARM_ACTS, alarms.engine, act_context),
+        alarm_acts=ActRunner(
+            "alarm", ALARM_ACTS, alarms.engine, act_context, partial(needs_of_alarm, alarms.engine)
+        ),
         recipe_acts=ActRunner("recipe", RECIPE_ACTS, recipes, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
         shift_acts=ActRunner("alarm", SHIFT_ACTS, None, act_context),

@@ -18,6 +18,7 @@ from pydantic_core import to_json
 
 from app.i18n import ENGLISH, localized
 from app.panel.layout import FRAME_ONLY
+from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.permission.control_authority_view import Role
 from app.view.audience import EVERYONE, Audience
 from app.view.heartbeat import Heartbeat
@@ -59,11 +60,14 @@ class ViewPublisher:
         revision: str,
         without_control: Mapping[str, Attributes] = NOTHING,
         pages: Mapping[str, Collection[str]] = NO_PAGES,
+        needs: PanelNeeds = NO_NEEDS,
     ) -> None:
         """`revision` is of all files that a page has loaded: a page with another one reloads.
         `without_control` has what is different for clients without control, `pages` the ids of the
-        widgets that a page shows, by the page's."""
+        widgets that a page shows, by the page's. `needs` are the roles and groups that pages and
+        commands need."""
         self._pages = pages
+        self.needs = needs
         self.instance_id = secrets.token_hex(4)
         self.version = 1
         self.view = view
@@ -74,7 +78,7 @@ class ViewPublisher:
         self._without_control = without_control
         self.shared = NO_SHARED
         # By the audience without its language.
-        self._views: dict[tuple[bool, Role, frozenset[str]], View] = {}
+        self._views: dict[tuple[bool, Role, frozenset[str], frozenset[str]], View] = {}
         self._snapshots: dict[tuple[Audience, str], bytes] = {}  # by the audience and the page
         self._prepared: dict[Variant, bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
@@ -115,6 +119,13 @@ class ViewPublisher:
         """The version in which a widget's lock has last closed or opened; 0 if it never has."""
         return self._lock_changes.get(widget, 0)
 
+    def renew_audiences(self) -> None:
+        """A new version of the same view: what clients see of it may have changed, as their roles."""
+        self.version += 1
+        self._latest_events = {}
+        self._snapshots, self._prepared, self._whole = {}, {}, {}
+        self._wake()
+
     def close(self) -> None:
         """Ends every stream."""
         self.closed = True
@@ -135,12 +146,12 @@ class ViewPublisher:
 
     def for_audience(self, audience: Audience = EVERYONE) -> View:
         """The newest view for an audience."""
-        if not audience.role:
+        if audience.sees_all:
             return self.view
-        key = audience.has_control, audience.role, audience.without
+        key = audience.has_control, audience.role, audience.without, audience.lacks
         if key not in self._views:
             self._views[key] = for_audience(
-                self.view, self._without_control, audience, self.shared.without_control
+                self.view, self._without_control, audience, self.shared.without_control, self.needs
             )
         return self._views[key]
 
@@ -169,7 +180,7 @@ class ViewPublisher:
         key = version, audience, before, page
         prepared = self._prepared.get(key)
         if prepared is None:
-            latest = version == self.version - 1 and not (before.role or audience.role)
+            latest = version == self.version - 1 and before.sees_all and audience.sees_all
             events = self._latest_events if latest else difference(view, self.for_audience(audience))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, audience.language)

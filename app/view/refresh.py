@@ -15,6 +15,7 @@ from app.alarms.shown import NO_ALARMS, AlarmsView
 from app.audit.press_record import Log
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
+from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority import ControlAuthority
 from app.permission.verdict import Verdict
@@ -96,6 +97,7 @@ class ViewSources:
     inhibited: Callable[[], Mapping[str, Verdict]] = dict
     recipes: Callable[[], Mapping[str, int]] = dict
     pages: Mapping[str, Collection[str]] | None = None  # of all robots
+    needs: PanelNeeds = NO_NEEDS  # of all robots
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -132,7 +134,7 @@ class ViewRefresher:
         pages = panel.widgets_by_page if sources.pages is None else sources.pages
         self.own = self._current  # the newest view without the widgets of other robots
         self.publisher = ViewPublisher(
-            self._current.view, revision, self._current.without_control, pages
+            self._current.view, revision, self._current.without_control, pages, sources.needs
         )
         self._shown_at = 0.0
         self._updated_keys: set[str] = set()  # of topics with a sample since the last frame

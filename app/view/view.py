@@ -12,10 +12,12 @@ from typing import Any, Final, NamedTuple, TypedDict
 from app.alarms.shown import NO_ALARMS, AlarmsView
 from app.i18n import Text, TextLike, joined, say
 from app.panel.model import Panel
+from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
 from app.permission.control_authority_view import NO_CONTROL, ControlView, for_role
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import NO_CONDITIONS, ServerConditions, permissions
+from app.permission.role_locks import hardest, role_reason
 from app.permission.verdict import PERMITTED, Verdict
 from app.robot.state import RobotState
 from app.view.audience import Audience
@@ -214,9 +216,16 @@ def for_audience(
     without_control: Mapping[str, Attributes],
     audience: Audience,
     of_others: Mapping[str, Mapping[str, Attributes]] = NOTHING_OF_OTHERS,
+    needs: PanelNeeds = NO_NEEDS,
 ) -> View:
-    """The view for an audience; without control, commands are locked. `of_others` has the same for the
+    """The view for an audience: without control, commands are locked, and without the role or group
+    that they need. Widgets of pages that it does not see are left out. `of_others` has the same for the
     widgets of other robots, by the robot's id."""
+    if audience.lacks:
+        seen = for_audience(
+            view, without_control, audience._replace(lacks=frozenset()), of_others, needs
+        )
+        return _for_lacking(seen, audience.lacks, needs)
     role = audience.role
     if not role:
         return view
@@ -232,9 +241,23 @@ def for_audience(
     return {**view, "control": control, "widgets": {**view["widgets"], **locked}}
 
 
-def _embedded(attributes: Attributes) -> Attributes:
-    """The attributes of a widget on a page that may only show."""
-    reason = say("page_embedded")
+def _for_lacking(view: View, lacks: frozenset[str], needs: PanelNeeds) -> View:
+    """The view for clients without these roles and groups."""
+    hidden = needs.hidden_widgets(lacks)
+    widgets = {name: shown for name, shown in view["widgets"].items() if name not in hidden}
+    for name, needed in needs.commands.items():
+        if name in widgets and (unmet := needed & lacks):
+            widgets[name] = _locked(widgets[name], role_reason(hardest(unmet)))
+    return {**view, "widgets": widgets}
+
+
+def _locked(attributes: Attributes, reason: TextLike) -> Attributes:
+    """The attributes of a command that this client may not press, whatever the robot permits."""
     overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
     overlay |= {"stoppable": False, "askable": False}
     return {name: overlay.get(name, value) for name, value in attributes.items()}
+
+
+def _embedded(attributes: Attributes) -> Attributes:
+    """The attributes of a widget on a page that may only show."""
+    return _locked(attributes, say("page_embedded"))

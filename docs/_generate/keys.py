@@ -53,7 +53,10 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     with_label = (name for name, table in tables.items() if "show_label" in table["properties"])
     label = {f"{name}.show_label": False for name in with_label}
     robot = {f"{name}.robot": "r1" for name, table in tables.items() if "robot" in table["properties"]}
-    return grow | label | source | robot | examples | own
+    needs = {
+        f"{name}.needs": "operator" for name, table in tables.items() if "needs" in table["properties"]
+    }
+    return needs | grow | label | source | robot | examples | own
 
 
 def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:

@@ -20,6 +20,7 @@ from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.same_widgets import SameWidget
 from app.panel.source import NAME as SOURCE
+from app.panel.widgets.families import Command
 from app.panel.widgets.kinds import KINDS
 from tests.support.form import LONG, several
 from tests.support.parts import TESTS
@@ -139,6 +140,7 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     for kind, (model, *_) in KINDS.items():
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
         own |= {"grow": True, "show_label": False, "robot": "r1"}  # of any kind, but of few widgets
+        own |= {"needs": "operator"} if issubclass(model, Command) else {}
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
         # A switch switches back; options are the file's or the robot's.
         refused = {

@@ -215,17 +215,18 @@ class Display(TopicWidget, DisplayWidget):
 
 
 class Command(BaseWidget):
-    """A widget that sends commands to the robot while its interlocks permit."""
+    """A widget that sends commands to the robot while its interlocks permit. `needs`: the role or group
+    of users that may press it."""
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
+    needs: Id | None = None
 
     def sources(self) -> Iterator[TopicSource]:
         """The topics whose values it needs, beside its interlocks'."""
         yield from ()
 
     @abstractmethod
-    def templates(self) -> list[Any]:
-        """All templates, which may contain input ids."""
+    def templates(self) -> list[Any]: ...  # which may contain input ids
 
     @abstractmethod
     def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
@@ -286,8 +287,7 @@ class PublishCommand(TopicWidget, Command):
     """A command that publishes a topic."""
 
     @property
-    def one_at_a_time(self) -> bool:
-        """Whether it is locked until the effect of the last press is confirmed."""
+    def one_at_a_time(self) -> bool:  # locked until the effect of the last press is confirmed
         return False
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:

@@ -39,6 +39,7 @@ CLOSE: Final[Mapping[str, int]] = {
     "limit": 4429,
     "link": 4503,
     "log": 4503,
+    "role": 4403,
 }
 
 

@@ -45,6 +45,7 @@ STATUS: Final[Mapping[str, int]] = {
     "log": 503,
     "time": 504,
     "limit": 429,
+    "role": 403,
 }
 
 
