@@ -47,6 +47,7 @@ from app.web.proxies import Proxies
 from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
 from app.web.root_path import RootPath, root_path_of
+from app.web.route_needs import route_guard
 from app.web.routes import (
     alarm_history,
     alarm_report,
@@ -77,7 +78,7 @@ from app.web.routes import audit_log as log_routes
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, check_protected, urls
-from app.web.session_end import release_control
+from app.web.session_end import release_control, renew_audiences
 from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
@@ -118,6 +119,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         openapi_url=None,  # routes.description has it
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
+        dependencies=[Depends(route_guard)],
     )
     _add_middleware(app, settings, panel.embed)
     _add_routes(app, settings.dev)
@@ -171,6 +173,7 @@ async def _lifespan(
     async with _app_state(settings, panel, app.state.server) as state:
         app.state.app_state = state
         state.access.on_end(partial(release_control, state))
+        state.access.on_change(partial(renew_audiences, state))
         ports: set[int] = set()
         watchdog = _watchdog(state)
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):

@@ -78,11 +78,17 @@ class Access:
         self._typed: dict[str, tuple[str, str, float]] = {}
         self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
+        self._change_listeners: list[Callable[[], None]] = []
 
     @property
     def configured(self) -> bool:
         """Whether clients have roles: there are users, or their file can't be read, which locks."""
         return self.book.configured or bool(self.fault)
+
+    @property
+    def has_roles(self) -> bool:
+        """Whether clients differ in what they may do: else everybody may do everything."""
+        return self.configured or not self.rules.open
 
     async def reload(self) -> None:
         """Reads the users' file if it has changed, on a thread, and logs the changes."""
@@ -99,6 +105,7 @@ class Access:
                 log.error("%s", fault)
             self.book, self.fault = loaded.book, fault
             self._end_changed(before)
+            self._changed()
         if not self.fault:
             self.log.changes(self.book)
 
@@ -186,6 +193,7 @@ class Access:
         session = self.sessions.begin(checked.user.name, client)
         who = self.principal(client, session.id)
         self.log.signed_in(who, attempt.way)
+        self._changed()
         return checked, session
 
     def sign_out(self, session: Session) -> None:
@@ -201,10 +209,20 @@ class Access:
         """`listener` is called when a session has ended, and why."""
         self._listeners.append(listener)
 
+    def on_change(self, listener: Callable[[], None]) -> None:
+        """`listener` is called when clients may have other roles: after a sign-in, a sign-out, or
+        another version of the users' file."""
+        self._change_listeners.append(listener)
+
+    def _changed(self) -> None:
+        for listener in self._change_listeners:
+            listener()
+
     def _ended(self, session: Session, reason: EndReason) -> None:
         self.log.signed_out(session, reason)
         for listener in self._listeners:
             listener(session, reason)
+        self._changed()
 
     def typed_digits(self, client: str, user: str) -> str:
         """The digits that a browser without scripts has typed for this user."""

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse, Res
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from app.errors import KioskError, TooMany, TooSlow
+from app.errors import KioskError, RoleNeeded, TooMany, TooSlow
 from app.i18n import TextLike, render, say
 from app.printable import printable
 from app.web.app_state import site_of
@@ -20,14 +20,16 @@ from app.web.rendering.display_choice import display_of
 TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 
 
-def error_answer(request: Request, status: int, message: TextLike) -> Response:
-    """An error for whom it is: a page for who reads pages, JSON for programs."""
+def error_answer(request: Request, status: int, message: TextLike, sign_in: bool = False) -> Response:
+    """An error for whom it is: a page for who reads pages, JSON for programs. `sign_in`: the page leads
+    to the sign-in."""
     site, language = site_of(request), language_of(request)
     if "text/html" not in request.headers.get("accept", ""):
         return JSONResponse({"error": render(message, language)}, status_code=status)
     panel = site.fleet.panel
     display = display_of(request, panel)
     context = {"site": site, "panel": panel, "display": display, "status": status, "message": message}
+    context["sign_in"] = say("signin_sign_in") if sign_in else ""
     html = site.templates.render("error.html", language, **context)
     return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
 
@@ -35,7 +37,7 @@ def error_answer(request: Request, status: int, message: TextLike) -> Response:
 async def on_kiosk_error(request: Request, error: Exception) -> Response:
     status = error.status if isinstance(error, KioskError) else 500
     message = error.text if isinstance(error, KioskError) else str(error)
-    answer = error_answer(request, status, message)
+    answer = error_answer(request, status, message, isinstance(error, RoleNeeded))
     if isinstance(error, TooSlow):
         answer.headers["connection"] = "close"  # no client waits for the rest
     if isinstance(error, TooMany):

@@ -6,6 +6,12 @@ from app.permission.principal import Principal
 from app.web.app_state import AppState
 
 
+def renew_audiences(state: AppState) -> None:
+    """What the browsers see may have changed, with a role."""
+    for robot in state.fleet.sessions:
+        robot.publisher.renew_audiences()
+
+
 def release_control(state: AppState, session: Session, reason: EndReason) -> None:
     """A browser where nobody is signed in has no control; a hand-over passes it to the next user."""
     if reason == "hand_over":

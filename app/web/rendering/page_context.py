@@ -19,8 +19,10 @@ from app.i18n import Text, TextLike, say
 from app.panel.layout import FRAME_ONLY, Page
 from app.panel.model import Panel
 from app.permission.principal import Principal
+from app.permission.role_locks import role_reason, unmet
 from app.printable import printable_texts
 from app.robot.command_status import GOOD_OUTCOMES
+from app.roles import OPERATOR
 from app.runtime.robot_session import RobotSession
 from app.view.audience import audience, audience_of
 from app.view.result_age import BAD_S, GOOD_S
@@ -55,6 +57,7 @@ class PageContext(TypedDict):
     display: DisplaySettings
     choices: Sequence[Choice]
     panel: Panel
+    tabs: Sequence[Page]
     page: Page
     railed: bool
     is_log: bool
@@ -114,11 +117,15 @@ def page_context(
     again |= {EMBED: 1} if embedded else {}
     now, wall = clock.server_now(), time.time()
     panel, language = state.fleet.panel, language_of(request)
+    lacks = unmet(panel.needs.named, who)
+    no_role = OPERATOR in lacks
     if only_shows(session.panel.embed, embedded):
-        of_client = audience("embedded", language)
+        of_client = audience("embedded", language, lacks=lacks)
     else:
         others = publisher.shared.controls
-        of_client = audience_of(who, publisher.view["control"], rules, language, others)
+        of_client = audience_of(
+            who, publisher.view["control"], rules, language, others, panel.needs.named
+        )
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
@@ -148,6 +155,7 @@ def page_context(
         display=display,
         choices=[*language_choice(panel, language), *choices(display)],
         panel=panel,
+        tabs=[other for other in panel.pages if who.meets(other.needs or "")],
         page=page,
         railed=panel.has_rail or page.id == FRAME_ONLY,
         is_log=is_log,
@@ -170,14 +178,15 @@ def page_context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words={"embed": embed, "root": state.root, "may_act": of_client.has_control}
+        words={"embed": embed, "root": state.root, "may_act": of_client.has_control and not no_role}
         | page_words(
             state.fleet,
             session,
             page,
             f"{state.root}/static/{state.assets.revision}/{PICTURES}",
             language,
-        ),
+        )
+        | ({"alarm_needs_control": role_reason(OPERATOR)} if no_role else {}),
         page_json=page_json(data, language),
         refresh_s=refresh_s,
         since=None if RELOADED in request.query_params else round(now, 3),

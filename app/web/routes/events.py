@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -10,14 +11,18 @@ from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.panel.rules import ControlRules
-from app.permission.control_authority_view import Role
-from app.permission.principal import Principal
-from app.view.audience import EVERYONE, Audience, audience, audience_of
+from app.permission.role_locks import unmet
+from app.view.audience import EVERYONE, NOTHING, Audience, audience, audience_of
 from app.view.heartbeat import beat
 from app.view.publisher import ViewPublisher, client_id_event
-from app.web.app_state import CurrentSession, CurrentState
+from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.asgi import server_send
-from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.client_cookie import (
+    Caller,
+    caller,
+    principal_with_new_token,
+    set_client_cookie,
+)
 from app.web.embedding import from_frame, only_shows
 from app.web.language import language_of
 from app.web.metrics import Open
@@ -50,13 +55,13 @@ async def events(
     frame."""
     publisher, rules = session.publisher, session.control.rules
     embedded, language = embed or from_frame(request.scope), language_of(request)
-    first, token, current = b"", "", _always("", language)
-    if only_shows(state.fleet.panel.embed, embedded):
-        current = _always("embedded", language)
-    elif rules.required:
+    first, token, asks = b"", "", caller(request)
+    only = only_shows(state.fleet.panel.embed, embedded)
+    if rules.required and not only:
         who, token = principal_with_new_token(request, state, embedded)
         first = client_id_event(who.client.id)
-        current = partial(_audience_now, publisher, who, rules, language)
+        asks = replace(asks, token=token or asks.token)
+    current = partial(_audience_now, state, publisher, asks, rules, language, only)
     shown = publisher.shown_page(page)
     answer: Response
     if once:
@@ -68,20 +73,27 @@ async def events(
 
 
 def _audience_now(
-    publisher: ViewPublisher, who: Principal, rules: ControlRules, language: str
+    state: AppState,
+    publisher: ViewPublisher,
+    asks: Caller,
+    rules: ControlRules,
+    language: str,
+    embedded: bool,
 ) -> Audience:
+    """The audience of a client now: it may have signed in or out, or the panel its first users, since
+    its stream began. `embedded`: a page in a frame, which only shows."""
+    has_roles = state.access.has_roles
+    if not has_roles and (embedded or not rules.required):
+        return audience("embedded" if embedded else "", language)
+    who, needs = asks.principal(state), publisher.needs.named if has_roles else NOTHING
+    if embedded:
+        return audience("embedded", language, lacks=unmet(needs, who))
     control, others = publisher.view["control"], publisher.shared.controls
-    return audience_of(who, control, rules, language, others)
+    return audience_of(who, control, rules, language, others, needs)
 
 
 def _everyone() -> Audience:
     return EVERYONE
-
-
-def _always(role: Role, language: str) -> Callable[[], Audience]:
-    """The audience of a client whose role never changes."""
-    of_client = audience(role, language)
-    return lambda: of_client
 
 
 class EventStream(Response):

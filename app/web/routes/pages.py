@@ -12,11 +12,17 @@ from app.panel.layout import Page
 from app.panel.robot_panels import page_for
 from app.panel.widgets.families import EntryWidget
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import opened_by_person, principal_with_new_token, set_client_cookie
+from app.web.client_cookie import (
+    opened_by_person,
+    principal_of,
+    principal_with_new_token,
+    set_client_cookie,
+)
 from app.web.embedding import QUERY, frame_ancestors, is_embedded, only_shows, says_embedded
 from app.web.language import language_of
 from app.web.openapi_parts import PAGE, Described, errors
 from app.web.rendering.page_context import page_context
+from app.web.route_needs import check_page
 from app.web.security import POLICY, content_security_policy
 
 router = APIRouter(include_in_schema=True)
@@ -61,9 +67,9 @@ OTHER_PAGES = (
 async def first_page(request: Request, state: CurrentState) -> Response:
     if away := _to_a_robot(request, state, "/"):
         return away
-    panel = state.fleet.panel
-    page = page_for(panel, request.path_params.get("robot"), panel.pages[0])
-    return _render(request, state, page)
+    panel, who = state.fleet.panel, principal_of(request, state)
+    seen = next((page for page in panel.pages if who.meets(page.needs or "")), panel.pages[0])
+    return _render(request, state, page_for(panel, request.path_params.get("robot"), seen))
 
 
 @router.get(
@@ -110,6 +116,7 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     typed = any(isinstance(widget, EntryWidget) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     who, token = principal_with_new_token(request, state, embedded)
+    check_page(page, who)
     if session.control.rules.required and not embedded:
         session.control.loaded(who, refresh_s + GRACE_S, opened_by_person(request))
         session.show()

@@ -1,0 +1,113 @@
+"""What each route needs: the one table of routes and roles, and its guard.
+
+Presses, holds and acts are judged where they are made, with a receipt and an entry in the operator's
+log: their routes need nothing here. A widget that a client does not see has no route for it.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from starlette.requests import HTTPConnection
+
+from app.errors import RoleNeeded
+from app.i18n import say
+from app.panel.layout import Page
+from app.permission.principal import Principal
+from app.permission.role_locks import role_name, unmet
+from app.roles import ANYBODY, ENGINEER, MAINTENANCE, OPERATOR
+from app.web.app_state import AppState, site_of
+from app.web.client_cookie import caller
+
+LOCAL_ONLY: Final = "local"  # an operator, or anybody on the server's own machine
+ROBOT: Final = "/robots/{robot}"  # stands before the paths of one of several robots
+
+ROUTE_NEEDS: Final[Mapping[str, str]] = {
+    # What everybody sees.
+    "/": ANYBODY,
+    "/pages/{page}": ANYBODY,
+    "/events": ANYBODY,
+    "/widgets/{widget}/frame": ANYBODY,
+    "/widgets/{widget}/frames": ANYBODY,
+    "/widgets/{widget}/lines": ANYBODY,
+    "/widgets/{widget}/lock": ANYBODY,
+    "/widgets/{widget}/trend": ANYBODY,
+    "/alarms": ANYBODY,
+    "/help": ANYBODY,
+    "/display": ANYBODY,
+    "/static/{revision}/{name:path}": ANYBODY,
+    "/healthz": ANYBODY,
+    "/readyz": ANYBODY,
+    # Who signs in and out.
+    "/session": ANYBODY,
+    "/session/end": ANYBODY,
+    "/session/here": ANYBODY,
+    # Judged where they are made. A cancel stops, and needs nothing.
+    "/widgets/{widget}": ANYBODY,
+    "/widgets/{widget}/cancel": ANYBODY,
+    "/widgets/{widget}/hold": ANYBODY,
+    "/presses": ANYBODY,
+    "/alarms/acknowledge": ANYBODY,
+    "/alarms/{alarm:path}/{act}": ANYBODY,
+    "/control/here": ANYBODY,
+    "/control/{act}": ANYBODY,
+    "/diagnostics/{act}": ANYBODY,
+    "/recipes/{set}/{act}": ANYBODY,
+    # What has been, and what the robot is asked.
+    "/widgets/{widget}/read": OPERATOR,
+    "/alarms/history": OPERATOR,
+    "/alarms/history.csv": OPERATOR,
+    "/alarms/figures": OPERATOR,
+    "/alarms/report": OPERATOR,
+    "/log": OPERATOR,
+    "/log.csv": OPERATOR,
+    "/recipes": OPERATOR,
+    "/recipes/{set}": OPERATOR,
+    "/recipes/{set}.csv": OPERATOR,
+    "/openapi.json": OPERATOR,
+    "/metrics": LOCAL_ONLY,
+    # For the engineer.
+    "/diagnostics": MAINTENANCE,
+    "/diagnostics/look": MAINTENANCE,
+    "/recordings/last.mcap": MAINTENANCE,
+    # In development only.
+    "/gallery": ENGINEER,
+    "/gallery/box.svg": ENGINEER,
+}
+
+
+async def route_guard(connection: HTTPConnection) -> None:
+    """RoleNeeded for a client without what the route needs, or that does not see the widget of the
+    path. A route that is not in the table needs an engineer."""
+    state = site_of(connection)
+    if not state.access.has_roles:
+        return
+    path = getattr(connection.scope.get("route"), "path", "").removeprefix(ROBOT) or "/"
+    need = ROUTE_NEEDS.get(path, ENGINEER)
+    widget = connection.path_params.get("widget", "")
+    if not need and not widget:
+        return
+    who = caller(connection).principal(state)
+    if need == LOCAL_ONLY:
+        need = ANYBODY if who.client.local else OPERATOR
+    if not who.meets(need):
+        raise needed(need)
+    if widget in hidden_widgets(state, who):
+        pages = state.fleet.panel.needs.shown_on[widget]
+        raise needed(min(state.fleet.panel.needs.pages[page] for page in pages))
+
+
+def hidden_widgets(state: AppState, who: Principal) -> frozenset[str]:
+    """The widgets that a client does not see."""
+    needs = state.fleet.panel.needs
+    return needs.hidden_widgets(unmet(needs.named, who)) if needs.pages else frozenset()
+
+
+def needed(need: str) -> RoleNeeded:
+    """The error for a client without this role or group."""
+    return RoleNeeded(say("page_needs_role", role=role_name(need)), need)
+
+
+def check_page(page: Page, who: Principal) -> None:
+    """RoleNeeded for a client that may not see the page."""
+    if page.needs and not who.meets(page.needs):
+        raise needed(page.needs)
