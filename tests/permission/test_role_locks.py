@@ -124,7 +124,7 @@ def locks(widgets: Mapping[str, Any]) -> dict[str, Any]:
 def test_a_viewer_sees_locks_that_say_what_to_do_and_no_hidden_page() -> None:
     shown = shown_to(who("viewer"), publisher_at_work())
     assert locks(shown["widgets"]) == {
-        "open": "Sign in as operator.",
+        "open": "Sign in as Operator.",
         "gripper": "Sign in as tooling.",
     }
     assert not {"seen", "settled"} & shown["widgets"].keys()
@@ -132,7 +132,7 @@ def test_a_viewer_sees_locks_that_say_what_to_do_and_no_hidden_page() -> None:
 
 def test_maintenance_sees_its_page_with_the_part_of_the_engineer_locked() -> None:
     shown = shown_to(who("maintenance", "tooling"), publisher_at_work())
-    assert locks(shown["widgets"]) == {"settled": "Sign in as engineer."}
+    assert locks(shown["widgets"]) == {"settled": "Sign in as Engineer."}
     assert "seen" in shown["widgets"]
 
 

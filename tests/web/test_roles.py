@@ -166,7 +166,7 @@ def test_a_lock_says_in_each_language_what_to_do(browsers: dict[str, httpx.Clien
 def test_a_page_that_is_not_seen_leads_to_the_sign_in(browsers: dict[str, httpx.Client]) -> None:
     answer = browsers["operator"].get("/pages/setup", headers={"accept": "text/html"})
     assert answer.status_code == 403
-    assert "Sign in as maintenance" in answer.text
+    assert "Sign in as Maintenance" in answer.text
     assert 'href="/signin"' in answer.text
 
 
