@@ -14,6 +14,7 @@ from app.panel import load_panel
 from app.settings import PACKAGE
 from app.web.language import COOKIE as LANGUAGE
 from app.web.rendering.display_choice import CHOICES, COOKIE
+from tests.runtime.test_robots_on_one_page import panel_file
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.line import Line
 from tests.support.browser.pages import DRAWN, place
@@ -187,6 +188,19 @@ def test_the_shipped_pages_are_level(shipped: Server, page: Page) -> None:
 def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, page: Page) -> None:
     page.goto(plan.url)
     assert violations(page) == []
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    yield from demo(str(panel_file(tmp_path_factory.mktemp("cell"), 'mode = "demo"\n')))
+
+
+@pytest.mark.parametrize("path", ["/robots/left/pages/robots", "/robots/left/pages/cell"])
+def test_axe_finds_nothing_on_pages_of_several_robots(robots: Server, page: Page, path: str) -> None:
+    """An overview, and a page with widgets of two robots."""
+    page.goto(robots.url + path)
+    expect(page.locator("#state")).not_to_have_attribute("data-state", "unknown")
+    assert violations(page) == [], path
 
 
 def test_axe_finds_nothing_in_dialogs(example: Server, page: Page) -> None:
