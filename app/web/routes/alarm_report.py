@@ -25,7 +25,8 @@ from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import described_body, errors, fields
-from app.web.rendering.alarm_report_page import COUNTED, ReportParts, ReportQuery, now, report_context
+from app.web.rendering.alarm_report_page import COUNTED, ReportParts, now, report_context
+from app.web.rendering.alarm_report_query import ReportQuery
 from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import word as log_word
 from app.web.request_body import act_body_of, as_model
