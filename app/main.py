@@ -78,7 +78,7 @@ from app.web.routes import audit_log as log_routes
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, check_protected, urls
-from app.web.session_end import release_control, renew_audiences
+from app.web.session_end import follow_users
 from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
@@ -172,8 +172,7 @@ async def _lifespan(
     """From the start of the server to its end."""
     async with _app_state(settings, panel, app.state.server) as state:
         app.state.app_state = state
-        state.access.on_end(partial(release_control, state))
-        state.access.on_change(partial(renew_audiences, state))
+        follow_users(state)
         ports: set[int] = set()
         watchdog = _watchdog(state)
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):

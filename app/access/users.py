@@ -91,8 +91,9 @@ class UserBook:
 
     @property
     def configured(self) -> bool:
-        """Whether the panel has users, so that its clients have roles."""
-        return bool(self.users or self.tokens)
+        """Whether the panel has or had users, so that its clients have roles. The removal of the last
+        one does not open it."""
+        return bool(self.users or self.tokens or self.changes)
 
     def user(self, name: str) -> User | None:
         """The user of this name, in upper or lower case."""

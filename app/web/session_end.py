@@ -1,5 +1,7 @@
 """What follows when a user is no longer signed in at a browser."""
 
+from functools import partial
+
 from app.access.access import EndReason
 from app.access.sessions import Session
 from app.permission.principal import Principal
@@ -20,3 +22,9 @@ def release_control(state: AppState, session: Session, reason: EndReason) -> Non
     for robot in state.fleet.sessions:
         if robot.control.rules.required and not robot.control.release(who):
             robot.show()
+
+
+def follow_users(state: AppState) -> None:
+    """Has control released and the browsers' views renewed when users sign in or out."""
+    state.access.on_end(partial(release_control, state))
+    state.access.on_change(partial(renew_audiences, state))

@@ -47,7 +47,16 @@ def test_a_newer_file_is_noticed_by_its_stamp(tmp_path: Path) -> None:
     file.edit(lambda book: book.without_user(SATO.name))
     again = file.newer(loaded.stamp)
     assert again is not None
-    assert not again.book.configured
+    assert again.book.users == ()
+
+
+def test_the_removal_of_the_last_user_does_not_open_the_panel(tmp_path: Path) -> None:
+    file = UsersFile(tmp_path)
+    file.edit(lambda book: added(book).noted("now", "add", SATO.name, "operator", "test"))
+    file.edit(lambda book: book.without_user(SATO.name))
+    assert users_configured(tmp_path)
+    file.path.unlink()
+    assert not users_configured(tmp_path)
 
 
 def test_an_edit_that_is_refused_changes_nothing(tmp_path: Path) -> None:

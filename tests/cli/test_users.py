@@ -53,7 +53,7 @@ def test_a_user_is_added_listed_changed_and_removed(
     assert users("enable", "M. Sato") == 0
     assert users("remove", "M. Sato") == 0
     book = file.read()
-    assert not book.configured
+    assert book.users == ()
     acts = ["add", "role", "pin", "badge", "disable", "enable", "remove"]
     assert [change.act for change in book.changes] == acts
     assert all(change.by for change in book.changes)
