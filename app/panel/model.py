@@ -136,7 +136,7 @@ class Panel(PanelKeys):
     @cached_property
     def needs(self) -> PanelNeeds:
         """The roles and groups that its pages, commands and alarms need."""
-        return needs_of(self)
+        return needs_of(self.pages, self.frame_widgets, self.commands, self.alarms)
 
     @cached_property
     def uniform_buttons(self) -> UniformButtons:

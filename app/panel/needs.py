@@ -5,17 +5,15 @@ stop button, which needs nothing unless it says so itself. A widget on several p
 places have in common. A page is not seen, and its widgets are not sent, without what it needs.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from app.panel.alarm import Alarm
 from app.panel.layout import Page
 from app.panel.widgets.families import BaseWidget, Command
 from app.panel.widgets.templated import is_stop
 from app.roles import OPERATOR
-
-if TYPE_CHECKING:
-    from app.panel.model import Panel
 
 Needs = frozenset[str]
 NOTHING: Final[Needs] = frozenset()
@@ -53,32 +51,37 @@ class PanelNeeds:
 NO_NEEDS: Final = PanelNeeds({}, {}, {}, {})
 
 
-def needs_of(panel: "Panel") -> PanelNeeds:
-    """What the pages, commands and alarms of a panel need."""
+def needs_of(
+    pages: Sequence[Page],
+    frame: Iterable[BaseWidget],
+    every_command: Iterable[Command],
+    alarms: Iterable[Alarm],
+) -> PanelNeeds:
+    """What the pages, commands and alarms of a panel need. `frame` are the widgets of every page."""
     commands: dict[str, Needs] = {}
     shown_on: dict[str, frozenset[str]] = {}
-    pages = {page.id: page.needs for page in panel.pages if page.needs}
-    for page in panel.pages:
+    needing = {page.id: page.needs for page in pages if page.needs}
+    for page in pages:
         for widget, needs in _placed(page):
             shown_on[widget.id] = shown_on.get(widget.id, frozenset()) | {page.id}
             if isinstance(widget, Command):
                 commands[widget.id] = commands.get(widget.id, needs) & needs
-    everywhere = {widget.id for widget in panel.frame_widgets}
-    always = {page.id for page in panel.pages} - pages.keys()
-    for command in panel.commands:
+    everywhere = {widget.id for widget in frame}
+    always = {page.id for page in pages} - needing.keys()
+    for command in every_command:
         own = frozenset(filter(None, (command.needs,)))
         least = NOTHING if is_stop(command) else frozenset({OPERATOR})
         placed = NOTHING if command.id in everywhere or is_stop(command) else commands.get(command.id)
         commands[command.id] = own | least | (placed or NOTHING)
     return PanelNeeds(
         commands,
-        pages,
+        needing,
         {
             name: where
             for name, where in shown_on.items()
             if not where & always and name not in everywhere
         },
-        {alarm.id: alarm.needs for alarm in panel.alarms if alarm.needs},
+        {alarm.id: alarm.needs for alarm in alarms if alarm.needs},
     )
 
 

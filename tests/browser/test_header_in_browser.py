@@ -182,7 +182,7 @@ def test_help_says_what_the_signs_mean_in_each_theme_and_language(branded: Serve
     page.locator(".menu-key").click()
     page.locator("#menu").get_by_role("link", name="Help").click()
     expect(page.locator(".signs li")).to_have_count(16)
-    expect(page.locator("main > .version")).to_contain_text("operator-panel")
+    expect(page.locator("main > .version").first).to_contain_text("operator-panel")
     expect(page.locator("[data-widget=stop] > button:not(.more)")).to_be_enabled()
     page.locator(".menu-key").click()
     page.locator("#menu").get_by_role("button", name="日本語").click()
