@@ -216,9 +216,8 @@ async def _app_state(
     async with open_log(settings, panel) as oplog:
         check_port(server)
         _check_protected(settings, panel, server)
-        # In development the gallery shows all kinds.
         used = {widget.kind for widget in panel.widgets()} & KINDS.keys()  # the state has no row
-        kinds = {*KINDS} if settings.dev else used
+        kinds = {*KINDS} if settings.dev else used  # the gallery shows all
         static_files, templates = shipped_path("static"), shipped_path("templates")
         require_files(static_files, templates)
         own = (panel.picture_files, panel.styles, panel.templates)
@@ -236,7 +235,8 @@ async def _app_state(
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
         doctor = _doctor(settings, server)
-        async with open_fleet(settings, panel, revision, oplog, in_process, doctor) as fleet:
+        tls = str(server.ssl_certfile or "") if server else ""
+        async with open_fleet(settings, panel, revision, oplog, in_process, doctor, tls) as fleet:
             metrics = Metrics(
                 fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
             )

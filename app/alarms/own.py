@@ -1,7 +1,8 @@
-"""The panel's own alarms, of the operator's log, the disk and the clock. Pure: from what the server
-sees to entries."""
+"""The panel's own alarms, of the operator's log, the disk, the clock and certificates. Pure: from what
+the server sees to entries."""
 
 from collections.abc import Iterator
+from datetime import datetime, timedelta
 from typing import Final, Literal, NamedTuple
 
 from app.alarms.delays import Delays
@@ -13,10 +14,16 @@ from app.clock import format_age, format_time
 from app.i18n import TextLike, number, say
 from app.panel.alarm import Alarm
 
-OwnAlarm = Literal["panel_log", "panel_disk", "panel_clock"]
-PRIORITIES: Final[dict[OwnAlarm, int]] = {"panel_log": 2, "panel_disk": 3, "panel_clock": 3}
+OwnAlarm = Literal["panel_log", "panel_disk", "panel_clock", "panel_certificate"]
+PRIORITIES: Final[dict[OwnAlarm, int]] = {
+    "panel_log": 2,
+    "panel_disk": 3,
+    "panel_clock": 3,
+    "panel_certificate": 2,
+}
 UNKEPT: Final = frozenset({"panel_log", "panel_disk"})
 JUMP_S: Final = 5.0  # a smaller step of the clock is not raised
+CERTIFICATE_DAYS: Final = 30  # before its end, a certificate raises the alarm
 ENOUGH: Final = 1.1  # of the free space below which the alarm is raised, until it returns
 
 
@@ -57,6 +64,16 @@ def clock_entry(by_s: float, before: float) -> AlarmEntry:
         cause = say("own_clock_ahead", by=by, before=old, after=new)
     texts = OwnTexts(say("own_clock"), cause, say("own_clock_times"), say("own_clock_action"))
     return _entry("panel_clock", abs(by_s) >= JUMP_S, texts)
+
+
+def certificate_entry(file: str, until: datetime, now: datetime) -> AlarmEntry:
+    """Of the certificate that ends first."""
+    code = "own_certificate_ends" if until > now else "own_certificate_ended"
+    cause = say(code, file=file, until=until.date().isoformat())
+    texts = OwnTexts(
+        say("own_certificate"), cause, say("own_certificate_shut"), say("own_certificate_action")
+    )
+    return _entry("panel_certificate", until - now < timedelta(days=CERTIFICATE_DAYS), texts)
 
 
 class OwnTexts(NamedTuple):

@@ -88,13 +88,13 @@ class Alarms:
         self._shown.selections.add_robot(robot_id, self._panel)
         return robot_alarms
 
-    async def start(self, folder: Path, operators_log: Log) -> None:
+    async def start(self, folder: Path, operators_log: Log, certificates: Sequence[Path] = ()) -> None:
         """Loads the alarms that stood when the server ended; nothing for a panel without alarms."""
         if not self._panel.may_raise:
             return
-        if self._panel.alarm_rules.panel:
-            rules = self._panel.alarm_rules
-            self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate)
+        if (rules := self._panel.alarm_rules).panel:
+            own = folder, operators_log, self.engine, self.evaluate, certificates
+            self._own = OwnAlarms(rules, *own)
             self._own.start()
         self.mqtt.start()
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)

@@ -20,7 +20,7 @@ from app.runtime.doctor_process import DoctorProcess
 from app.runtime.fleet import Fleet
 from app.runtime.state_recorder import StateRecorder
 from app.settings import Mode, Settings
-from app.transport.zenoh_config import Config, config_from, config_to
+from app.transport.zenoh_config import Config, certificates_in, config_from, config_to
 
 if TYPE_CHECKING:
     from app.recording import Recordings
@@ -77,9 +77,13 @@ async def open_fleet(
     oplog: OperatorLog | NullLog,
     simulated_robot: SimulatedRobot,
     doctor: DoctorProcess | None = None,
+    certificate: str = "",
 ) -> AsyncIterator[Fleet]:
-    """The robots of the panel, real or simulated. `revision` is that of the page's files."""
+    """The robots of the panel, real or simulated. `revision` is that of the page's files, `certificate`
+    the file of the server's own certificate."""
     demo = mode_of(settings, panel) == "demo"
+    certificates = [Path(certificate)] if certificate else []
+    certificates += [] if demo else certificates_in(settings.zenoh)
     with ExitStack() as stack:
 
         def config_of(entry: RobotEntry | None) -> Config:
@@ -106,7 +110,8 @@ async def open_fleet(
                 recordings.start()
             if trends is not None:
                 await trends.start()
-            await fleet.alarms.start(settings.data_folder(mode_of(settings, panel)), oplog)
+            folder = settings.data_folder(mode_of(settings, panel))
+            await fleet.alarms.start(folder, oplog, certificates)
             await fleet.recipes.start(settings.data_folder(mode_of(settings, panel)))
             await fleet.start()
             if states is not None:

@@ -1,24 +1,36 @@
-"""What the server sees of itself, for the panel's own alarms: its log, its disk and its clock."""
+"""What the server sees of itself, for the panel's own alarms: its log, its disk, its clock and the
+certificates that it uses."""
 
 import asyncio
 import logging
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Protocol
 
 from app.alarms.engine import AlarmEngine
 from app.alarms.entries import AlarmEntry
-from app.alarms.own import OwnAlarm, clock_entry, disk_entry, log_entry, own_definitions
+from app.alarms.own import (
+    OwnAlarm,
+    certificate_entry,
+    clock_entry,
+    disk_entry,
+    log_entry,
+    own_definitions,
+)
 from app.audit.press_record import Log
+from app.certificates.folder import Listed, about
+from app.errors import KioskError
 from app.panel.alarm import AlarmRules
 
 log = logging.getLogger("kiosk.alarms")
 
 CHECK_S: Final = 1.0
 DISK_EVERY: Final = 10  # checks
+CERTIFICATES_EVERY: Final = 3600  # checks
 CLOCKS_APART_S: Final = 0.05  # two clocks that are read further apart say nothing
 MEGABYTE: Final = 1e6
 
@@ -40,7 +52,10 @@ class OwnAlarms:
         operators_log: Log,
         engine: AlarmEngine,
         evaluate: Callable[[], None],
+        certificates: Sequence[Path] = (),
     ) -> None:
+        """`certificates` are the files that the server and its link to the robot use."""
+        self._certificates = certificates
         self._rules = rules
         self._folder = folder
         self._log = operators_log
@@ -54,6 +69,7 @@ class OwnAlarms:
         self._checks = 0
         self._timer: asyncio.TimerHandle | None = None
         self._measuring: asyncio.Task[None] | None = None
+        self._reading: asyncio.Task[None] | None = None
 
     def start(self) -> None:
         """Adds the alarms, and looks at what they are about from now on."""
@@ -65,7 +81,7 @@ class OwnAlarms:
 
     def stop(self) -> None:
         self._listening.close()
-        for work in (self._timer, self._measuring):
+        for work in (self._timer, self._measuring, self._reading):
             if work is not None:
                 work.cancel()
 
@@ -87,6 +103,8 @@ class OwnAlarms:
         self._check_clock()
         if self._checks % DISK_EVERY == 0 and self._measuring is None:
             self._measuring = asyncio.create_task(self._check_disk())
+        if self._certificates and self._checks % CERTIFICATES_EVERY == 0:
+            self._reading = asyncio.create_task(self._check_certificates())
         self._checks += 1
         self._evaluate()
 
@@ -112,6 +130,26 @@ class OwnAlarms:
             self._evaluate()
         finally:
             self._measuring = None
+
+    async def _check_certificates(self) -> None:
+        """Reads them on a thread: a renewed one is another file, or the same with other content."""
+        listed = await asyncio.to_thread(_listed, self._certificates)
+        if listed:
+            first = min(listed, key=lambda certificate: certificate.until)
+            entry = certificate_entry(str(first.file), first.until, datetime.now(UTC))
+            self._set("panel_certificate", entry)
+            self._evaluate()
+
+
+def _listed(files: Sequence[Path]) -> list[Listed]:
+    """The certificates that can be read."""
+    listed = []
+    for file in files:
+        try:
+            listed.append(about(file))
+        except KioskError as error:
+            log.warning("when a certificate ends is not known: %s", error)
+    return listed
 
 
 def _usage(folder: Path) -> Usage:

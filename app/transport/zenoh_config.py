@@ -40,6 +40,13 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
     return _apply_required_settings(config)
 
 
+def certificates_in(path: Path) -> list[Path]:
+    """The files of certificates that a Zenoh configuration file names, for TLS."""
+    tls = json.loads(zenoh.Config.from_file(path).get_json("transport/link/tls")) or {}
+    names = ("root_ca_certificate", "listen_certificate", "connect_certificate")
+    return [Path(tls[name]) for name in names if tls.get(name)]
+
+
 def config_to(endpoint: str) -> zenoh.Config:
     """A session that connects to one endpoint and to nothing else."""
     config = zenoh.Config()

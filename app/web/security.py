@@ -25,6 +25,7 @@ GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|line
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
+SECURE: Final = frozenset({"https", "wss"})
 HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:\d{1,5})?")
 NO_FRAMES: Final = EmbedRules()
 OWN_SITE: Final = frozenset({"same-origin", "none"})
@@ -43,6 +44,8 @@ FOR_ALL: Final = {
     "x-content-type-options": "nosniff",
     "cross-origin-resource-policy": "same-origin",
 }
+# Over HTTPS: from then on a browser asks this host by HTTPS only, for a year.
+ONLY_HTTPS: Final = {"strict-transport-security": "max-age=31536000"}
 POLICY: Final = "content-security-policy"
 SECURITY_HEADERS: Final = FOR_ALL | {
     POLICY: content_security_policy(),
@@ -69,7 +72,7 @@ class RequestGuard:
 
         why = self._refusal(scope)
         if why is None:
-            await self._app(scope, receive, secured(send))
+            await self._app(scope, receive, secured(send, scope["scheme"] in SECURE))
         else:
             await refuse(JSONResponse({"error": printable(why)}, status_code=403), scope, receive, send)
 
@@ -102,14 +105,16 @@ def moves(scope: Scope) -> bool:
     return scope["method"] not in READING
 
 
-def secured(send: Send) -> Send:
+def secured(send: Send, is_https: bool = False) -> Send:
     """`send` with the security headers."""
+    for_all = FOR_ALL | (ONLY_HTTPS if is_https else {})
+    for_documents = SECURITY_HEADERS | for_all
 
     async def send_secured(message: Message) -> None:
         if message["type"] in STARTS:
             headers = MutableHeaders(scope=message)
             document = not headers.get("content-type", "").startswith(NO_DOCUMENTS)
-            for name, value in (SECURITY_HEADERS if document else FOR_ALL).items():
+            for name, value in (for_documents if document else for_all).items():
                 headers.setdefault(name, value)
         await send(message)
 

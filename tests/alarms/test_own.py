@@ -1,8 +1,10 @@
 """The panel's own alarms, from what the server sees of its log, its disk and its clock."""
 
+from datetime import UTC, datetime, timedelta
+
 import pytest
 
-from app.alarms.own import clock_entry, disk_entry, log_entry, own_definitions
+from app.alarms.own import certificate_entry, clock_entry, disk_entry, log_entry, own_definitions
 from app.i18n import render, say
 
 
@@ -39,6 +41,14 @@ def test_a_log_that_locks_says_so() -> None:
 
 def test_the_panels_own_alarms_are_of_no_robot_and_never_of_high_priority() -> None:
     definitions = dict(own_definitions())
-    assert set(definitions) == {"panel_log", "panel_disk", "panel_clock"}
+    assert set(definitions) == {"panel_log", "panel_disk", "panel_clock", "panel_certificate"}
     assert not any(definition.is_of_robot for definition in definitions.values())
     assert all(definition.rules.priority(1) > 1 for definition in definitions.values())
+
+
+@pytest.mark.parametrize(("days", "level"), [(31, 0), (29, 1), (-1, 1)])
+def test_a_certificate_is_raised_thirty_days_before_its_end(days: int, level: int) -> None:
+    now = datetime(2026, 11, 27, 12, tzinfo=UTC)
+    entry = certificate_entry("panel.pem", now + timedelta(days=days), now)
+    assert entry.level == level
+    assert ("was valid" in render(entry.cause)) == (days < 0)

@@ -1,14 +1,20 @@
 """The panel's own alarms on a server: without any alarm in the panel file, and off if it says so."""
 
+import json
 import signal
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.x509.oid import NameOID
 
+from app.certificates.issuing import new_key, pem
 from tests.faults.clock import Clock
-from tests.support.parts import Server, until
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server
 
 PAGE: Final = """
@@ -98,3 +104,40 @@ def test_a_clock_that_is_set_is_raised_once_and_returns(tmp_path: Path) -> None:
         assert listed(server)["panel_clock"]["occurrence"] == 1
         pid = server.process.pid
     clock.clean(pid)
+
+
+def certificate(file: Path, days: int) -> None:
+    """A self-signed certificate that ends in so many days."""
+    key, now = new_key(), datetime.now(UTC)
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "panel")])
+    made = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))
+        .not_valid_after(now + timedelta(days=days))
+        .sign(key, hashes.SHA256())
+    )
+    file.write_bytes(pem(made))
+
+
+def test_a_certificate_that_runs_out_is_raised(tmp_path: Path) -> None:
+    """It is in the Zenoh file of a live panel; the one that ends first is named."""
+    files = {"root_ca_certificate": 400, "listen_certificate": 7, "connect_certificate": 20}
+    for name, days in files.items():
+        certificate(tmp_path / name, days)
+    zenoh = {
+        "mode": "peer",
+        "connect": {"endpoints": ["tcp/127.0.0.1:1"]},
+        "scouting": {"multicast": {"enabled": False}},
+        "transport": {"link": {"tls": {name: str(tmp_path / name) for name in files}}},
+    }
+    (tmp_path / "zenoh.json5").write_text(json.dumps(zenoh))
+    (tmp_path / "cell.toml").write_text(PAGE)
+    panel, config = str(tmp_path / "cell.toml"), str(tmp_path / "zenoh.json5")
+    with Server(ROOT, KIOSK_MODE="live", KIOSK_PANEL=panel, KIOSK_ZENOH=config) as server:
+        alarm = until(lambda: listed(server).get("panel_certificate"), "the alarm is raised")
+        assert alarm["priority"] == 2
+        assert "listen_certificate is valid until" in alarm["cause"]

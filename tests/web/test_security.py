@@ -18,14 +18,20 @@ OWN = {"host": "localhost:8000"}
 
 
 def answer_to(
-    method: str, path: str, headers: Named, answer: PlainTextResponse | None = None
+    method: str,
+    path: str,
+    headers: Named,
+    answer: PlainTextResponse | None = None,
+    scheme: str = "http",
 ) -> httpx.Response:
     """What comes back through the doors; inside, everything is answered with "in"."""
 
     async def ask() -> httpx.Response:
         doors = RequestGuard(answer or PlainTextResponse("in"), HOSTS)
         transport = httpx.ASGITransport(doors)
-        async with httpx.AsyncClient(transport=transport, base_url="http://localhost:8000") as client:
+        async with httpx.AsyncClient(
+            transport=transport, base_url=f"{scheme}://localhost:8000"
+        ) as client:
             return await client.request(method, path, headers=headers)
 
     return asyncio.run(ask())
@@ -185,6 +191,14 @@ def test_every_answer_has_the_security_headers(host: str) -> None:
     assert {name: headers.get(name) for name in SECURITY_HEADERS} == SECURITY_HEADERS
     assert "frame-ancestors 'none'" in headers["content-security-policy"]
     assert "unsafe" not in headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("scheme", ["http", "https"])
+def test_answers_over_https_ask_for_https_from_then_on(scheme: str) -> None:
+    for media_type in ("text/html", "text/event-stream"):
+        answer = PlainTextResponse("in", media_type=media_type)
+        headers = answer_to("GET", "/", OWN, answer, scheme).headers
+        assert ("strict-transport-security" in headers) == (scheme == "https")
 
 
 @pytest.mark.parametrize("media_type", ["text/css", "text/javascript", "text/event-stream"])
