@@ -76,7 +76,7 @@ class Screen {
     }
     if (document.querySelector(".alarm-line"))
       source.load(import("./alarm-line.js"), ({ AlarmLine }) => (this.#alarms = new AlarmLine(source)));
-    if (document.querySelector("a.who")) import("./session.js").catch(pageGuard.fail);
+    if (document.querySelector("a.user")) import("./session.js").catch(pageGuard.fail);
     if (document.querySelector("[data-recipes]"))
       source.load(import("./recipes.js"), (recipes) => (this.#recipes = recipes));
     if (document.querySelector(".group-tab")) source.load(import("./tabs.js"), noop);

@@ -4,7 +4,7 @@ import { find } from "./show.js";
 const EVERY_MS = 5000;
 const WARNED_S = 30;
 
-const who = find(document, "a.who");
+const who = find(document, "a.user");
 let touched = true;
 for (const name of ["pointerdown", "keydown"]) addEventListener(name, () => (touched = true), { passive: true });
 

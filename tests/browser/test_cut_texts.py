@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support.browser.browsers import sized
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
 
@@ -80,4 +80,4 @@ def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -
             for number in range(max(1, tabs.count())):
                 if tabs.count():
                     tabs.nth(number).click()
-                assert page.evaluate(CUT) == [], (path, width, height, number)
+                assert settled(page, CUT) == [], (path, width, height, number)

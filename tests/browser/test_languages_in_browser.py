@@ -11,7 +11,7 @@ from app.i18n.catalogue import files
 from app.web.language import COOKIE
 from tests.browser.test_layout_in_browser import PANEL
 from tests.browser.test_screen_in_browser import CUT, OVERFLOWS
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import Server
 from tests.support.servers import demo_server
 
@@ -70,8 +70,8 @@ def test_the_frame_has_room_for_its_words(server: Server, page: Page, language: 
     for width, height in SIZES:
         page.set_viewport_size({"width": width, "height": height})
         page.evaluate(DRAWN)
-        assert page.evaluate(OVERFLOWS) == [], width
-        assert page.evaluate(CUT) == [], width
+        assert settled(page, OVERFLOWS) == [], width
+        assert settled(page, CUT) == [], width
         assert page.evaluate(BEYOND) == [], width
         assert len(set(page.evaluate(BESIDE, words))) == 1, width
 

@@ -11,7 +11,7 @@ from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
 from tests.recipes.panels import CARTON, TRAY
 from tests.support.browser.browsers import ReusedPage, sized
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import Server, until
 from tests.web.test_recipes import act, exported, load, make, server_with
 
@@ -151,6 +151,6 @@ def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page
             for width, height in SIZES:
                 sized(axe_page, width, height).evaluate(DRAWN)
                 assert axe_page.evaluate("document.documentElement.scrollWidth") == width
-                assert axe_page.evaluate(CUT) == [], (language, query, width)
+                assert settled(axe_page, CUT) == [], (language, query, width)
                 if language == "en":
                     assert violations(axe_page) == [], (query, width)

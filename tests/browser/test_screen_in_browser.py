@@ -11,7 +11,7 @@ from playwright.sync_api import CDPSession, Locator, Page, expect
 from app.i18n import sentences
 from tests.browser.test_layout_in_browser import PANEL
 from tests.support.browser.browsers import sized
-from tests.support.browser.pages import DRAWN, place
+from tests.support.browser.pages import DRAWN, place, settled
 from tests.support.panel_text import MAIN, START
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready
@@ -133,8 +133,8 @@ def test_no_element_overflows_on_any_screen(
         expect(page.locator("#clock")).not_to_be_empty()
         for width, height in SCREENS:
             sized(page, width, height).evaluate(DRAWN)
-            assert page.evaluate(OVERFLOWS) == [], f"{url}, {width}"
-            assert page.evaluate(CUT) == [], f"{url}, {width}"
+            assert settled(page, OVERFLOWS) == [], f"{url}, {width}"
+            assert settled(page, CUT) == [], f"{url}, {width}"
 
 
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
@@ -145,7 +145,7 @@ def test_each_state_of_the_robot_fits_a_phone(cell: Server, page: Page, language
     for state in ("online", "unknown", "lost"):
         shown.evaluate(SAYS, [state, sentences(language)[f"state_{state}"], language])
         page.evaluate(DRAWN)
-        assert page.evaluate(OVERFLOWS) == [], state
+        assert settled(page, OVERFLOWS) == [], state
 
 
 def test_the_frame_stays_where_it_is_when_the_page_scrolls(several: Server, page: Page) -> None:
@@ -194,7 +194,7 @@ def test_groups_that_have_no_room_side_by_side_take_turns(
     until(is_shown, "its group is shown", every_s=0.2)
     assert shown_groups(page) == then
     assert button(page, "Stop").bounding_box() == stop
-    assert page.evaluate(OVERFLOWS) == []
+    assert settled(page, OVERFLOWS) == []
 
 
 def test_without_scripts_all_groups_are_there(cell: Server, without_scripts: Page) -> None:

@@ -28,7 +28,7 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 def signed_in_by_pad(page: Page, server: Server, user: str, pin: str) -> None:
     """From the header, with two touches and the digits."""
-    page.locator("a.who").click()
+    page.locator("a.user").click()
     page.locator(".tile", has_text=user).click()
     for digit in pin:
         page.locator(f".pad button[value='{digit}']").click()
@@ -42,13 +42,13 @@ def test_a_user_signs_in_on_the_pad_and_hands_over(
     page = own_page
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.goto(kiosk.url)
-    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "")
     for user, pin in PIN_IS.items():
         signed_in_by_pad(page, kiosk, user, pin)
-        expect(page.locator("a.who")).to_have_attribute("data-user", user)
-    page.locator("a.who").click()
+        expect(page.locator("a.user")).to_have_attribute("data-user", user)
+    page.locator("a.user").click()
     page.locator("form[action$='/session/end'] button").click()
-    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "")
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -60,7 +60,7 @@ def test_everything_of_the_page_is_within_the_screen(
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.set_extra_http_headers({"accept-language": language})
     page.goto(f"{kiosk.url}/signin?user=M.+Sato")
-    for selector in (".tile", ".pad button", ".sign-in-key", ".badge-form", "a.who"):
+    for selector in (".tile", ".pad button", ".sign-in-key", ".badge-form", "a.user"):
         for part in page.locator(selector).all():
             box = part.bounding_box()
             assert box is not None, selector
@@ -87,7 +87,7 @@ def test_a_badge_is_read_without_a_touch_and_never_shown(own_page: Page, kiosk: 
     expect(page.locator("#badge")).to_have_attribute("type", "password")
     page.keyboard.type("04A2B3")
     page.keyboard.press("Enter")
-    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
     assert "04A2B3" not in page.content() + page.url
 
 
@@ -96,14 +96,14 @@ def test_a_password_signs_in(own_page: Page, kiosk: Server) -> None:
     page.goto(f"{kiosk.url}/signin?user=J.+Brandt")
     page.locator("#password").fill("long enough")
     page.locator(".sign-in-key").click()
-    expect(page.locator("a.who")).to_have_attribute("data-user", "J. Brandt")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "J. Brandt")
 
 
 def test_without_a_touch_a_warning_comes_which_a_touch_ends(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(kiosk.url)
     signed_in_by_pad(page, kiosk, "M. Sato", "2580")
-    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
     expect(page.locator("#idle")).to_be_visible(timeout=20_000)
     page.locator("#idle").click()
     expect(page.locator("#idle")).to_be_hidden()
@@ -113,9 +113,9 @@ def test_idle_time_ends_in_the_page_of_sign_in(own_page: Page, kiosk: Server) ->
     page = own_page
     page.goto(kiosk.url)
     signed_in_by_pad(page, kiosk, "M. Sato", "2580")
-    expect(page.locator("a.who")).to_have_attribute("data-user", "M. Sato")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
     page.wait_for_url(f"{kiosk.url}/signin", timeout=60_000)
-    expect(page.locator("a.who")).to_have_attribute("data-user", "")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "")
 
 
 def test_without_scripts_the_pad_works_and_no_page_has_the_pin(
@@ -133,4 +133,4 @@ def test_without_scripts_the_pad_works_and_no_page_has_the_pin(
         assert "147" not in page.content() + page.url
         page.locator(".pad button[value='0']").click()
         page.locator(".sign-in-key").click()
-        expect(page.locator("a.who")).to_have_attribute("data-user", "K. Novak")
+        expect(page.locator("a.user")).to_have_attribute("data-user", "K. Novak")

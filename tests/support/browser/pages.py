@@ -1,6 +1,7 @@
 """Functions for any page in tests."""
 
-from typing import Final
+import time
+from typing import Any, Final
 
 from playwright.sync_api import FloatRect, Frame, Locator, Page
 
@@ -35,6 +36,15 @@ def widget(page: Page | Frame, name: str) -> Locator:
 def press_button(page: Page | Frame, name: str) -> Locator:
     """The button that presses a widget. A locked widget has a second one, "…"."""
     return widget(page, name).locator("button:not(.more)")
+
+
+def settled(page: Page | Frame, script: str) -> list[Any]:
+    """What a script finds wrong on a page, once that is so for some seconds: what has just appeared
+    gets its size a frame later."""
+    ends = time.monotonic() + 3
+    while (wrong := page.evaluate(script)) and time.monotonic() < ends:
+        page.wait_for_timeout(100)
+    return list(wrong)
 
 
 def asked(button: Locator) -> Locator:
