@@ -4,6 +4,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -73,6 +74,7 @@ class Access:
         self.fault: TextLike = ""
         self.book = UserBook()
         self.file = file
+        self._reader = ThreadPoolExecutor(1, "users")
         self._stamp: Stamp | None = None
         self._monotonic = monotonic
         self._typed: dict[str, tuple[str, str, float]] = {}
@@ -91,8 +93,10 @@ class Access:
         return self.configured or not self.rules.open
 
     async def reload(self) -> None:
-        """Reads the users' file if it has changed, on a thread, and logs the changes."""
-        self.apply(await asyncio.to_thread(self.file.newer, self._stamp))
+        """Reads the users' file if it has changed, on a thread of its own: others may wait for a slow
+        disk or the robot. Logs the changes."""
+        loop = asyncio.get_running_loop()
+        self.apply(await loop.run_in_executor(self._reader, self.file.newer, self._stamp))
 
     def apply(self, loaded: Loaded | None) -> None:
         """Works with a newer version of the file; None if there is none. Nobody is signed in while it
@@ -246,13 +250,20 @@ class Access:
 
     async def watch(self) -> None:
         """Reads changes of the users' file and signs out idle users, until it is cancelled."""
-        while True:
-            await asyncio.sleep(WATCHED_EVERY_S)
-            await self.reload()
-            self.end_idle()
+        reading = asyncio.ensure_future(self.reload())
+        try:
+            while True:
+                await asyncio.sleep(WATCHED_EVERY_S)
+                self.end_idle()
+                if reading.done():
+                    reading.result()
+                    reading = asyncio.ensure_future(self.reload())
+        finally:
+            reading.cancel()
 
     def close(self) -> None:
         self.checker.close()
+        self._reader.shutdown(wait=False, cancel_futures=True)
 
 
 def _rights(user: User | None) -> tuple[object, ...] | None:
