@@ -5,6 +5,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from pydantic import BaseModel, Field
 
 from app.access.access import Attempt
 from app.access.secrets_hash import LONGEST
@@ -16,7 +17,7 @@ from app.web.client_cookie import caller, principal_of
 from app.web.framed_page import FramedPage, framed_page
 from app.web.openapi_parts import described_body, errors, fields
 from app.web.rendering.sign_in_words import ROLE_WORDS, initials, sign_in_words
-from app.web.request_body import body_of, form_of
+from app.web.request_body import as_model, body_of, form_of
 from app.web.routes.session import signed_in
 
 router = APIRouter()
@@ -24,6 +25,14 @@ router = APIRouter()
 PIN_MOST: Final = 12
 WRONG: Final = ("sign_in_wrong_pin", "sign_in_wrong_password", "sign_in_wrong_badge")
 Name = Annotated[str, Query(max_length=LONGEST_NAME)]
+
+
+class PadForm(BaseModel):
+    """What the pad posts without scripts: a digit, "clear" or "enter"."""
+
+    user: Annotated[str, Field(max_length=LONGEST_NAME)] = ""
+    pin: Annotated[str, Field(max_length=LONGEST)] = ""
+    digit: Annotated[str, Field(max_length=8)] = ""
 
 
 @router.get(
@@ -79,18 +88,16 @@ async def page(
 )
 async def pad(request: Request, state: CurrentState) -> Response:
     """The server keeps the digits until the PIN is complete: no page has them."""
-    form = form_of(await body_of(request), 8)
-    user, digit, client = form.get("user", ""), form.get("digit", ""), caller(request).client(state)
-    if digit == "enter":
-        pin = form.get("pin", "") or state.access.typed_digits(client.id, user)
+    form = as_model(PadForm, form_of(await body_of(request), 8))
+    user, client = form.user, caller(request).client(state)
+    if form.digit == "enter":
+        pin = form.pin or state.access.typed_digits(client.id, user)
         state.access.type_digit(client.id, user, "clear")
         if pin:
-            return await signed_in(
-                request, state, Attempt(user[:LONGEST_NAME], "pin", pin[:LONGEST]), True
-            )
+            return await signed_in(request, state, Attempt(user, "pin", pin), True)
     else:
-        state.access.type_digit(client.id, user, digit)
-    return RedirectResponse(f"{state.root}/signin?{urlencode({'user': user[:LONGEST_NAME]})}", 303)
+        state.access.type_digit(client.id, user, form.digit)
+    return RedirectResponse(f"{state.root}/signin?{urlencode({'user': user})}", 303)
 
 
 def _tile(user: User) -> dict[str, TextLike]:
