@@ -50,7 +50,8 @@ CUT: Final = """() => {
     if (box === document.body || isHidden(box)) continue;
     const { left, right, bottom } = box.getBoundingClientRect();
     const isCut = (rect) => rect.right > right + 1.5 || rect.left < left - 1.5 || rect.top > bottom - 4;
-    if (rects(element).some(isCut)) found.push(`${box.className}: ${element.textContent.trim()}`);
+    const text = texts.currentNode;
+    if (rects(text).some(isCut)) found.push(`${box.className}: ${text.data.trim()}`);
   }
   for (const tab of document.querySelectorAll(".pages a span")) {
     const lines = new Set(rects(tab).map(({ top }) => Math.round(top)));
