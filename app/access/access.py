@@ -3,8 +3,9 @@
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -218,8 +219,17 @@ class Access:
         another version of the users' file."""
         self._change_listeners.append(listener)
 
+    @contextmanager
+    def notifying(self, listener: Callable[[], None]) -> Iterator[None]:
+        """`listener` is called as that of `on_change`, while the context lasts."""
+        self._change_listeners.append(listener)
+        try:
+            yield
+        finally:
+            self._change_listeners.remove(listener)
+
     def _changed(self) -> None:
-        for listener in self._change_listeners:
+        for listener in list(self._change_listeners):
             listener()
 
     def _ended(self, session: Session, reason: EndReason) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from socket import create_connection
 from typing import Any, Final
 
+import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -24,6 +25,7 @@ from app.web.client_cookie import COOKIE
 from tests.support.holds import PANEL, PATIENT, TRIES, jogging, permit
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, events_in, http_client, until
 from tests.support.servers import demo_server
+from tests.support.users import Browsers, add_user, command
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +161,40 @@ def test_a_hold_ends_when_another_panel_takes_control(tmp_path: Path, kind: str)
                 said = socket.hear()
                 assert (said["state"], said["outcome"]) == ("ended", "aborted")
                 assert "The panel at the cell has control of the robot." in said["reason"]
+
+
+def signed_out(client: httpx.Client, _: Path) -> None:
+    client.delete("/session").raise_for_status()
+
+
+def disabled(_: httpx.Client, data: Path) -> None:
+    command(data, "disable", "M. Sato")
+
+
+def handed_over(client: httpx.Client, _: Path) -> None:
+    client.post("/session", json={"user": "A. Weber", "pin": "2580"}).raise_for_status()
+
+
+@pytest.mark.parametrize("change", [signed_out, disabled, handed_over])
+def test_a_hold_ends_with_the_sign_in_of_who_holds(
+    tmp_path: Path, change: Callable[[httpx.Client, Path], None]
+) -> None:
+    data = tmp_path / "data"
+    data.mkdir(mode=0o700)
+    for user in ("M. Sato", "A. Weber"):
+        add_user(data, user, "operator", pin="2580")
+    with demo_server(tmp_path, PANEL, app=PATIENT, KIOSK_DATA=str(data)) as mine:
+        every = Browsers()
+        client = every.signed_in(mine.url, "M. Sato", pin="2580")
+        cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+        with opened(mine, cookie=cookie) as socket:
+            assert socket.begin()["state"] == "held"
+            assert socket.beat()["state"] == "held"
+            change(client, data)
+            said = socket.hear()
+            assert (said["state"], said["outcome"]) == ("ended", "aborted")
+            assert "no longer signed in" in said["reason"]
+        every.close()
 
 
 def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -23,7 +24,7 @@ from app.i18n import TextLike, localized, say
 from app.panel.widgets.hold import HoldCommand
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import caller
+from app.web.client_cookie import Caller, caller
 from app.web.hold_protocol import END_REASONS, Beat, Begin, End, HoldMessage, Message, read_message
 from app.web.language import language_of
 from app.web.request_body import received
@@ -50,7 +51,7 @@ async def hold(socket: WebSocket, widget: str, state: CurrentState, session: Cur
     who = caller(socket)
     user_session = state.access.sessions.get(who.session, who.client(state).id)
     press = Press(secrets.token_hex(8), command, {}, who.principal(state))
-    served = _HoldSocket(socket, state, session, press)
+    served = _HoldSocket(socket, state, session, press, who)
     holding = state.access.sessions.holding(user_session)
     with suppress(WebSocketDisconnect), state.in_flight.track(), holding:
         receipt = await served.run()
@@ -68,8 +69,11 @@ class _HoldSocket:
         state: AppState,
         session: RobotSession,
         press: Press[HoldCommand],
+        who: Caller,
     ) -> None:
         self._socket = socket
+        self._state = state
+        self._who = who
         self._limits = state.limits
         self._session = session
         self._opened_at = time.monotonic()
@@ -97,11 +101,19 @@ class _HoldSocket:
         try:
             if not self._ended.done():
                 await self._say(state="held", lease=begun.lease.id, reason=begun.since)
-            await self._listen(begun)
+            with self._state.access.notifying(partial(self._check_user, begun)):
+                self._check_user(begun)  # it may have changed while the press was logged
+                await self._listen(begun)
         finally:
             self._session.holds.end(begun, "hold_by_closing")
             await asyncio.gather(sending, return_exceptions=True)
         return self._receipt or self._ended.result()
+
+    def _check_user(self, holding: ActiveHold) -> None:
+        """Ends the hold of a user who has signed out, is disabled, or may do something else now."""
+        now, then = self._who.principal(self._state), self._press.principal
+        if (now.user, now.role, now.groups) != (then.user, then.role, then.groups):
+            self._session.holds.end(holding, "hold_by_sign_out")
 
     async def _begun(self) -> Receipt | ActiveHold:
         try:
