@@ -255,6 +255,7 @@ def wanted_socket(headers: Mapping[str, str], *extensions: str) -> list[dict[str
 
     scope = {
         "type": "websocket",
+        "scheme": "ws",
         "path": "/widgets/x/hold",
         "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
         "extensions": {key: {} for key in extensions},
