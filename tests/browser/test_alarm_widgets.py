@@ -123,6 +123,7 @@ def test_widgets_are_locked_without_a_connection_and_without_control(
 ) -> None:
     with cell_with(tmp_path, CONTROL) as cell:
         started(own_page, cell.url)
+        expect(own_page.locator(f"{AIR_LINE} button")).to_be_enabled()  # it has control
         started(page, cell.url)
         for widget in (AIR_LIST, AIR_LINE):
             expect(own_page.locator(f"{widget} button")).to_be_enabled()
