@@ -17,11 +17,11 @@ from tests.support.servers import ready
 
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (390, 844))
 STOP: Final = "[data-widget=stop] > button:not(.more)"
-# A button's own face, and a unit that stands after its number, may move.
+# A button's own face, a unit that stands after its number, and the lines below a new line may move.
 SHIFTS: Final = """globalThis.shifts = [];
 new PerformanceObserver((list) => {
   for (const { sources } of list.getEntries()) {
-    const moved = sources.filter(({ node }) => !node?.parentElement?.closest(".face, .number"));
+    const moved = sources.filter(({ node }) => !node?.parentElement?.closest(".face, .number, .lines"));
     shifts.push(...moved.map(({ node }) => node?.outerHTML?.slice(0, 90)));
   }
 }).observe({ type: "layout-shift", buffered: true });"""

@@ -131,8 +131,7 @@ def is_drawn(page: Page) -> bool:
 def opened(page: Page, cell: Server) -> None:
     """The page with the trend, drawn by its script."""
     page.goto(cell.url)
-    expect(page.locator(".trend-keys")).to_be_visible()
-    expect(page.locator('[data-do="forward"]')).to_be_disabled()
+    expect(page.locator('[data-do="pause"]')).to_be_enabled()
 
 
 def key(page: Page, action: str) -> Any:

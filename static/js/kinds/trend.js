@@ -46,13 +46,13 @@ class Trend {
     this.#cursor = new Cursor(root, this.#plot);
     this.#columns = this.#plot.pens.map(() => []);
     this.#listen();
+    this.#showState();
   }
 
   #listen() {
     new IntersectionObserver((seen) => this.#setVisible(seen[seen.length - 1].isIntersecting)).observe(this.#area);
     document.addEventListener("visibilitychange", () => this.#update());
     const keys = this.#root.querySelector(".trend-keys");
-    if (keys) keys.hidden = false;
     keys?.addEventListener("click", ({ target }) => this.#act(closest(target, "button")?.dataset.do));
     setInterval(() => this.#showBehind(), 1000);
   }
@@ -161,6 +161,7 @@ class Trend {
       forward: live,
       longer: window >= this.#windows.length - 1,
       shorter: window <= 0,
+      pause: false,
     };
     for (const [name, off] of Object.entries(keys)) {
       const key = this.#root.querySelector(`button[data-do="${name}"]`);
