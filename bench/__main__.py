@@ -25,6 +25,7 @@ from bench.peers import PEERS
 from bench.peers.check import fault_of
 from bench.phases import latency
 from bench.phases.cost import cost
+from bench.phases.dialects import BRIDGE, RMW, dialect
 from bench.phases.growth import Growth
 from bench.phases.stalled import stalled
 from bench.phases.start import start
@@ -83,6 +84,13 @@ class Run:
             with timed(f"growth: {axis}"), self._store.faults(f"growth: {axis}"):
                 self._store.add("growth", 0, axis, {"points": measure()})
 
+    def dialects(self) -> None:
+        """This panel over the bridge and on rmw_zenoh."""
+        with self._rig.bridge() as bridge, self._rig.router() as router:
+            measure = partial(dialect, routers={BRIDGE.id: bridge, RMW.id: router})
+            both = [(peer.id, peer) for peer in (BRIDGE, RMW)]
+            self._interleaved("dialects", both, measure, self._rounds)
+
     def flood(self) -> None:
         """Presses of this panel beside a flood of alarms."""
         self._store.begin("flood")
@@ -107,7 +115,7 @@ class Run:
                     self._store.add(phase, turn, name, measure(self._rig, peer))
 
 
-PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth", "flood")
+PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth", "dialects", "flood")
 
 
 @contextmanager
@@ -176,7 +184,7 @@ def main(arguments: Sequence[str]) -> int:
         traceback.print_exc()
         return 1
     finally:
-        titles = {peer.id: peer.title for peer in (KIOSK, *PEERS)}
+        titles = {peer.id: peer.title for peer in (KIOSK, BRIDGE, RMW, *PEERS)}
         write(store.results, titles, options.results, options.page)
     ours = [where for where in store.results["faults"] if KIOSK.id in where or "growth" in where]
     return 1 if ours else 0

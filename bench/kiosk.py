@@ -69,12 +69,18 @@ class Robot:
 
 
 def panel(
-    topics: Sequence[str], buttons: int = 1, widgets: int = 0, robots: Sequence[Robot] = ()
+    topics: Sequence[str],
+    buttons: int = 1,
+    widgets: int = 0,
+    robots: Sequence[Robot] = (),
+    dialect: str = "",
 ) -> str:
     """A panel file with a readout for each topic, and in total `widgets` readouts of the first
     topic."""
 
     def parts() -> Iterator[str]:
+        if dialect:
+            yield f'dialect = "{dialect}"'
         yield HEAD
         for robot in robots:
             yield ROBOT.format(id=robot.id, locator=robot.locator)
@@ -91,7 +97,7 @@ def panel(
 
 @dataclass(frozen=True)
 class Kiosk(Peer):
-    """This panel; `widgets` and `robots` as in `panel`."""
+    """This panel; `widgets`, `robots` and `dialect` as in `panel`."""
 
     id: str = "kiosk"
     title: str = "this panel"
@@ -99,10 +105,11 @@ class Kiosk(Peer):
     button: str = '[data-widget^="operation"] button[formaction]'
     widgets: int = 0
     robots: tuple[Robot, ...] = ()
+    dialect: str = ""
 
     def start(self, place: Place) -> Running:
         file = place.folder / "panel.toml"
-        file.write_text(panel(place.topics, place.buttons, self.widgets, self.robots))
+        file.write_text(panel(place.topics, place.buttons, self.widgets, self.robots, self.dialect))
         port = free_port()
         env = {
             "KIOSK_PANEL": str(file),

@@ -64,7 +64,7 @@ class Peer(ABC):
 
     id: str
     title: str
-    robot: Literal["zenoh", "ros"] = "zenoh"
+    robot: Literal["zenoh", "ros", "rmw"] = "zenoh"
     shown: str = "#publish"
     button: str = "#publish"
 

@@ -16,6 +16,7 @@ from bench.parts import robot
 from bench.peer import Peer, Place, Running
 from bench.unattended import Unattended
 from tests.support.parts import Bridge
+from tests.support.rmw import Router
 
 DOMAIN: Final = 97
 SAID_EVERY_S: Final = 0.05
@@ -100,6 +101,18 @@ class Rig:
             yield bridge.endpoint
         finally:
             bridge.end()
+
+    @contextmanager
+    def router(self) -> Iterator[str]:
+        """Runs a router with the robot's node on rmw_zenoh within the block; yields its locator."""
+        router = Router()
+        router.start()
+        try:
+            self.robot("join", router=router.endpoint)
+            yield router.endpoint
+        finally:
+            self.robot("leave")
+            router.end()
 
     @contextmanager
     def running(

@@ -217,3 +217,20 @@ def test_the_benchmarks_panels_can_be_used(text: str, tmp_path: Path) -> None:
     path = tmp_path / "panel.toml"
     path.write_text(text)
     assert load_panel(path).title == "Benchmark"
+
+
+def test_rmw_zenoh_is_held_against_the_bridge() -> None:
+    measured = results(
+        dialects=phase(
+            **{
+                "kiosk-bridge": {"down_p50": 4.0, "up_p50": 2.0, "server_1000": 3.0},
+                "kiosk-rmw": {"down_p50": 2.0, "up_p50": 3.0, "server_1000": 3.0},
+            }
+        )
+    )
+    judged = {target.text.split(",")[0]: target for target in targets(measured) if "rmw" in target.text}
+    assert [target.measured for target in judged.values()] == ["0.50 ×", "1.50 ×", "1.00 ×"]
+    assert [target.reached for target in judged.values()] == [True, False, True]
+    assert "| over the bridge | 4.00" in whole(
+        measured | {"machine": {}}, {"kiosk-bridge": "over the bridge"}
+    )

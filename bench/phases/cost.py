@@ -30,14 +30,14 @@ def cost(rig: Rig, peer: Peer) -> Figures:
     return single(rig, peer) | wide(rig, peer) | many(rig, peer)
 
 
-def single(rig: Rig, peer: Peer) -> Figures:
+def single(rig: Rig, peer: Peer, router: str = "") -> Figures:
     """One topic and one page, at the second start in a folder: memory at rest, and the cost by rate."""
     topics = (TOPIC,)
     with ExitStack() as stack:
         folder = stack.enter_context(scratch(peer))
-        with rig.running(peer, topics, folder=folder):
+        with rig.running(peer, topics, router, folder=folder):
             pass
-        server = stack.enter_context(rig.running(peer, topics, folder=folder))
+        server = stack.enter_context(rig.running(peer, topics, router, folder=folder))
         browser = stack.enter_context(rig.unattended(peer, server, topics))
         time.sleep(SETTLE_S)
         figures = {"rest_mib": rss_mib(family(server.pids))}

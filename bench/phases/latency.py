@@ -40,10 +40,13 @@ def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, fl
         return figures_of(matched, clock.doubt_ms)
 
 
-def up(rig: Rig, peer: Peer) -> dict[str, float]:
-    """One round of one peer."""
+def up(rig: Rig, peer: Peer, router: str = "") -> dict[str, float]:
+    """One round of one peer, with the locator that it connects to."""
     way = peer.robot
-    with rig.running(peer, buttons=BUTTONS) as server, rig.page(peer, server, way) as page:
+    with (
+        rig.running(peer, router=router, buttons=BUTTONS) as server,
+        rig.page(peer, server, way) as page,
+    ):
         time.sleep(SETTLE_S)
         clock = page.clock()
         page.watch()

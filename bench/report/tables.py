@@ -46,6 +46,7 @@ def whole(results: Results, titles: Titles) -> str:
         "A browser that stands still": stalled_table(results, titles),
         "Start": start_table(results, titles),
         "Growth of this panel": growth_table(results),
+        "Both dialects": dialects_table(results, titles),
         "A flood of alarms on this panel": flood_table(results),
         "Not measured": faults(results, titles),
     }
@@ -207,6 +208,25 @@ def flood_table(results: Results) -> str:
     ]
     head = ["10,000 alarms, and", "presses", "p50 in ms", "longest in ms", "server CPU %", "MiB"]
     return table([head, *rows]) if rows else ""
+
+
+def dialects_table(results: Results, titles: Titles) -> str:
+    """This panel over the bridge and on rmw_zenoh, from node to page and back."""
+
+    def cell_of(*names: str, shape: str = ".2f") -> Cell:
+        return lambda peer: slashed(
+            number(figure(results, "dialects", peer, name), shape) for name in names
+        )
+
+    columns = {
+        "node → DOM": cell_of("down_p50", "down_p99"),
+        "released → node": cell_of("up_p50", "up_p99"),
+        "server idle / 100 Hz / 1 kHz": cell_of(
+            *(f"server_{hz}" for hz in (0, 100, 1000)), shape=".1f"
+        ),
+        "memory MiB": cell_of("rest_mib", shape=".0f"),
+    }
+    return peers_table(columns, titles)
 
 
 def _linear(growth: Grown) -> str:

@@ -27,7 +27,8 @@ class Target:
 
 
 def targets(results: Results) -> list[Target]:
-    return [*_down(results), *_up(results), *_costs(results), *_stalled(results), *_start(results)]
+    groups = (_down, _up, _costs, _stalled, _start, _dialects)
+    return [target for group in groups for target in group(results)]
 
 
 def best_rival(results: Results, phase: str, name: str) -> tuple[str, float]:
@@ -91,6 +92,15 @@ def _start(results: Results) -> Iterator[Target]:
     yield _below("start to ready", start("ready_s"), 0.8, "s")
     yield _at_most("first page: request to the robot's state", start("shown_ms"), 150, "ms")
     yield _at_most("first page: bytes in all", start("bytes") / 1000, 30, "kB")
+
+
+def _dialects(results: Results) -> Iterator[Target]:
+    names = {"down_p50": "down p50", "up_p50": "up p50", "server_1000": "server at 1 kHz"}
+    for name, noun in names.items():
+        bridge, rmw = (
+            figure(results, "dialects", peer, name) for peer in ("kiosk-bridge", "kiosk-rmw")
+        )
+        yield _times(f"on rmw_zenoh: {noun}, of the bridge's", ratio(rmw, bridge), 1.0)
 
 
 def _times(text: str, measured: float, limit: float, rival: str = "") -> Target:
