@@ -14,7 +14,7 @@ LINE_KEYS: Final = (
 )  # fmt: skip
 ROW_KEYS: Final = (
     *LINE_KEYS, "state", "state_text", "acknowledged", "group", "follows_text", "value_text",
-    "limit_text",
+    "limit_text", "acts", "shelf", "out_of_service",
 )  # fmt: skip
 # The act of a row's button: what is to be done first.
 ROW_ACTS: Final[Mapping[str, TextLike]] = {

@@ -27,7 +27,7 @@ class AlarmQuery(BaseModel):
     `robot` and a `group`. `alarm` is the id of one alarm: of the history, or whose details the page
     shows. The page lists alarms of such a `priority`, `robot` and `group` too. For the page only:
     `show` chooses the states that are listed, `sort` their order, `act` the act whose receipt is
-    shown."""
+    shown, `sheet` opens the sheet of the alarm's row."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -44,6 +44,7 @@ class AlarmQuery(BaseModel):
     sort: Sort = "urgent"
     alarm: Annotated[str, Field(max_length=300)] = ""
     act: Annotated[str, Field(max_length=400)] = ""
+    sheet: bool = False
 
     def filter(self) -> HistoryFilter:
         return HistoryFilter(

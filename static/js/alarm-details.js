@@ -41,9 +41,10 @@ function lockActs() {
   const acts = shown.rows.get(chosen)?.acts ?? [];
   for (const part of document.querySelectorAll("[data-act]:not([data-fixed])")) {
     const isPossible = acts.includes(part.dataset.act);
+    const isMine = part.dataset.roleLock === undefined;
     if (isPossible) part.hidden = false;
     for (const button of part.querySelectorAll("button:not([popovertargetaction])"))
-      button.disabled = isLocked() || !isPossible;
+      button.disabled = isLocked() || !isPossible || !isMine;
     for (const needed of part.querySelectorAll("[data-needs-control]")) needed.hidden = lock === "";
   }
 }

@@ -103,6 +103,8 @@ export class AlarmLine {
   constructor(source) {
     if (document.querySelector(".alarm-list ol.alarms"))
       source.load(import("./alarm-list.js"), ({ showRows }) => (this.#showRows = showRows));
+    if (document.querySelector("#alarm-sheet[popover]"))
+      source.load(import("./alarm-sheet.js"), ({ equip }) => equip(source));
     if (this.#line.dataset.sound)
       source.load(import("./alarm-sound.js"), ({ update, lost }) => (this.#sound = { update, lost }));
     this.#source = source;

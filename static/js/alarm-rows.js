@@ -12,6 +12,18 @@ const TEXTS = [
   "limit_text",
 ];
 
+// The row that an item of a list shows.
+/** @type {WeakMap<HTMLElement, Data>} */
+export const rowOf = new WeakMap();
+/** @type {() => void} */
+let changed = () => {};
+
+// Calls back when a list has changed.
+/** @param {() => void} show */
+export function followRows(show) {
+  changed = show;
+}
+
 // Shows rows in a list, in their order. `more` shows what is special of a list, and may add to a new row.
 /**
  * @param {HTMLElement} list
@@ -31,12 +43,15 @@ export function showList(list, template, rows, more) {
     if (item === next) next = item.nextElementSibling;
     else list.insertBefore(item, next);
   }
+  changed();
 }
 
 /** @param {HTMLElement} item @param {Data} row */
 function showRow(item, row) {
+  rowOf.set(item, row);
   const link = find(item, "a");
   if (item.dataset.alarm !== row.id) link.href += encodeURIComponent(row.id);
+  find(item, "button.more-acts").value = row.id;
   Object.assign(item.dataset, { alarm: row.id, priority: row.priority, state: row.state });
   item.dataset.acknowledged = row.acknowledged;
   find(item, ".of-priority").dataset.priority = row.priority;

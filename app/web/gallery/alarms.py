@@ -39,6 +39,9 @@ def _row(priority: int) -> dict[str, Any]:
         "value_text": number("4.8", "bar"),
         "limit_text": number("5", "bar"),
         "first": priority == 1,
+        "acts": ["out_of_service" if priority == 1 else "shelve"],
+        "shelf": None,
+        "out_of_service": None,
         "act": act,
         "act_text": LABELS[act],
     }

@@ -1,7 +1,5 @@
 """The page of alarms: its list, and the details of one alarm."""
 
-from typing import Final
-
 from app.alarms.rows import AlarmRow
 from app.alarms.shown import MAX_ROWS
 from app.i18n import Text, TextLike, number, render, say
@@ -10,16 +8,14 @@ from app.web.app_state import AppState
 from app.web.rendering.alarm_choice import AlarmChoice, ChoiceContext, choice_context, shows
 from app.web.rendering.alarm_curve import ShownCurve, shown_curve
 
-SHELF_MINUTES: Final = (15, 60, 120)
-REASONS: Final = ("maintenance", "repair", "sensor", "known")
-
 
 class AlarmsContext(ChoiceContext):
     """The variables of `alarms.html`, beside those of the frame. `details` is the address of an alarm's
     details, up to its id, and `list_address` that of the list. `chosen` is the alarm whose details are
     shown, None for none; `gone`: it was asked for and is no longer listed. `place` is where a page
     shows what it is about, `curve` that of its value. `firsts` are the ids of alarms that others
-    followed, `followers` those that followed the chosen one."""
+    followed, `followers` those that followed the chosen one. `with_sheet`: the sheet of its row is
+    open."""
 
     rows: list[AlarmRow]
     details: str
@@ -33,16 +29,17 @@ class AlarmsContext(ChoiceContext):
     followers: list[AlarmRow]
     more: TextLike
     steps: list[str]
-    reasons: list[Text]
-    shelf_times: list[tuple[int, Text]]
+    with_sheet: bool
 
 
 def word(name: str) -> Text:
     return say(f"alarms_{name}")
 
 
-def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> AlarmsContext:
-    """The alarms as they are now."""
+def alarms_context(
+    state: AppState, choice: AlarmChoice, language: str, *, with_sheet: bool = False
+) -> AlarmsContext:
+    """The alarms as they are now. `with_sheet`: the sheet of the chosen alarm's row is open."""
     rows = state.fleet.alarms.rows()
     row = next((row for row in rows if row["id"] == choice.alarm), None)
     taken = [row for row in rows if choice.takes(row)]
@@ -70,11 +67,7 @@ def alarms_context(state: AppState, choice: AlarmChoice, language: str) -> Alarm
         followers=[follower for follower in rows if follower["follows"] == row["id"]] if row else [],
         more=say("alarms_more", count=number(str(len(listed) - len(shown)))) if listed != shown else "",
         steps=_lines(row["action"], language) if row else [],
-        reasons=[word(f"reason_{name}") for name in REASONS],
-        shelf_times=[
-            (60 * minutes, say("alarms_minutes", count=number(str(minutes))))
-            for minutes in SHELF_MINUTES
-        ],
+        with_sheet=with_sheet and row is not None,
     )
 
 

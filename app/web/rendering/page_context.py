@@ -34,6 +34,7 @@ from app.web.assets import PICTURES
 from app.web.embedding import QUERY as EMBED
 from app.web.embedding import only_shows
 from app.web.language import language_of
+from app.web.rendering.alarm_sheet import sheet_words
 from app.web.rendering.display_choice import (
     Choice,
     DisplaySettings,
@@ -186,6 +187,7 @@ def page_context(
             f"{state.root}/static/{state.assets.revision}/{PICTURES}",
             language,
         )
+        | sheet_words(who)
         | ({"alarm_needs_control": role_reason(OPERATOR)} if no_role else {}),
         page_json=page_json(data, language),
         refresh_s=refresh_s,

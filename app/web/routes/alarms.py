@@ -116,7 +116,7 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     page = FramedPage(
         "alarms.html", word("title"), alarms_page=f"alarms?{choice.address()}", vary="accept"
     )
-    context = alarms_context(state, choice, language_of(request))
+    context = alarms_context(state, choice, language_of(request), with_sheet=query.sheet)
     return framed_page(request, state, page, {**context, "word": word})
 
 

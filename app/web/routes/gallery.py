@@ -16,6 +16,7 @@ from app.web.gallery.displays import LINES
 from app.web.gallery.examples import Example
 from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
+from app.web.rendering.alarm_sheet import WORDS as SHEET_WORDS
 from app.web.rendering.display_choice import CHOICES, Choice, DisplaySettings, choices, display_of
 from app.web.rendering.entry_words import UNREADABLE
 from app.web.rendering.page_words import ALARM_WORDS, TREND_WORDS, WORDS
@@ -71,7 +72,7 @@ async def box() -> Response:
 
 def _words() -> dict[str, Any]:
     """The words of a page that its widgets use."""
-    return {word: say(word) for word in (*WORDS, *TREND_WORDS, *ALARM_WORDS)} | {
+    return {word: say(word) for word in (*WORDS, *TREND_WORDS, *ALARM_WORDS, *SHEET_WORDS)} | {
         **UNREADABLE,
         "base": "",
         "embed": "",

@@ -35,7 +35,7 @@ class AlarmList {
   show({ rows, more }) {
     showList(this.#list, find(this.#root, "template"), rows, (item, row) => {
       item.dataset.first = row.first;
-      const button = find(item, "button");
+      const button = find(item, "button.row-act");
       button.formAction = `${this.#root.dataset.root}/alarms/${encodeURIComponent(row.id)}/${row.act}`;
       button.value = row.occurrence;
       button.dataset.path = `${encodeURIComponent(row.id)}/${row.act}`;
@@ -49,7 +49,8 @@ class AlarmList {
   #lock() {
     markLock(this.#root);
     if (isLocked()) this.#touched = null;
-    for (const button of this.#list.querySelectorAll("button")) button.disabled = isLocked();
+    for (const button of this.#list.querySelectorAll("button.row-act")) button.disabled = isLocked();
+    for (const button of this.#list.querySelectorAll("button.more-acts")) button.disabled = false;
   }
 
   /** @param {HTMLElement} button */
@@ -60,7 +61,7 @@ class AlarmList {
 
   /** @param {EventTarget | null} target */
   #down(target) {
-    const button = closest(target, "button:enabled");
+    const button = closest(target, "button.row-act:enabled");
     this.#touched = button && this.#list.contains(button) ? this.#actOf(button) : null;
   }
 
