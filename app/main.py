@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from typing import Final
 
 from fastapi import Depends, FastAPI
@@ -34,7 +33,7 @@ from app.runtime.assembly import check_zenoh, data_folder, mode_of, open_fleet, 
 from app.runtime.doctor_process import DoctorProcess
 from app.settings import Settings, shipped_path
 from app.simulator.in_process import in_process
-from app.web.app_state import AppState, named_robot
+from app.web.app_state import AppState
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets, require_files
 from app.web.bearer_guard import BearerGuard
@@ -42,39 +41,13 @@ from app.web.connections import Connection
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
-from app.web.openapi_parts import errors
 from app.web.proxies import Proxies
 from app.web.rendering.page_templates import PageTemplates
 from app.web.request_body import LONGEST
 from app.web.root_path import RootPath, root_path_of
 from app.web.route_needs import route_guard
-from app.web.routes import (
-    alarm_history,
-    alarm_report,
-    alarms,
-    control,
-    description,
-    diagnostics,
-    display,
-    events,
-    frames,
-    health,
-    help,
-    hold_socket,
-    lock_help,
-    log_lines,
-    pages,
-    parameters,
-    press_socket,
-    presses,
-    recipes,
-    recordings,
-    session,
-    signin,
-    static,
-    trends,
-)
-from app.web.routes import audit_log as log_routes
+from app.web.route_tables import add_routes
+from app.web.routes import pages
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
 from app.web.serving import check_port, check_protected, urls
@@ -83,22 +56,6 @@ from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
 
-# With several robots, their paths stand below that of each.
-ROBOT_ROUTES: Final = (
-    pages,
-    events,
-    presses,
-    press_socket,
-    control,
-    hold_socket,
-    parameters,
-    frames,
-    log_lines,
-    lock_help,
-    trends,
-    recipes,
-)
-ALARM_ROUTES: Final = (alarms, alarm_history, alarm_report)
 READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown
 RESPONSE_TIMEOUT_S: Final = 2.0  # for the robot's at shutdown; then the result of a press is unknown
 
@@ -122,7 +79,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         dependencies=[Depends(route_guard)],
     )
     _add_middleware(app, settings, panel.embed)
-    _add_routes(app, settings.dev)
+    add_routes(app, settings.dev)
     return app
 
 
@@ -139,30 +96,6 @@ def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(RootPath, root=settings.root_path)
     app.add_middleware(ReadableStartupErrors)
-
-
-def _add_routes(app: FastAPI, dev: bool) -> None:
-    """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
-    last: no page of a panel with one robot requests them. The others are built by the first health
-    check, so that the first page does not wait for it."""
-    further = (diagnostics, recordings, help, session, signin, static, health, display, description)
-    for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, *further):
-        app.include_router(routes.router)
-    if dev:
-        _add_gallery(app)
-    app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
-    for routes in ROBOT_ROUTES:
-        app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-
-
-def _add_gallery(app: FastAPI) -> None:
-    """The gallery is a part of the checkout only, not of the installed package."""
-    if find_spec("app.web.routes.gallery") is None:
-        log.info("/gallery is not in the installed package: `make dev` in a checkout has it")
-        return
-    from app.web.routes import gallery
-
-    app.include_router(gallery.router)
 
 
 @asynccontextmanager

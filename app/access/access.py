@@ -14,7 +14,7 @@ from app.access.delays import SignInDelays
 from app.access.secret_checker import SecretChecker
 from app.access.secrets_hash import Cost, Way, cost_of_machine, memory_of_machine
 from app.access.sessions import Session, Sessions
-from app.access.users import User, UserBook
+from app.access.users import Edit, User, UserBook
 from app.access.users_file import Loaded, Stamp, UsersFile
 from app.i18n import TextLike, say
 from app.panel.rules import AccessRules
@@ -113,6 +113,15 @@ class Access:
             self._changed()
         if not self.fault:
             self.log.changes(self.book)
+
+    async def edit(self, edit: Edit) -> TextLike:
+        """Changes the users' file, logs the change and works with it at once; UsersError or OSError if
+        it changes nothing. Returns "" when the entries of the log are on the disk, else why not."""
+        loop = asyncio.get_running_loop()
+        book = await loop.run_in_executor(self._reader, self.file.edit, edit)
+        fault = await self.log.changed_here(book)
+        await self.reload()
+        return fault
 
     def _end_changed(self, before: UserBook) -> None:
         """Ends the sessions of users who may do something else now. A changed secret ends them too."""

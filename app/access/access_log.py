@@ -6,7 +6,7 @@ import secrets
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -39,12 +39,21 @@ class AccessLog(Protocol):
     async def closed(self, entry: Entry) -> TextLike: ...
 
 
+@dataclass(frozen=True, slots=True)
+class LastUses:
+    """When users last signed in (ISO 8601, by their names), and when tokens were last used (in whole
+    hours)."""
+
+    users: dict[str, str] = field(default_factory=dict)
+    tokens: dict[str, str] = field(default_factory=dict)
+
+
 @dataclass(slots=True)
 class _State:
-    """The number of the last logged change, and when tokens were last used (ISO 8601, whole hours)."""
+    """`logged` is the number of the last logged change."""
 
     logged: int
-    used: dict[str, str]
+    last: LastUses
 
 
 class AccessLogWriter:
@@ -61,6 +70,9 @@ class AccessLogWriter:
     def signed_in(self, who: Principal, way: Way) -> None:
         origin = origin_of(who)
         self._places[who.client.id] = origin
+        at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._wall()))
+        self._state.last.users[who.user] = at
+        self._write()
         reason = say(f"log_signed_in_{way}", name=who.user)
         self._add(
             new_entry(
@@ -104,7 +116,34 @@ class AccessLogWriter:
             except LogError:
                 break  # the rest later
             self._state.logged = change.number
+        self._forget_removed(book)
         self._write()
+
+    async def changed_here(self, book: UserBook) -> TextLike:
+        """Writes the changes that are not written yet. Returns "" when they are on the disk, else why
+        they are not."""
+        fault: TextLike = ""
+        for change in book.changes:
+            if change.number > self._state.logged:
+                self._state.logged = change.number
+                fault = await self._log.closed(_entry(change)) or fault
+        self._forget_removed(book)
+        self._write()
+        return fault
+
+    @property
+    def last(self) -> LastUses:
+        return self._state.last
+
+    def _forget_removed(self, book: UserBook) -> None:
+        """A later user or token of the same name has not been used yet."""
+        for kept, names in (
+            (self._state.last.users, {user.name for user in book.users}),
+            (self._state.last.tokens, {token.name for token in book.tokens}),
+        ):
+            for name in kept.keys() - names:
+                del kept[name]
+                self._used_at.pop(name, None)
 
     def token_used(self, name: str) -> None:
         """Keeps the hour of the use of a token."""
@@ -112,12 +151,13 @@ class AccessLogWriter:
         if now - self._used_at.get(name, 0.0) < USED_EVERY_S:
             return
         self._used_at[name] = now
-        self._state.used[name] = time.strftime("%Y-%m-%dT%H:00Z", time.gmtime(now))
+        self._state.last.tokens[name] = time.strftime("%Y-%m-%dT%H:00Z", time.gmtime(now))
         self._write()
 
     def _write(self) -> None:
         draft = self._path.with_name(f".{self._path.name}.{secrets.token_hex(4)}")
-        text = json.dumps({"logged": self._state.logged, "used": self._state.used})
+        last = self._state.last
+        text = json.dumps({"logged": self._state.logged, "used": last.tokens, "signed_in": last.users})
         try:
             draft.touch(mode=0o600)
             draft.write_text(text, encoding="utf-8")
@@ -128,9 +168,9 @@ class AccessLogWriter:
                 draft.unlink()
 
 
-def last_uses(folder: Path) -> dict[str, str]:
-    """When each token was last used, by its name, in whole hours."""
-    return _read(folder / STATE).used
+def last_uses(folder: Path) -> LastUses:
+    """When each user and token was last used."""
+    return _read(folder / STATE).last
 
 
 def _entry(change: Change) -> Entry:
@@ -138,7 +178,7 @@ def _entry(change: Change) -> Entry:
     reason: TextLike = say(
         f"log_users_{act}", name=change.name, detail=change.detail, by=change.by, at=change.at
     )
-    origin = Origin(address="", who=change.by)
+    origin = Origin(address=change.address, browser=change.browser, who=change.by)
     values = {"user": change.name, "detail": change.detail, "at": change.at}
     return new_entry("access", origin, values, reason, action=f"users_{act}", outcome="accepted")
 
@@ -146,6 +186,12 @@ def _entry(change: Change) -> Entry:
 def _read(path: Path) -> _State:
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
-        return _State(int(content["logged"]), {str(k): str(v) for k, v in content["used"].items()})
+        signed_in = content.get("signed_in", {})
+        last = LastUses(_texts(signed_in), _texts(content["used"]))
+        return _State(int(content["logged"]), last)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return _State(0, {})
+        return _State(0, LastUses())
+
+
+def _texts(texts: dict[Any, Any]) -> dict[str, str]:
+    return {str(name): str(text) for name, text in texts.items()}

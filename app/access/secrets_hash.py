@@ -14,6 +14,8 @@ from typing import Final, Literal, NamedTuple
 from cryptography.exceptions import InvalidKey
 from cryptography.hazmat.primitives.kdf.argon2 import Argon2id
 
+from app.i18n import Text, say
+
 Way = Literal["pin", "password", "badge"]
 WAYS: Final[tuple[Way, ...]] = ("pin", "password", "badge")
 
@@ -83,20 +85,20 @@ def token_hash(token: str) -> str:
     return hashlib.sha256(token.encode()).hexdigest()
 
 
-def fault_of(way: Way, secret: str) -> str:
-    """What is wrong with a new secret and what would be right; "" if it can be used. The text never has
-    the secret."""
+def fault_of(way: Way, secret: str) -> Text | None:
+    """What is wrong with a new secret and what would be right; None if it can be used. The text never
+    has the secret."""
     if len(secret) > LONGEST or not secret.isprintable():
-        return f"a {way} has at most {LONGEST} printable characters"
+        return say("users_secret_form", most=LONGEST)
     if way == "pin" and not PIN.fullmatch(secret):
-        return "a PIN has 4 to 12 digits, and nothing else"
+        return say("users_pin_form")
     if way == "pin" and (len(set(secret)) == 1 or secret in DIGITS):
-        return "a PIN such as 1111 or 1234 is guessed first: choose other digits"
+        return say("users_pin_guessed")
     if way == "password" and len(secret) < SHORTEST_PASSWORD:
-        return f"a password has at least {SHORTEST_PASSWORD} characters"
+        return say("users_password_short", least=SHORTEST_PASSWORD)
     if way == "badge" and len(secret) < SHORTEST_BADGE:
-        return f"a badge's number has at least {SHORTEST_BADGE} characters"
-    return ""
+        return say("users_badge_short", least=SHORTEST_BADGE)
+    return None
 
 
 def _argon(salt: bytes, cost: Cost) -> Argon2id:

@@ -5,13 +5,14 @@ import re
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.access.secrets_hash import Way, same_text, token_hash
 from app.errors import KioskError
-from app.roles import ROLES
+from app.i18n import say
+from app.roles import ENGINEER, ROLES
 
 VERSION: Final = 1
 CHANGES_KEPT: Final = 500
@@ -70,7 +71,8 @@ class ApiToken:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change of users for the operator's log. `act` is like "add", `by` the account that made it."""
+    """A change of users for the operator's log. `act` is like "add", `by` the account or user who made
+    it, `address` and `browser` those of a browser that they made it at."""
 
     number: int
     at: str
@@ -78,6 +80,8 @@ class Change:
     name: str
     detail: str
     by: str
+    address: str = ""
+    browser: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,15 @@ class UserBook:
         """Whether the panel has or had users, so that its clients have roles. The removal of the last
         one does not open it."""
         return bool(self.users or self.tokens or self.changes)
+
+    @property
+    def engineers(self) -> tuple[User, ...]:
+        """The users who can sign in as engineers."""
+        return tuple(u for u in self.users if u.role == ENGINEER and not u.disabled and u.ways)
+
+    def version(self, name: str) -> int:
+        """The number of the last change of the user or token of this name, 0 for none that is kept."""
+        return max((c.number for c in self.changes if c.name.casefold() == name.casefold()), default=0)
 
     def user(self, name: str) -> User | None:
         """The user of this name, in upper or lower case."""
@@ -112,7 +125,7 @@ class UserBook:
         known = self.user(user.name)
         if known is None:
             if len(self.users) >= MOST_USERS:
-                raise UsersError(f"there are {MOST_USERS} users: remove one first")
+                raise UsersError(say("users_full", count=MOST_USERS))
             return replace(self, users=(*self.users, replace(user, created=now, changed=now)))
         changed = replace(user, changed=now)
         return replace(self, users=tuple(changed if other is known else other for other in self.users))
@@ -120,10 +133,12 @@ class UserBook:
     def without_user(self, name: str) -> "UserBook":
         return replace(self, users=tuple(user for user in self.users if user.name != name))
 
-    def noted(self, now: str, act: str, name: str, detail: str, by: str) -> "UserBook":
+    def noted(
+        self, now: str, act: str, name: str, detail: str, by: str, address: str = "", browser: str = ""
+    ) -> "UserBook":
         """With a change for the operator's log."""
         number = self.changes[-1].number + 1 if self.changes else 1
-        change = Change(number, now, act, name, detail, by)
+        change = Change(number, now, act, name, detail, by, address, browser)
         return replace(self, changes=(*self.changes, change)[-CHANGES_KEPT:])
 
     def as_text(self) -> str:
@@ -134,28 +149,22 @@ class UserBook:
 Edit = Callable[[UserBook], UserBook]
 
 
-def check_name(name: str, kind: str = "user") -> str:
+def check_name(name: str, kind: Literal["user", "token"] = "user") -> str:
     """The name, if it can be one; UsersError says what would be right."""
     if not name or len(name) > LONGEST_NAME or not name.isprintable() or name != name.strip():
-        raise UsersError(
-            f'"{name[:LONGEST_NAME]}" can not be the name of a {kind}: 1 to {LONGEST_NAME} printable '
-            "characters, without spaces at the ends"
-        )
+        raise UsersError(say(f"users_name_of_{kind}", name=name[:LONGEST_NAME], most=LONGEST_NAME))
     return name
 
 
 def check_role(role: str) -> str:
     if role not in ROLES:
-        raise UsersError(f'"{role}" is not a role: there is {", ".join(ROLES)}')
+        raise UsersError(say("users_role_unknown", role=role[:LONGEST_NAME], roles=", ".join(ROLES)))
     return role
 
 
 def check_group(group: str) -> str:
     if not GROUP.fullmatch(group) or group in ROLES:
-        raise UsersError(
-            f'"{group}" can not be a group: a letter, then up to 63 of a-z, 0-9 and "_", as in '
-            "[access] groups, and not the name of a role"
-        )
+        raise UsersError(say("users_group_form", group=group[:LONGEST_NAME]))
     return group
 
 
@@ -188,6 +197,8 @@ class _Change(BaseModel):
     name: str
     detail: str
     by: str
+    address: str = ""
+    browser: str = ""
 
 
 class _Book(BaseModel):

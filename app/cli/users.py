@@ -9,34 +9,34 @@ import json
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from app.access.access_log import last_uses
+from app.access.edits import (
+    add_token,
+    add_user,
+    hashes_of,
+    remove_user,
+    revoke_token,
+    set_disabled,
+    set_role,
+    set_secrets,
+)
+from app.access.listing import tokens_json, users_json
 from app.access.secrets_hash import (
     LONGEST,
     WAYS,
     Way,
-    badge_hash,
     cost_of_machine,
     fault_of,
-    hashed,
     memory_of_machine,
     new_api_token,
     token_hash,
 )
-from app.access.users import (
-    ApiToken,
-    User,
-    UserBook,
-    UsersError,
-    check_group,
-    check_name,
-    check_role,
-)
+from app.access.users import UserBook, UsersError, check_group, check_name
 from app.access.users_file import UsersFile
 from app.cli.arguments import environment
 from app.cli.parser import Parser
@@ -81,14 +81,6 @@ def _change(options: Any, file: UsersFile, edit: Callable[[UserBook], UserBook],
     file.edit(lambda book: edit(book).noted(now, act, name, detail, by))
 
 
-def _user(book: UserBook, name: str) -> User:
-    user = book.user(name)
-    if user is None:
-        there = ", ".join(other.name for other in book.users) or "none yet: `users add` adds them"
-        raise UsersError(f'there is no user "{name}"; there is {there}')
-    return user
-
-
 def _secrets(options: Any) -> dict[Way, str]:
     """The secrets that the options name, a line of standard input each, in the order of `WAYS`."""
     secrets: dict[Way, str] = {}
@@ -107,18 +99,7 @@ def _secrets(options: Any) -> dict[Way, str]:
 
 
 def _hashes(secrets: dict[Way, str], book: UserBook, name: str) -> dict[Way, str]:
-    """The hashes of secrets by way; UsersError if another user has the badge."""
-    cost = cost_of_machine(memory_of_machine())
-    hashes: dict[Way, str] = {}
-    for way, secret in secrets.items():
-        if way == "badge":
-            hashes[way] = badge_hash(secret, book.badge_salt)
-            other = book.user_of_badge(hashes[way])
-            if other is not None and other.name.casefold() != name.casefold():
-                raise UsersError(f'this badge is that of "{other.name}": a badge has one user')
-        else:
-            hashes[way] = hashed(secret, cost)
-    return hashes
+    return hashes_of(secrets, book, name, cost_of_machine(memory_of_machine()))
 
 
 def _add(options: Any, file: UsersFile) -> int:
@@ -130,10 +111,8 @@ def _add(options: Any, file: UsersFile) -> int:
         )
 
     def edit(book: UserBook) -> UserBook:
-        if book.user(name) is not None:
-            raise UsersError(f'there is a user "{name}": `users pin` or `users role` changes it')
-        user = User(name, options.role, groups)
-        return book.with_user(user.with_hashes(_hashes(secrets, book, name)), _now())
+        hashes = _hashes(secrets, book, name)
+        return add_user(book, name, options.role, groups, hashes, _now())
 
     _change(options, file, edit, ", ".join((options.role, *groups)))
     print(f'"{name}" can sign in as {options.role} with {" or ".join(secrets)}')
@@ -144,11 +123,7 @@ def _role(options: Any, file: UsersFile) -> int:
     groups = None if options.group is None else tuple(map(check_group, filter(None, options.group)))
 
     def edit(book: UserBook) -> UserBook:
-        user = _user(book, options.name)
-        changed = replace(user, role=options.role)
-        if groups is not None:
-            changed = replace(changed, groups=groups)
-        return book.with_user(changed, _now())
+        return set_role(book, options.name, options.role, groups, _now())
 
     _change(options, file, edit, ", ".join((options.role, *(groups or ()))))
     return 0
@@ -162,52 +137,33 @@ def _secret(way: Way, options: Any, file: UsersFile) -> int:
         secrets = _secrets(options)
 
     def edit(book: UserBook) -> UserBook:
-        user = _user(book, options.name)
-        changed = user.with_hashes(_hashes(secrets, book, user.name) or {way: ""})
-        if not changed.ways:
-            raise UsersError(f'"{user.name}" could not sign in any more: `users disable` says so')
-        return book.with_user(changed, _now())
+        hashes = _hashes(secrets, book, options.name) or {way: ""}
+        return set_secrets(book, options.name, hashes, _now())
 
     _change(options, file, edit, "removed" if options.none else "changed")
     return 0
 
 
 def _disabled(disabled: bool, options: Any, file: UsersFile) -> int:
-    def edit(book: UserBook) -> UserBook:
-        return book.with_user(replace(_user(book, options.name), disabled=disabled), _now())
-
-    _change(options, file, edit, options.act)
+    _change(options, file, lambda book: set_disabled(book, options.name, disabled, _now()), options.act)
     return 0
 
 
 def _remove(options: Any, file: UsersFile) -> int:
-    _change(
-        options, file, lambda book: book.without_user(_user(book, options.name).name), "with all rights"
-    )
+    _change(options, file, lambda book: remove_user(book, options.name), "with all rights")
     return 0
 
 
 def _list(options: Any, file: UsersFile) -> int:
-    book = file.read()
-    rows: list[dict[str, Any]] = [
-        {
-            "name": user.name,
-            "role": user.role,
-            "groups": list(user.groups),
-            "signs_in_with": list(user.ways),
-            "disabled": user.disabled,
-            "created": user.created,
-            "changed": user.changed,
-        }
-        for user in book.users
-    ]
+    rows = users_json(file.read(), last_uses(file.folder))
     if options.json:
         print(json.dumps(rows, ensure_ascii=False, indent=1))
         return 0
     for row in rows:
         groups = f" ({', '.join(row['groups'])})" if row["groups"] else ""
         off = ", disabled" if row["disabled"] else ""
-        print(f"{row['name']}: {row['role']}{groups}, {' or '.join(row['signs_in_with'])}{off}")
+        ways, last = " or ".join(row["signs_in_with"]), row["last_sign_in"] or "never"
+        print(f"{row['name']}: {row['role']}{groups}, {ways}{off}, last sign-in {last}")
     if not rows:
         print(f"no users in {file.folder}: everybody at this machine may do everything")
     return 0
@@ -217,10 +173,7 @@ def _token(options: Any, file: UsersFile) -> int:
     name, token = check_name(options.name, "token"), new_api_token()
 
     def edit(book: UserBook) -> UserBook:
-        if any(known.name == name for known in book.tokens):
-            raise UsersError(f'there is a token "{name}": `users revoke` removes it')
-        made = ApiToken(name, check_role(options.role), token_hash(token), _now())
-        return replace(book, tokens=(*book.tokens, made))
+        return add_token(book, name, options.role, token_hash(token), _now())
 
     _change(options, file, edit, options.role)
     print(token)
@@ -229,16 +182,7 @@ def _token(options: Any, file: UsersFile) -> int:
 
 
 def _tokens(options: Any, file: UsersFile) -> int:
-    used = last_uses(file.folder)
-    rows = [
-        {
-            "name": token.name,
-            "role": token.role,
-            "created": token.created,
-            "last_used": used.get(token.name),
-        }
-        for token in file.read().tokens
-    ]
+    rows = tokens_json(file.read(), last_uses(file.folder))
     if options.json:
         print(json.dumps(rows, ensure_ascii=False, indent=1))
         return 0
@@ -248,13 +192,7 @@ def _tokens(options: Any, file: UsersFile) -> int:
 
 
 def _revoke(options: Any, file: UsersFile) -> int:
-    def edit(book: UserBook) -> UserBook:
-        if all(token.name != options.name for token in book.tokens):
-            there = ", ".join(token.name for token in book.tokens) or "none"
-            raise UsersError(f'there is no token "{options.name}"; there is {there}')
-        return replace(book, tokens=tuple(t for t in book.tokens if t.name != options.name))
-
-    _change(options, file, edit, "revoked")
+    _change(options, file, lambda book: revoke_token(book, options.name), "revoked")
     return 0
 
 

@@ -39,7 +39,7 @@ class ActRequest(NamedTuple):
     `object` is the id of what the act is about, such as the client whose request is answered; "" if the
     table is about one thing. `values` are further inputs; they are written to the log. `at` is when the
     operator touched the screen (in the server's time), None if unknown. `scripted` is false for a page
-    without scripts, which reloads instead of sending keepalives.
+    without scripts, which reloads instead of sending keepalives. `secrets` are neither logged nor kept.
     """
 
     act: str
@@ -48,6 +48,7 @@ class ActRequest(NamedTuple):
     values: Mapping[str, Any] = NO_VALUES
     at: float | None = None
     scripted: bool = True
+    secrets: Mapping[str, str] = NO_VALUES
 
 
 class ActGuard(Protocol):
@@ -64,15 +65,19 @@ class ActGuard(Protocol):
 class Applied:
     """The result of `Act.apply`. `refusal`: why it changed nothing. `waits`: it is accepted, and its
     effect is yet to come. `finish` ends what takes time, such as a write to the disk, and returns why
-    it failed, None if it did not; the entry is made after it. `note` is what the receipt says of an act
-    that was applied."""
+    it failed, None if it did not; the entry is made after it. `fails_by` is the cause of a failure.
+    `note` is what the receipt says of an act that was applied. `logged`: `finish` makes the entry, and
+    this returns why it is not on the disk."""
 
     refusal: Text | None = None
     waits: bool = False
     finish: Finish | None = None
+    fails_by: Cause = "log"
     note: TextLike = ""
+    logged: Callable[[], TextLike] | None = None
 
 
+NOT_APPLIED: Final = Applied()
 Subject = TypeVar("Subject")
 Result = TypeVar("Result", bound=Applied)
 
@@ -197,41 +202,45 @@ class ActRunner(Generic[Subject]):
 
     def _begin(self, request: ActRequest, act_id: str) -> "asyncio.Task[ActReceipt]":
         """Applies the act at once; the task returned ends when its entry is written."""
-        receipt, entry, finish = self._applied(request, act_id)
-        task = asyncio.ensure_future(self._ended(request, receipt, entry, finish))
+        receipt, entry, applied = self._applied(request, act_id)
+        task = asyncio.ensure_future(self._ended(request, receipt, entry, applied))
         self._made[act_id] = _kept(request), task
         while len(self._made) > RECEIPTS_KEPT:
             self._made.popitem(last=False)
         return task
 
-    def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike, Finish | None]:
-        """The receipt, the sentence of the log, and what ends the act."""
+    def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike, Applied]:
+        """The receipt, the sentence of the log, and what was applied."""
         act = self._acts[request.act]
         needs = {act.needs, *self._further_needs(request.object)}
         verdict = role_verdict(needs, request.who) or act.permission(self._context.guard, request)
         if not verdict.permitted:
             reason = verdict.reason or ""
-            return _refused(request, act_id, verdict.code, reason), reason, None
+            return _refused(request, act_id, verdict.code, reason), reason, NOT_APPLIED
         applied = act.apply(self._subject, request)
         self._context.changed()
         if refusal := applied.refusal:
-            return _refused(request, act_id, refusal.code, refusal), refusal, None
+            return _refused(request, act_id, refusal.code, refusal), refusal, applied
         outcome: OutcomeCode = "accepted" if applied.waits else "succeeded"
         receipt = ActReceipt(act_id, request.act, outcome, "", applied.note, _now(), "")
-        return receipt, act.entry(applied), applied.finish
+        return receipt, act.entry(applied), applied
 
     async def _ended(
-        self, request: ActRequest, receipt: ActReceipt, entry: TextLike, finish: Finish | None
+        self, request: ActRequest, receipt: ActReceipt, entry: TextLike, applied: Applied
     ) -> ActReceipt:
         """The receipt of an act that is over and logged."""
+        finish = applied.finish if receipt.done else None
         if finish is not None and (failure := await finish()):
-            receipt, entry = _refused(request, receipt.id, failure.code, failure, "log"), failure
+            cause = applied.fails_by
+            receipt, entry = _refused(request, receipt.id, failure.code, failure, cause), failure
         if finish is not None:
             self._context.changed()
         if not receipt.done:
             self._log.warning(
                 "%s: %s by %s: refused: %s", self._kind, request.act, request.who, receipt.reason
             )
+        if receipt.done and applied.logged is not None:
+            return _with_fault(receipt, entry, applied.logged())
         return await self._logged(request, receipt, entry)
 
     async def _logged(self, request: ActRequest, receipt: ActReceipt, entry: TextLike) -> ActReceipt:
@@ -243,9 +252,7 @@ class ActRunner(Generic[Subject]):
         fault = await self._press_log.acted(
             self._kind, action, receipt.id, origin, receipt.outcome, entry, values
         )
-        if not fault:
-            return receipt
-        return replace(receipt, reason=say("log_not_on_disk", said=entry, why=fault))
+        return _with_fault(receipt, entry, fault)
 
 
 def same_principal(who: Principal, other: Principal | None) -> bool:
@@ -263,12 +270,19 @@ def _kept(request: ActRequest) -> ActRequest:
         else value
         for name, value in request.values.items()
     }
-    return request._replace(values=values)
+    return request._replace(values=values, secrets=NO_VALUES)
 
 
 def _same_act(earlier: ActRequest, request: ActRequest) -> bool:
     same = (earlier.act, earlier.object) == (request.act, request.object)
     return same and earlier.values == request.values and same_principal(earlier.who, request.who)
+
+
+def _with_fault(receipt: ActReceipt, entry: TextLike, fault: TextLike) -> ActReceipt:
+    """The receipt; it says so if its entry is not safely in the log."""
+    if not fault:
+        return receipt
+    return replace(receipt, reason=say("log_not_on_disk", said=entry, why=fault))
 
 
 def _refused(

@@ -9,8 +9,11 @@ from starlette.requests import HTTPConnection
 
 from app.access.access import Access
 from app.audit import NullLog, OperatorLog
+from app.audit.press_record import PressLog
+from app.commands.acts import ActContext, ActRunner
 from app.commands.press_limits import PressLimits
 from app.commands.receipts import Receipt
+from app.commands.user_acts import USER_ACTS
 from app.concurrency import InFlight
 from app.i18n import TextLike
 from app.permission.clients import Clients
@@ -36,6 +39,12 @@ class AppState:
     access: Access
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
+    user_acts: ActRunner[Access] = field(init=False)
+
+    def __post_init__(self) -> None:
+        guard, nothing_shown = self.fleet.first.press_guard, lambda: None
+        context = ActContext(guard, PressLog(self.log), "", nothing_shown)
+        self.user_acts = ActRunner("access", USER_ACTS, self.access, context)
 
     @property
     def root(self) -> str:

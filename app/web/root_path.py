@@ -16,7 +16,7 @@ from app.settings import Settings, parse_root_path
 OWN_PATHS: Final = frozenset(
     {
         *("pages", "events", "widgets", "presses", "control", "robots", "log", "log.csv", "display"),
-        *("alarms", "diagnostics", "recordings", "help", "recipes", "session", "signin"),
+        *("alarms", "diagnostics", "recordings", "help", "recipes", "session", "signin", "users"),
         *("static", "healthz", "readyz", "metrics", "gallery", "openapi.json"),
     }
 )

@@ -71,6 +71,8 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/diagnostics": MAINTENANCE,
     "/diagnostics/look": MAINTENANCE,
     "/recordings/last.mcap": MAINTENANCE,
+    "/users": ENGINEER,
+    "/users/{act}": ENGINEER,
     # In development only.
     "/gallery": ENGINEER,
     "/gallery/box.svg": ENGINEER,

@@ -46,6 +46,7 @@ def test_a_user_is_added_listed_changed_and_removed(
         "groups": ["quality"],
         "signs_in_with": ["pin"],
         "disabled": True,
+        "last_sign_in": None,
     }
     sato = file.read().user("M. Sato")
     assert sato is not None
@@ -82,7 +83,7 @@ def test_a_token_is_printed_once_and_kept_as_its_hash(
         (("add", "A", "--role", "operator", "--pin-stdin"), "987\n", "4 to 12 digits"),
         (("add", "A", "--role", "operator", "--pin-stdin"), "", "4 to 12 digits"),
         (("add", " A", "--role", "operator", "--pin-stdin"), "2580\n", "without spaces at the ends"),
-        (("add", "m. SATO", "--role", "operator", "--pin-stdin"), "2580\n", "there is a user"),
+        (("add", "m. SATO", "--role", "operator", "--pin-stdin"), "2580\n", "There is a user"),
         (("add", "A", "--role", "operator", "--badge-stdin"), "04A2\n", 'that of "M. Sato"'),
         (
             ("add", "A", "--role", "operator", "--group", "Q", "--pin-stdin"),
@@ -90,7 +91,7 @@ def test_a_token_is_printed_once_and_kept_as_its_hash(
             "can not be a group",
         ),
         (("pin", "B"), "2580\n", 'no user "B"; there is M. Sato'),
-        (("badge", "M. Sato", "--none"), "", "users disable"),
+        (("badge", "M. Sato", "--none"), "", "Disable the user"),
     ],
 )
 def test_a_mistake_is_refused_with_what_would_be_right(

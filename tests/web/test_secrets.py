@@ -14,7 +14,10 @@ PIN_CANARY = "830461957"
 PASSWORD_CANARY = "canary-password-7f3a"
 BADGE_CANARY = "CANARYBADGE04A2"
 WRONG = ("770461953", "canary-wrong-91bc", "CANARYWRONG77")
+NEW = ("6140283957", "canary-changed-5d20", "CANARYNEWBADGE3")
 PAGES = (
+    "/users",
+    "/users?name=K.+Novak",
     "/",
     "/signin",
     "/signin?user=M.+Sato",
@@ -38,7 +41,7 @@ def test_no_secret_is_anywhere(browsers: Browsers, tmp_path: Path) -> None:
     data.mkdir(mode=0o700)
     add_user(data, "M. Sato", "engineer", pin=PIN_CANARY, password=PASSWORD_CANARY, badge=BADGE_CANARY)
     token = token_of(data, "line", "engineer")
-    secrets = (PIN_CANARY, PASSWORD_CANARY, BADGE_CANARY, token, *WRONG)
+    secrets = (PIN_CANARY, PASSWORD_CANARY, BADGE_CANARY, token, *WRONG, *NEW)
     shown = []
     with ready(
         Server(ROOT, KIOSK_DATA=str(data), KIOSK_MODE="demo", KIOSK_LOG_LEVEL="debug")
@@ -54,6 +57,15 @@ def test_no_secret_is_anywhere(browsers: Browsers, tmp_path: Path) -> None:
             answer = browser.post("/session/pad", data={"user": "M. Sato", "digit": digit})
             shown.append(f"{answer.text} {answer.headers}")
         shown += [browser.get(path).text for path in PAGES]
+        for way, secret in zip(("pin", "password", "badge"), NEW, strict=True):
+            for name in ("K. Novak", "Nobody"):
+                body = {"name": name, "role": "operator", way: secret}
+                form = {"name": name, "role": "operator", "way": way, "secret": secret}
+                for act in ("add", way):
+                    for sent in ({"json": body}, {"data": form}, {"json": {**body, "more": secret}}):
+                        answer = browser.post(f"/users/{act}", **sent)  # type: ignore[arg-type]
+                        shown.append(f"{answer.text} {answer.headers}")
+        shown += [browser.get(path, headers={"accept": "text/html"}).text for path in PAGES]
         program = browsers.new(server.url)
         for bearer in (token, token + "x"):
             headers = {"authorization": f"Bearer {bearer}"}

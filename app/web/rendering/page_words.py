@@ -47,6 +47,7 @@ WORDS: Final = (
     "diagnostics_title",
     "help",
     "recipes_title",
+    "users_page_title",
 )
 TREND_WORDS: Final = (
     "trend_earlier",

@@ -5,6 +5,7 @@ from typing import Final
 
 from app.i18n import Text, TextLike, say
 from app.permission.principal import Principal
+from app.roles import ENGINEER
 from app.web.app_state import AppState
 
 ROLE_WORDS: Final = {
@@ -22,7 +23,7 @@ WORDS: Final = (
 @dataclass(frozen=True, slots=True)
 class SignedIn:
     """`user` is "" for nobody, `name` what the header shows then; `hint` says what to do on a panel
-    without users, "" on one with users."""
+    without users, "" on one with users. `changes_users`: the menu leads to the page of users."""
 
     configured: bool
     user: str
@@ -31,6 +32,7 @@ class SignedIn:
     label: TextLike
     idle: TextLike
     hint: TextLike
+    changes_users: bool
 
 
 def signed_in(state: AppState, who: Principal) -> SignedIn:
@@ -46,6 +48,7 @@ def signed_in(state: AppState, who: Principal) -> SignedIn:
         say("signin_label", name=name, role=role),
         say("signin_idle"),
         "" if configured else say("signin_no_users"),
+        who.role == ENGINEER and (configured or who.client.local),
     )
 
 

@@ -12,14 +12,12 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
-from app import clock
 from app.alarms.history import read_history
 from app.alarms.transition_json import finite, transition
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
-from app.errors import InputError
 from app.i18n import localized, say
 from app.web.alarm_answers import (
     AcknowledgeBody,
@@ -39,7 +37,7 @@ from app.web.language import language_of
 from app.web.openapi_parts import PAGE, Described, described_body, errors, fields
 from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import act_body_of, as_model
-from app.web.routes.press_forms import TAP_AGAIN_S
+from app.web.routes.press_forms import is_second_tap
 from app.web.routes.presses import STATUS
 
 router = APIRouter()
@@ -177,7 +175,7 @@ async def _answer(
     """Runs an act on alarms and answers with the receipts."""
     # Without a cookie the client is anonymous; its next request has this one.
     who, token = principal_with_new_token(request, state)
-    refusal = TOO_SOON if form is not None and _is_second_tap(form) else None
+    refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
         refusal = TOO_OFTEN
     runs = AlarmRuns(state, who, refusal, scripted=form is None)
@@ -189,15 +187,6 @@ async def _answer(
     else:
         response = _json(request, pairs, several)
     return set_client_cookie(response, request, token)
-
-
-def _is_second_tap(form: Mapping[str, str]) -> bool:
-    """Whether a page without scripts is touched sooner than anyone reads it."""
-    try:
-        shown_at = float(form.get("_since", "-inf"))
-    except ValueError:
-        raise InputError("_since: is not that of a page") from None
-    return clock.server_now() - shown_at < TAP_AGAIN_S
 
 
 def _json(request: Request, pairs: list[tuple[str, AlarmRun]], several: bool) -> Response:

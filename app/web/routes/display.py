@@ -14,7 +14,7 @@ from app.web.request_body import body_of, form_of
 router = APIRouter()
 
 OWN_PAGE: Final = re.compile(
-    r"(/robots/[a-z0-9_]+)?/pages/[a-z0-9_]+|/log|/alarms|/diagnostics|/help|/signin"
+    r"(/robots/[a-z0-9_]+)?/pages/[a-z0-9_]+|/log|/alarms|/diagnostics|/help|/signin|/users"
 )
 # What is none of these is ignored: a page that is still open may be of another version.
 BODY: Final = {

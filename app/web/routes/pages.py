@@ -48,6 +48,7 @@ OTHER_PAGES = (
     "log.html",
     "help.html",
     "signin.html",
+    "users.html",
     "recipes.html",
     "alarms.html",
     "alarm-history.html",

@@ -3,6 +3,7 @@
 import math
 import re
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 from urllib.parse import quote
@@ -185,3 +186,8 @@ def recipe_of(session: RobotSession, load: RecipeLoad, receipt_id: str) -> str:
     receipt = session.presses.receipt(receipt_id)
     value = receipt.inputs.get(load.id, "") if receipt else ""
     return str(value).rpartition("@")[0]
+
+
+def is_second_tap(form: Mapping[str, str]) -> bool:
+    """Whether the form of an act, on a page without scripts, is sent sooner than anyone reads it."""
+    return _is_second_tap({"_since": form["_since"]}) if "_since" in form else False

@@ -12,7 +12,6 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app import clock
 from app.commands.acts import ActReceipt, ActRequest
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
@@ -31,7 +30,7 @@ from app.web.language import language_of
 from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fields
 from app.web.rendering.recipes_page import Mode, entries_of, recipes_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.press_forms import TAP_AGAIN_S
+from app.web.routes.press_forms import is_second_tap
 from app.web.routes.presses import STATUS
 
 router = APIRouter()
@@ -193,7 +192,7 @@ async def act(
     at = body.at.timestamp() if body.at else None
     asked = ActRequest(act, who, f"{set}/{body.recipe}", body.inputs, at, form is None)
     runner = session.recipe_acts
-    refusal = TOO_SOON if form is not None and _is_second_tap(form) else None
+    refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
         refusal = TOO_OFTEN
     with state.in_flight.track():
@@ -253,15 +252,6 @@ def _form_body(book: RecipeBook, act: str, form: Mapping[str, str], language: st
         if key not in known and key != "_since" and key.removeprefix("-") not in OWN_FIELDS:
             raise InputError(f'the form has an unknown field "{key:.40}"')
     return as_model(RecipeActBody, own)
-
-
-def _is_second_tap(form: Mapping[str, str]) -> bool:
-    """Whether a page without scripts is touched sooner than anyone reads it."""
-    try:
-        shown_at = float(form.get("_since", "-inf"))
-    except ValueError:
-        raise InputError("_since: is not that of a page") from None
-    return clock.server_now() - shown_at < TAP_AGAIN_S
 
 
 def _receipt(request: Request, receipt: ActReceipt) -> Response:

@@ -4,7 +4,7 @@ import { closest } from "../show.js";
 
 const coarse = matchMedia("(pointer: coarse)");
 const always = pageGuard.page.keyboard === "on";
-const TOUCHED = ":is([data-widget], [data-typed]) :is(input[type=text], output)";
+const TOUCHED = ":is([data-widget], [data-typed]) :is(input[type=text], input[type=password], output)";
 /** @type {Record<"keypad" | "keyboard", () => Promise<{ Entry: new (input: HTMLInputElement, closed: () => void) => { input: HTMLElement, cancel(): void } }>>} */
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
@@ -15,7 +15,9 @@ let touches = 0; // counts them: a module that arrives after the next touch open
 // Without a system keyboard, where there is one of the page's own.
 function prepare() {
   const active = always || coarse.matches;
-  for (const input of document.querySelectorAll(":is([data-widget], [data-typed]) input[type=text]")) {
+  for (const input of document.querySelectorAll(
+    ":is([data-widget], [data-typed]) :is(input[type=text], input[type=password])",
+  )) {
     input.dataset.inputmode ??= input.inputMode;
     input.inputMode = active ? "none" : input.dataset.inputmode;
   }
