@@ -30,6 +30,7 @@ READING_LOCKS: Final[Mapping[str, str]] = {
     "cut": "interlock_connection_lost",
     "unreadable": "interlock_unreadable",
     "reading": "interlock_reading",
+    "foreign": "interlock_foreign",
 }
 # Why a function of fields has no value.
 ABSENCES: Final[Mapping[Absence, Text]] = {

@@ -212,6 +212,10 @@ class LiveGraph:
         """The zids of the peers behind which a node publishes, subscribes or serves."""
         return frozenset(e.zid for e in self._endpoints(role, key))
 
+    def announces(self, zid: str, role: Role, key: str) -> bool:
+        """Whether a session, also one that is no peer, has a token of this endpoint."""
+        return any(e.zid == zid and e.role == role for e in self._tokens.get(key, {}).values())
+
     def has_endpoint(self, role: Role, key: str) -> bool:
         """Whether a node behind a peer publishes, subscribes or serves."""
         return bool(self._endpoints(role, key))

@@ -25,7 +25,8 @@ class Sample(NamedTuple):
     samples and losses of peers as this session received them. `sent` is the timestamp of the sender's
     clock, in seconds since the epoch. `skipped` is the number of messages just before it that were not
     read; for lossless topics `skipped_payloads` are their payloads, and `overrun` is true if there were
-    even more. `cached`: it is from a cache, published at an unknown time.
+    even more. `cached`: it is from a cache, published at an unknown time. `sender` is set for a sample
+    that no peer has stamped: the zid in its timestamp, "" without one.
     """
 
     payload: Buffer
@@ -38,3 +39,4 @@ class Sample(NamedTuple):
     skipped_payloads: tuple[SkippedPayload, ...] = ()
     overrun: bool = False
     cached: bool = False
+    sender: str | None = None

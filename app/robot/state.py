@@ -101,8 +101,7 @@ class RobotState:
         self.conditions = {condition.id: condition for condition in conditions}
         self._condition_keys = frozenset(self.key(condition.topic) for condition in panel.conditions)
         self.silent_publishers = SilentPublishers(self._condition_keys, traits)
-        self.topic_publishers = TopicPublishers()
-        self.replayed = ReplayedMessages()
+        self.topic_publishers, self.replayed = TopicPublishers(), ReplayedMessages()
         self._adaptive_keys = frozenset(map(self.key, panel.adaptive_topics))
         self.reliable_readers: set[str] = set()  # keys of subscriptions that began as reliable
         self.command_status = CommandStatuses()  # by widget id
@@ -116,8 +115,8 @@ class RobotState:
         self.alarmed = NO_ALARMED
         self.alarm_selections: Mapping[str, AlarmSelection] = {}  # by widget id
         self._log = RobotLog(log, self.name)
-        self.is_responding = True  # False: its peers do not respond
-        self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
+        # False: its peers do not respond; the event loop stalled, and the inbox has not been read yet.
+        self.is_responding = self.is_caught_up = True
         self.presence = EndpointPresence(needed, self.key)
         self.traffic, self.round_trips = Traffic(self._log), RoundTrips()
         self.slices = slices or Slices()
@@ -249,13 +248,11 @@ class RobotState:
                 topic.drop()
 
     def invalidate(self, key: str) -> None:
-        """The last value of a topic is unknown."""
-        self._topics[key].invalidate()
+        self._topics[key].invalidate()  # the last value is unknown
 
     def mark_link_lost(self) -> None:
         """The link was lost: the graph is empty, and no sample is valid."""
-        self.link_up = False
-        self.settled_at = math.inf
+        self.link_up, self.settled_at = False, math.inf
         self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
         self.silent_publishers = SilentPublishers(self._condition_keys, self.traits)
         self.topic_publishers = TopicPublishers()
@@ -272,14 +269,17 @@ class RobotState:
         """The same by the topic's key."""
         known = self._topics[key]
         reading, sample = known.reading(), known.sample
-        if sample is None or self.is_from_peer(key, sample.source):
+        if sample is None or reading.status == "cut" or self.is_from_peer(key, sample):
             return reading
-        return replace(reading, status="cut")
+        return replace(reading, status="foreign")
 
-    def is_from_peer(self, key: str, source: str | None) -> bool:
+    def is_from_peer(self, key: str, sample: Sample) -> bool:
         """Whether a sample's source is a peer that is there: one of this robot, or any for a topic
-        that is not below its namespace."""
-        return source is None or source in self.peers_of(key)
+        that is not below its namespace. What permits needs a known one, or a publisher's session."""
+        source, sender, peers = sample.source, sample.sender, self.peers_of(key)
+        if source is not None or sender is None or key not in self._condition_keys:
+            return source is None or source in peers
+        return sender in peers or self.graph.announces(sender, "MP", key)
 
     def peers_of(self, key: str) -> Collection[str]:
         """The zids of the peers through which a topic may come."""

@@ -29,12 +29,13 @@ class Reading:
     """The latest message of a topic.
 
     `status`: no message yet ("waiting"); received before a cut ("cut"); not decodable ("unreadable");
-    being decoded, with the fields of the one before ("reading"); a valid message ("message"). `at` is
-    in monotonic seconds, `wall` in seconds since the epoch. `keyed` are the newest values of fields
-    with keys, over several messages. `since` has the wall time of the last change of timed fields.
+    being decoded, with the fields of the one before ("reading"); of a Zenoh session that is none of the
+    robot's ("foreign"); a valid message ("message"). `at` is in monotonic seconds, `wall` in seconds
+    since the epoch. `keyed` are the newest values of fields with keys, over several messages. `since`
+    has the wall time of the last change of timed fields.
     """
 
-    status: Literal["waiting", "cut", "unreadable", "reading", "message"]
+    status: Literal["waiting", "cut", "unreadable", "reading", "foreign", "message"]
     fields: Fields | None = None
     at: float = -math.inf
     wall: float = 0.0

@@ -138,11 +138,11 @@ class Ingest:
         return Updates(urgent, other=needed, values={key}, topics={key}, readings=readings)
 
     def _with_peer(self, sample: Sample) -> Sample:
-        """A sample whose source is a peer, or not known: a router may have stamped it."""
-        robot = self._robot
-        if robot.traits.stamped_by_peer or sample.source in robot.graph.every_peer:
+        """A sample whose source is a peer, or not known: then it has a sender."""
+        robot, source = self._robot, sample.source
+        if source in robot.graph.every_peer or (robot.traits.stamped_by_peer and source is not None):
             return sample
-        return sample._replace(source=None)
+        return sample._replace(source=None, sender=source or "")
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Ingests a sample; returns whether it changed a permission."""

@@ -116,6 +116,8 @@ def _dated(reading: Reading, value: Any, max_age_s: float | None, now: float) ->
         return FieldState(
             "old", say("readout_before_disconnect", time=format_time(reading.wall)), value
         )
+    if reading.status == "foreign":
+        return FieldState("old", say("readout_foreign", time=format_time(reading.wall)), value)
     until = math.inf if max_age_s is None else reading.at + max_age_s
     if now < until:
         return FieldState("live", _received(format_time(reading.wall)), value, until)

@@ -29,6 +29,7 @@ GONE: Final = frozenset({"interlock_no_publisher", "service_unavailable", "param
 NODE: Final = GONE.union(sentences.uncallable for sentences in EVERY_SENTENCES) | {
     "interlock_waiting",
     "interlock_connection_lost",
+    "interlock_foreign",
     "interlock_stale",
     "interlock_stale_field",
     "interlock_unreadable",

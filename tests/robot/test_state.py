@@ -156,7 +156,27 @@ def test_a_topic_of_the_cell_comes_through_another_bridge() -> None:
     says(robot, "//cell/heard", "open", source=OTHER)
     assert robot.reading("//cell/heard").status == "message"
     robot.graph.apply_token(bridge_token(OTHER), False)
+    robot.mark_peer_lost(OTHER, 9)
     assert robot.reading("//cell/heard").status == "cut"
+
+
+def test_a_value_that_another_zenoh_session_has_stamped_is_foreign(robot: RobotState) -> None:
+    for topic, type_name in (("/heard", TEXT), (ENABLED, BOOL)):
+        says(robot, topic, "x" if type_name == TEXT else True, type_name, source="stranger")
+        assert robot.reading(topic).status == "foreign"
+
+
+@pytest.mark.parametrize("sender", ["", "router"])
+def test_what_permits_needs_a_stamp_of_the_robot(robot: RobotState, sender: str) -> None:
+    """A value that is only shown does not: not every session stamps what it sends."""
+    key = ENABLED[1:]
+    payload = INTERFACES.encode(BOOL, {"data": True})
+    robot.update(key, Sample(payload, 1, 1.0, 1.0, None, sender=sender))
+    assert robot.reading(ENABLED).status == "foreign"
+    robot.graph.apply_token(token("router", "MP", key, BOOL, Qos(), ""), True)
+    assert (robot.reading(ENABLED).status == "message") is (sender == "router")
+    robot.update("heard", Sample(b"", 1, 1.0, 1.0, None, sender=sender))
+    assert robot.reading("/heard").status == "unreadable"
 
 
 @pytest.mark.parametrize(

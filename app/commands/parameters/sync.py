@@ -124,7 +124,7 @@ class ParameterSync:
     def on_event(self, key: str, sample: Sample) -> None:
         """Applies a parameter event of any node, from the topic of this key. Queries the nodes if an
         event may have been missed."""
-        passed_on = self._robot.is_from_peer(key, sample.source)
+        passed_on = self._robot.is_from_peer(key, sample)
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
