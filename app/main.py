@@ -50,7 +50,7 @@ from app.web.route_tables import add_routes
 from app.web.routes import pages
 from app.web.security import RequestGuard
 from app.web.server_log import count_repeated, limit_server_log
-from app.web.serving import check_port, check_protected, urls
+from app.web.serving import check_port, check_protected, served_certificate, urls
 from app.web.session_end import follow_users
 from app.web.turns import Turns
 
@@ -168,8 +168,10 @@ async def _app_state(
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
         doctor = _doctor(settings, server)
-        tls = str(server.ssl_certfile or "") if server else ""
-        async with open_fleet(settings, panel, revision, oplog, in_process, doctor, tls) as fleet:
+        async with (
+            served_certificate(server) as tls,
+            open_fleet(settings, panel, revision, oplog, in_process, doctor, tls) as fleet,
+        ):
             metrics = Metrics(
                 fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
             )
@@ -191,9 +193,7 @@ def _check_protected(settings: Settings, panel: Panel, server: ServerConfig | No
 
 def _doctor(settings: Settings, server: ServerConfig | None) -> DoctorProcess:
     """The doctor, which asks this server where it listens."""
-    if server is None:
-        return DoctorProcess(settings)
-    return DoctorProcess(settings, server.host, server.port)
+    return DoctorProcess(settings, *((server.host, server.port) if server else ()))
 
 
 async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:

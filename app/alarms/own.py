@@ -76,6 +76,17 @@ def certificate_entry(file: str, until: datetime, now: datetime) -> AlarmEntry:
     return _entry("panel_certificate", until - now < timedelta(days=CERTIFICATE_DAYS), texts)
 
 
+def unused_certificate_entry(file: str) -> AlarmEntry:
+    """Of the server's new certificate, which can't be used."""
+    texts = OwnTexts(
+        say("own_certificate_unused"),
+        say("own_certificate_broken", file=file),
+        say("own_certificate_old_stays"),
+        say("own_certificate_repair"),
+    )
+    return _entry("panel_certificate", True, texts)
+
+
 class OwnTexts(NamedTuple):
     """What the operator reads."""
 

@@ -56,12 +56,16 @@ class CertificateFolder:
         if not by_plant:
             files.insert(0, self._targets(AUTHORITY, by_plant))
         self._check_absent([file for pair in files for file in pair])
-        with _writing(self.path):
-            self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self.create()
         issuer = None if by_plant else self._make_authority(authority)
         for name, holder in named:
             self._make(name, holder, issuer)
         return [file for pair in files for file in pair]
+
+    def create(self) -> None:
+        """Makes the folder, for its owner alone; one that is there stays as it is."""
+        with _writing(self.path):
+            self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
 
     def add(self, name: str, holder: Holder, by_plant: bool) -> list[Path]:
         """Makes one more; see `make`."""
@@ -69,6 +73,28 @@ class CertificateFolder:
         self._check_absent(files)
         self._make(name, holder, None if by_plant else self.issuer())
         return list(files)
+
+    def self_sign(self, name: str, holder: Holder, days: int) -> list[Path]:
+        """Makes a key and its certificate without any CA."""
+        files = self._targets(name, by_plant=False)
+        self._check_absent(files)
+        key = issuing.new_key()
+        write_new(self.key(name), issuing.key_pem(key), OWN)
+        certificate = issuing.issue(holder, key, None, days)
+        write_new(self.certificate(name), issuing.pem(certificate), PUBLIC)
+        return list(files)
+
+    def renew_own(self, name: str, days: int, by_plant: bool) -> Path:
+        """Makes a certificate anew for the same key, signed by itself, or a request for it."""
+        key = read_key(self.key(name))
+        holder = issuing.holder_of(read_certificate(self.certificate(name)))
+        if by_plant:
+            file, content = self.request(name), issuing.pem(issuing.request(holder, key))
+        else:
+            certificate = issuing.issue(holder, key, None, days)
+            file, content = self.certificate(name), issuing.pem(certificate)
+        replace_file(file, content)
+        return file
 
     def renew(self, names: Sequence[str], by_plant: bool) -> list[Path]:
         """Makes the certificates with these names anew, for the same keys, or requests for them. All

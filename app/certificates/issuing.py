@@ -75,7 +75,7 @@ def new_authority(name: str, key: Key) -> x509.Certificate:
     )
 
 
-def issue(holder: Holder, key: Key, issuer: Issuer | None) -> x509.Certificate:
+def issue(holder: Holder, key: Key, issuer: Issuer | None, days: int = DAYS) -> x509.Certificate:
     """A holder's certificate, self-signed without an issuer. It ends no later than the issuer's."""
     subject = _subject(holder.name)
     signer = issuer.key if issuer else key
@@ -83,7 +83,7 @@ def issue(holder: Holder, key: Key, issuer: Issuer | None) -> x509.Certificate:
         raise CertificateError("the key of the CA must be one on an elliptic curve: use --request")
     by = issuer.certificate.subject if issuer else subject
     latest = issuer.certificate.not_valid_after_utc if issuer else None
-    builder = _builder(subject, by, key.public_key(), DAYS, latest)
+    builder = _builder(subject, by, key.public_key(), days, latest)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(_usage(signs=False), critical=True)
     authority = signer.public_key()

@@ -54,6 +54,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "recipes": Command("list, export and import the recipes of a panel", "recipes"),
     "users": Command("add, change and list users and tokens of programs", "users"),
     "bridge-config": Command("write a configuration of the bridge that fits a panel", "bridge_config"),
+    "certificate": Command("make the certificate of the panel's own server", "certificate"),
     "interfaces": Command("copy the definitions of ROS packages beside a panel", "interfaces"),
     "router-config": Command(
         "write a configuration of the Zenoh router of a robot on rmw_zenoh", "router_config"

@@ -24,6 +24,7 @@ from app.alarms.rows import AlarmRow, row_of
 from app.alarms.shown import MAX_ROWS, NO_ALARMS, AlarmsView, PendingRow, ShownAlarms, outdated
 from app.alarms.status import now
 from app.audit.press_record import Log
+from app.certificates.served import NO_FILES, UsedCertificates
 from app.i18n import TextLike
 from app.panel.model import Panel
 from app.robot.state import RobotState
@@ -88,13 +89,12 @@ class Alarms:
         self._shown.selections.add_robot(robot_id, self._panel)
         return robot_alarms
 
-    async def start(self, folder: Path, operators_log: Log, certificates: Sequence[Path] = ()) -> None:
+    async def start(self, folder: Path, operators_log: Log, used: UsedCertificates = NO_FILES) -> None:
         """Loads the alarms that stood when the server ended; nothing for a panel without alarms."""
         if not self._panel.may_raise:
             return
         if (rules := self._panel.alarm_rules).panel:
-            own = folder, operators_log, self.engine, self.evaluate, certificates
-            self._own = OwnAlarms(rules, *own)
+            self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate, used)
             self._own.start()
         self.mqtt.start()
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)

@@ -13,6 +13,7 @@ from app.audit import Limits, NullLog, OperatorLog
 from app.audit.kept_files import KeptFiles
 from app.audit.start_files import read_start_files
 from app.audit.start_record import StartRecord
+from app.certificates.served import ServedCertificate, UsedCertificates
 from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.panel.widgets.trend import trends_of
@@ -77,13 +78,12 @@ async def open_fleet(
     oplog: OperatorLog | NullLog,
     simulated_robot: SimulatedRobot,
     doctor: DoctorProcess | None = None,
-    certificate: str = "",
+    certificate: ServedCertificate | None = None,
 ) -> AsyncIterator[Fleet]:
     """The robots of the panel, real or simulated. `revision` is that of the page's files, `certificate`
-    the file of the server's own certificate."""
+    the server's own."""
     demo = mode_of(settings, panel) == "demo"
-    certificates = [Path(certificate)] if certificate else []
-    certificates += [] if demo else certificates_in(settings.zenoh)
+    certificates = UsedCertificates(() if demo else certificates_in(settings.zenoh), certificate)
     with ExitStack() as stack:
 
         def config_of(entry: RobotEntry | None) -> Config:

@@ -20,9 +20,11 @@ from app.alarms.own import (
     disk_entry,
     log_entry,
     own_definitions,
+    unused_certificate_entry,
 )
 from app.audit.press_record import Log
 from app.certificates.folder import Listed, about
+from app.certificates.served import NO_FILES, UsedCertificates
 from app.errors import KioskError
 from app.panel.alarm import AlarmRules
 
@@ -52,10 +54,10 @@ class OwnAlarms:
         operators_log: Log,
         engine: AlarmEngine,
         evaluate: Callable[[], None],
-        certificates: Sequence[Path] = (),
+        certificates: UsedCertificates = NO_FILES,
     ) -> None:
-        """`certificates` are the files that the server and its link to the robot use."""
         self._certificates = certificates
+        self._certificate_fault = ""
         self._rules = rules
         self._folder = folder
         self._log = operators_log
@@ -103,7 +105,9 @@ class OwnAlarms:
         self._check_clock()
         if self._checks % DISK_EVERY == 0 and self._measuring is None:
             self._measuring = asyncio.create_task(self._check_disk())
-        if self._certificates and self._checks % CERTIFICATES_EVERY == 0:
+        fault = self._certificates.fault
+        is_new, self._certificate_fault = fault != self._certificate_fault, fault
+        if self._certificates.all_files and (is_new or self._checks % CERTIFICATES_EVERY == 0):
             self._reading = asyncio.create_task(self._check_certificates())
         self._checks += 1
         self._evaluate()
@@ -133,7 +137,12 @@ class OwnAlarms:
 
     async def _check_certificates(self) -> None:
         """Reads them on a thread: a renewed one is another file, or the same with other content."""
-        listed = await asyncio.to_thread(_listed, self._certificates)
+        if self._certificates.fault:
+            file = str(self._certificates.all_files[0])
+            self._set("panel_certificate", unused_certificate_entry(file))
+            self._evaluate()
+            return
+        listed = await asyncio.to_thread(_listed, self._certificates.all_files)
         if listed:
             first = min(listed, key=lambda certificate: certificate.until)
             entry = certificate_entry(str(first.file), first.until, datetime.now(UTC))

@@ -42,9 +42,10 @@ class Caller:
 
 
 def caller(request: HTTPConnection) -> Caller:
-    token = request.cookies.get(COOKIE, "")
+    cookies = request.cookies
+    token = cookies.get(client_cookie(request)) or cookies.get(COOKIE, "")
     address = request.client.host if request.client else ""
-    session = request.cookies.get(session_cookie(request), "")
+    session = cookies.get(session_cookie(request), "")
     own = token if TOKEN.fullmatch(token) else ""
     return Caller(own, address, session, bearer_of(request.headers.get("authorization", "")))
 
@@ -56,11 +57,22 @@ def bearer_of(authorization: str) -> str:
 
 
 def session_cookie(request: HTTPConnection) -> str:
-    """The name of the cookie of a session. Over HTTPS its prefix binds it to this host (RFC 6265bis);
-    below a root path to HTTPS only, as another panel may be at the same host."""
+    """The name of the cookie of a session."""
+    return _bound(SESSION, request)
+
+
+def client_cookie(request: HTTPConnection) -> str:
+    """The name of the cookie of a client. A browser that has one without the prefix, of a version
+    before or of HTTP, keeps its token and gets the other."""
+    return _bound(COOKIE, request)
+
+
+def _bound(name: str, request: HTTPConnection) -> str:
+    """A cookie's name. Over HTTPS its prefix binds it to this host (RFC 6265bis); below a root path to
+    HTTPS only, as another panel may be at the same host."""
     if request.url.scheme not in ("https", "wss"):
-        return SESSION
-    return f"__Secure-{SESSION}" if site_of(request).root else f"__Host-{SESSION}"
+        return name
+    return f"__Secure-{name}" if site_of(request).root else f"__Host-{name}"
 
 
 def client_of(connection: HTTPConnection) -> str:
@@ -82,6 +94,8 @@ def principal_with_new_token(
     since its next request has the first. One that shows a page in a frame (`embedded`) would keep none.
     """
     who = principal_of(request, state)
+    if who.client.id and client_cookie(request) not in request.cookies and not embedded:
+        return who, caller(request).token
     if who.client.id or embedded or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return who, ""
     token = new_token()
@@ -96,7 +110,7 @@ def set_client_cookie(response: Response, request: Request, token: str) -> Respo
     """The response, with the cookie if `token` is not ""."""
     if token:
         response.set_cookie(
-            COOKIE,
+            client_cookie(request),
             token,
             max_age=KEPT_S,
             path=site_of(request).root or "/",

@@ -4,10 +4,13 @@
 started without them gets them as the application starts, before it listens.
 """
 
+import asyncio
 import os
 import socket
-from collections.abc import Collection, Sequence
+from collections.abc import AsyncIterator, Collection, Sequence
+from contextlib import asynccontextmanager
 from ipaddress import ip_address
+from pathlib import Path
 from typing import Any, Final
 
 from starlette.types import Receive
@@ -15,6 +18,7 @@ from uvicorn import Config
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.certificates.served import ServedCertificate
 from app.errors import SettingsError
 from app.permission.client_places import ClientPlaces, shares
 from app.process.listen_sockets import check_port_free
@@ -68,6 +72,22 @@ def urls(
         names = hosts if host in ("0.0.0.0", "::") else [f"[{host}]" if ":" in host else host]
         sockets += [f"{scheme}://{name}:{port}" for name in names]
     return sockets
+
+
+@asynccontextmanager
+async def served_certificate(server: Config | None) -> AsyncIterator[ServedCertificate | None]:
+    """The certificate of a server with TLS, loaded again when its files change until the end."""
+    if server is None or server.ssl is None or not server.ssl_certfile:
+        yield None
+        return
+    key = Path(server.ssl_keyfile) if server.ssl_keyfile else None
+    file, password = Path(server.ssl_certfile), server.ssl_keyfile_password
+    served = ServedCertificate(file, key, password, server.ssl)
+    watching = asyncio.create_task(served.watch())
+    try:
+        yield served
+    finally:
+        watching.cancel()
 
 
 def check_protected(server: Config | None, has_users: bool, without: Collection[str]) -> None:
