@@ -38,6 +38,8 @@ need wtype test -e /usr/bin/wtype
 need swayidle test -e /usr/bin/swayidle
 need mosquitto test -e /usr/sbin/mosquitto
 need minisign minisign -v
+need nginx test -e /usr/sbin/nginx
+need caddy caddy version
 need systemd systemd-analyze --version
 need iproute2 ip -V
 # Pages are laid out with each of these alone, see tests/support/browser/fonts.py.
