@@ -35,6 +35,23 @@ def errors(*statuses: int) -> Described:
     return {status: {"description": REASONS[status], "content": content} for status in (*statuses, 429)}
 
 
+def refusals(model: type[BaseModel]) -> Described:
+    """The responses of what is judged where it is made: receipts of this model."""
+    return {
+        403: {
+            "model": model | ErrorAnswer,
+            "description": f"without the role; {REASONS[403]}",
+            "content": PAGE,
+        },
+        409: {"model": model, "description": "it was not done"},
+        429: {
+            "model": model,
+            "description": "more than a client may",
+            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
+        },
+    }
+
+
 def described_body(
     model: type[BaseModel] | None, form: dict[str, Any] | None, *, required: bool
 ) -> dict[str, Any]:

@@ -158,8 +158,8 @@ def test_a_hold_goes_through_a_websocket(panel: Panel) -> None:
     with signed_in(panel) as browser:
 
         def snapshot() -> dict[str, Any]:
-            found: dict[str, Any] = json.loads(events_in(browser.get("/events?once=1").text)[0][1])
-            return found
+            content: dict[str, Any] = json.loads(events_in(browser.get("/events?once=1").text)[0][1])
+            return content
 
         until(lambda: snapshot()["widgets"]["jog"]["enabled"], "the robot permits")
         cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())

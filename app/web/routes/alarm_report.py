@@ -24,7 +24,7 @@ from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import described_body, errors, fields
+from app.web.openapi_parts import described_body, errors, fields, refusals
 from app.web.rendering.alarm_report_page import COUNTED, ReportParts, now, report_context
 from app.web.rendering.alarm_report_query import ReportQuery
 from app.web.rendering.alarms_page import word
@@ -95,15 +95,10 @@ async def report(
     "/alarms/report",
     response_model=MessageReceipt,
     summary="Leave a message to the next shift",
-    responses=errors(403, 408, 413, 422)
+    responses=errors(408, 413, 422)
+    | refusals(MessageReceipt)
     | {
         303: {"description": "of a form: back to the report, with the receipt's id if it was refused"},
-        409: {"model": MessageReceipt, "description": "it was not done"},
-        429: {
-            "model": MessageReceipt,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
         503: {"model": MessageReceipt, "description": "the operator's log can't be written"},
     },
     openapi_extra=described_body(

@@ -34,7 +34,7 @@ from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, Described, described_body, errors, fields
+from app.web.openapi_parts import PAGE, Described, described_body, errors, fields, refusals
 from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import act_body_of, as_model
 from app.web.routes.press_forms import is_second_tap
@@ -57,16 +57,16 @@ TOO_SOON: Final = say("press_too_soon")
 
 def _acts(model: type[BaseModel]) -> Described:
     """The responses of an act: receipts of this model."""
-    return errors(403, 404, 408, 413, 422) | {
-        303: {"description": "of a form: back to the page that it came from, with the receipt's id"},
-        409: {"model": model, "description": "it was not done"},
-        429: {
-            "model": model,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
-        503: {"model": model, "description": "the operator's log can't be written"},
-    }
+    return (
+        errors(404, 408, 413, 422)
+        | refusals(model)
+        | {
+            303: {
+                "description": "of a form: back to the page that it came from, with the receipt's id"
+            },
+            503: {"model": model, "description": "the operator's log can't be written"},
+        }
+    )
 
 
 FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {

@@ -20,7 +20,7 @@ from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import principal_of, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, described_body, errors, fields
+from app.web.openapi_parts import FORM, JSON, described_body, errors, fields, refusals
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.presses import STATUS
 
@@ -89,15 +89,10 @@ async def keep_alive(request: Request, state: CurrentState, session: CurrentSess
     "/control/{act}",
     response_model=ControlAnswer,
     summary="Take, ask for, give, keep or release control of the robot",
-    responses=errors(403, 404, 408, 413, 422)
+    responses=errors(404, 408, 413, 422)
+    | refusals(ControlAnswer)
     | {
         303: {"description": "of a form: back to the page"},
-        409: {"model": ControlAnswer, "description": "it was not done"},
-        429: {
-            "model": ControlAnswer,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
         503: {"model": ControlAnswer, "description": "the operator's log can't be written"},
     },
     openapi_extra=described_body(

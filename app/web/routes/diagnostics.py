@@ -35,7 +35,7 @@ from app.web.diagnostics_answer import (
 )
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import JSON, PAGE, described_body, errors, fields
+from app.web.openapi_parts import JSON, PAGE, described_body, errors, fields, refusals
 from app.web.rendering.diagnostics_json import diagnostics_json, look_json, mqtt_json
 from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
@@ -89,7 +89,8 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
 @router.post(
     "/diagnostics/{act}",
     summary="Begin a check by the doctor, or get the support bundle",
-    responses=errors(403, 404, 408, 413, 422)
+    responses=errors(404, 408, 413, 422)
+    | refusals(DiagnosticReceipt)
     | {
         200: {
             "content": {
@@ -99,12 +100,6 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
             "description": "of `check` the receipt, of `bundle` the zip",
         },
         303: {"description": "of a form: back to the page, with the receipt's id"},
-        409: {"model": DiagnosticReceipt, "description": "it was not done"},
-        429: {
-            "model": DiagnosticReceipt,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
         503: {"description": "the operator's log can't be written, or the bundle not be made"},
     },
     openapi_extra=described_body(

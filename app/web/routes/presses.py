@@ -29,6 +29,7 @@ from app.web.openapi_parts import (
     described_body,
     errors,
     fields,
+    refusals,
 )
 from app.web.receipt_answer import ReceiptAnswer
 from app.web.rendering.display_choice import display_of
@@ -77,19 +78,21 @@ class Cancel(BaseModel):
     press: str = ""
 
 
-RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
-    303: {"description": "of a form: back to the page, with the receipt on it"},
-    409: {
-        "model": ReceiptAnswer,
-        "description": "refused: an interlock, who has control, no such goal",
-    },
-    429: {
-        "model": ReceiptAnswer,
-        "description": "more than a client may",
-        "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-    },
-    503: {"model": ReceiptAnswer | ErrorAnswer, "description": "no way to the robot, or to the log"},
-}
+RECEIPTS: Final[Described] = (
+    errors(404, 408, 413)
+    | refusals(ReceiptAnswer)
+    | {
+        303: {"description": "of a form: back to the page, with the receipt on it"},
+        409: {
+            "model": ReceiptAnswer,
+            "description": "refused: an interlock, who has control, no such goal",
+        },
+        503: {
+            "model": ReceiptAnswer | ErrorAnswer,
+            "description": "no way to the robot, or to the log",
+        },
+    }
+)
 
 
 @router.post(

@@ -27,7 +27,7 @@ from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fields
+from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fields, refusals
 from app.web.rendering.recipes_page import Mode, entries_of, recipes_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import is_second_tap
@@ -161,15 +161,10 @@ async def page(
     "/recipes/{set}/{act}",
     response_model=RecipeReceipt,
     summary="Make, change, restore or delete a recipe, or import some",
-    responses=errors(403, 404, 408, 413, 422)
+    responses=errors(404, 408, 413, 422)
+    | refusals(RecipeReceipt)
     | {
         303: {"description": "of a form: back to the page, with the receipt on it"},
-        409: {"model": RecipeReceipt, "description": "it was not done"},
-        429: {
-            "model": RecipeReceipt,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
         503: {"model": RecipeReceipt, "description": "the disk or the operator's log refuses it"},
     },
     openapi_extra=described_body(
