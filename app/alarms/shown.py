@@ -11,7 +11,7 @@ from app.alarms.marks import AlarmMarks
 from app.alarms.rows import AlarmRow
 from app.alarms.selections import AlarmSelections
 from app.alarms.sorted_rows import SortedRows
-from app.i18n import TextLike
+from app.i18n import TextLike, number, say
 
 MAX_ROWS: Final = 500  # that are listed; the others are counted
 PRIORITIES: Final = (1, 2, 3, 4)
@@ -31,7 +31,8 @@ class AlarmsView(TypedDict):
     priority. `standing` counts the alarms that are not normal; `unacknowledged` and `unknown` are of
     these. `raised` counts the raises since the server's start that are to be acknowledged. The shelved,
     suppressed and those out of service are counted apart. `rows` has the first `MAX_ROWS` by their ids,
-    and `more` is how many follow. `fault`: why they are not kept on the disk, "" if they are."""
+    and `more` is how many follow, `more_text` the same as a sentence, "" for none. `fault`: why they
+    are not kept on the disk, "" if they are."""
 
     line: AlarmRow | None
     standing: int
@@ -44,6 +45,7 @@ class AlarmsView(TypedDict):
     flood: bool
     fault: TextLike
     more: int
+    more_text: TextLike
     rows: Mapping[str, AlarmRow]
 
 
@@ -61,6 +63,7 @@ NO_ALARMS: Final = AlarmsView(
     flood=False,
     fault="",
     more=0,
+    more_text="",
     rows={},
 )
 
@@ -112,7 +115,7 @@ class ShownAlarms:
     def view(self, now: float, fault: TextLike = "") -> AlarmsView:
         """The section at `now` (monotonic seconds)."""
         rows = {row["id"]: row for row in islice(self.listed(), MAX_ROWS)}
-        counts = self._sorted.counts
+        counts, more = self._sorted.counts, len(self.rows) - len(rows)
         return AlarmsView(
             line=self._sorted.line,
             standing=counts["standing"],
@@ -131,9 +134,15 @@ class ShownAlarms:
             out_of_service=counts["out_of_service"],
             flood=now < self.flood_ends_at(),
             fault=fault,
-            more=len(self.rows) - len(rows),
+            more=more,
+            more_text=more_text(more),
             rows=rows,
         )
+
+
+def more_text(more: int) -> TextLike:
+    """How many alarms are counted and not listed; "" for none."""
+    return say("alarms_more", count=number(str(more))) if more else ""
 
 
 def outdated(alarms: Mapping[str, AlarmInstance], rows: Mapping[str, AlarmRow], most: int) -> list[str]:

@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from app.i18n import TextLike, number, say
+from app.alarms.shown import more_text
+from app.i18n import TextLike, say
 from app.panel.widgets.alarm_views import AlarmLineView, AlarmListView
 from app.robot.alarmed import NO_SELECTION
 from app.robot.state import RobotState
@@ -38,8 +39,7 @@ def alarm_list(widget: AlarmListView, robot: RobotState) -> tuple[dict[str, Any]
     firsts = {row["follows"] for row in shown.rows}
     rows = [_row(row, row["id"] in firsts) for row in shown.rows[: widget.lines]]
     more = shown.more + len(shown.rows) - len(rows)
-    text = say("alarms_more", count=number(str(more))) if more else ""
-    return {"state": "live", "alarms": {"rows": rows, "more": text}}, math.inf
+    return {"state": "live", "alarms": {"rows": rows, "more": more_text(more)}}, math.inf
 
 
 def _row(row: Mapping[str, Any], is_first: bool) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """What clients send to `/alarms` and get from it."""
 
 import math
+import sys
 from typing import Annotated, Any, Final
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
@@ -15,6 +16,7 @@ from app.commands.receipts import Receipt
 from app.web.receipt_answer import ReceiptAnswer
 from app.web.rendering.alarm_choice import AlarmChoice, Show, Sort
 
+MANY: Final = sys.maxsize
 MAX_ACKNOWLEDGED: Final = 500  # alarms in one request
 MAX_OCCURRENCE: Final = 2**53
 Occurrence = Annotated[int, Field(ge=0, le=MAX_OCCURRENCE)]
@@ -25,9 +27,9 @@ class AlarmQuery(BaseModel):
     for the history: of transitions before the number `before`, from `since` on and before `until`, with
     `text` in the alarm's id, texts or group or in the name of who acted, of a `priority` (0: all), a
     `robot` and a `group`. `alarm` is the id of one alarm: of the history, or whose details the page
-    shows. The page lists alarms of such a `priority`, `robot` and `group` too. For the page only:
-    `show` chooses the states that are listed, `sort` their order, `act` the act whose receipt is
-    shown, `sheet` opens the sheet of the alarm's row."""
+    shows. What is listed is of such a `priority`, `robot` and `group` too, `show` chooses its states
+    and `sort` the order; without `history` all is listed unless `limit` is given. For the page only:
+    `act` the act whose receipt is shown, `sheet` opens the sheet of the alarm's row."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -58,8 +60,13 @@ class AlarmQuery(BaseModel):
             self.group,
         )
 
+    @property
+    def rows_limit(self) -> int:
+        """How many alarms are listed: all, if the client does not say."""
+        return self.limit if "limit" in self.model_fields_set else MANY
+
     def choice(self) -> AlarmChoice:
-        """What the page lists."""
+        """What is listed."""
         return AlarmChoice(self.show, self.priority, self.group, self.robot, self.sort, self.alarm)
 
 
@@ -183,9 +190,15 @@ class TransitionAnswer(BaseModel):
 
 
 class AlarmsAnswer(BaseModel):
-    """What is not normal now, the most urgent first."""
+    """What is not normal now, the most urgent first or as `sort` says. `more` follow after `limit`, in
+    `more_text` as a sentence. `counts`: how many there would be with each of these values of `show`.
+    `alarm` is that of the query's `alarm`, null for none."""
 
     alarms: list[AlarmAnswer]
+    more: int
+    more_text: str
+    counts: dict[str, int]
+    alarm: AlarmAnswer | None
 
 
 class HistoryAnswer(BaseModel):

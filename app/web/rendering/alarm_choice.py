@@ -61,6 +61,28 @@ class AlarmChoice(NamedTuple):
         return list(rows) if key is None else sorted(rows, key=key)
 
 
+class Chosen(NamedTuple):
+    """The alarms of a choice: `taken` have its priority, group and robot, in all states; `rows` are the
+    first of those that it lists, in its order, and `more` is how many follow."""
+
+    taken: list[AlarmRow]
+    rows: list[AlarmRow]
+    more: int
+
+
+def chosen_rows(choice: AlarmChoice, rows: Iterable[AlarmRow], language: str, limit: int) -> Chosen:
+    """The first `limit` rows of a choice, of all that there are."""
+    taken = [row for row in rows if choice.takes(row)]
+    listed = choice.sorted((row for row in taken if shows(choice.show, row)), language)
+    return Chosen(taken, listed[:limit], max(0, len(listed) - limit))
+
+
+def segment_counts(taken: Iterable[AlarmRow]) -> dict[str, int]:
+    """How many of the rows each button would list."""
+    rows = list(taken)
+    return {show: sum(shows(show, row) for row in rows) for show in SEGMENTS}
+
+
 def shows(show: Show, row: AlarmRow) -> bool:
     """Whether an alarm has a state that `show` lists."""
     if show == "unacknowledged":
@@ -86,7 +108,7 @@ class ChoiceContext(TypedDict):
 
 def choice_context(panel: Panel, choice: AlarmChoice, rows: Iterable[AlarmRow]) -> ChoiceContext:
     """`rows` are the alarms of the chosen priority, group and robot, in all states."""
-    listed = list(rows)
+    counts = segment_counts(rows)
     states = [(show, say(f"alarms_show_{show}")) for show in SHOWS]
     priorities = [say(code) for code in PRIORITY_WORDS[1:]]
     groups = {str(alarm.group): alarm.group for alarm in panel.alarms if alarm.group}
@@ -104,10 +126,7 @@ def choice_context(panel: Panel, choice: AlarmChoice, rows: Iterable[AlarmRow]) 
         filtered.append(say(f"alarms_sort_{choice.sort}"))
     return ChoiceContext(
         choice=choice,
-        segments=[
-            (show, choice.address(show=show, alarm=""), sum(shows(show, row) for row in listed))
-            for show in SEGMENTS
-        ],
+        segments=[(show, choice.address(show=show, alarm=""), counts[show]) for show in SEGMENTS],
         states=states,
         priorities=priorities,
         groups=list(groups.items()),

@@ -1,23 +1,24 @@
 """The page of alarms: its list, and the details of one alarm."""
 
 from app.alarms.rows import AlarmRow
-from app.alarms.shown import MAX_ROWS
-from app.i18n import Text, TextLike, number, render, say
+from app.alarms.shown import MAX_ROWS, more_text
+from app.i18n import Text, TextLike, render, say
 from app.panel.alarm_places import AlarmPlace, alarm_place
 from app.web.app_state import AppState
-from app.web.rendering.alarm_choice import AlarmChoice, ChoiceContext, choice_context, shows
+from app.web.rendering.alarm_choice import AlarmChoice, ChoiceContext, choice_context, chosen_rows
 from app.web.rendering.alarm_curve import ShownCurve, shown_curve
 
 
 class AlarmsContext(ChoiceContext):
-    """The variables of `alarms.html`, beside those of the frame. `details` is the address of an alarm's
-    details, up to its id, and `list_address` that of the list. `chosen` is the alarm whose details are
-    shown, None for none; `gone`: it was asked for and is no longer listed. `place` is where a page
-    shows what it is about, `curve` that of its value. `firsts` are the ids of alarms that others
-    followed, `followers` those that followed the chosen one. `with_sheet`: the sheet of its row is
-    open."""
+    """The variables of `alarms.html`, beside those of the frame. `rows_query` asks for the rows as
+    JSON. `details` is the address of an alarm's details, up to its id, and `list_address` that of the
+    list. `chosen` is the alarm whose details are shown, None for none; `gone`: it was asked for and is
+    no longer listed. `place` is where a page shows what it is about, `curve` that of its value.
+    `firsts` are the ids of alarms that others followed, `followers` those that followed the chosen
+    one. `with_sheet`: the sheet of its row is open."""
 
     rows: list[AlarmRow]
+    rows_query: str
     details: str
     list_address: str
     chosen: AlarmRow | None
@@ -42,9 +43,7 @@ def alarms_context(
     """The alarms as they are now. `with_sheet`: the sheet of the chosen alarm's row is open."""
     rows = state.fleet.alarms.rows()
     row = next((row for row in rows if row["id"] == choice.alarm), None)
-    taken = [row for row in rows if choice.takes(row)]
-    listed = choice.sorted((row for row in taken if shows(choice.show, row)), language)
-    shown = listed[:MAX_ROWS]
+    listed = chosen_rows(choice, rows, language, MAX_ROWS)
     address = choice.address(alarm="")
     alarm = state.fleet.alarms.engine.alarms.get(choice.alarm) if row else None
     place = (
@@ -54,8 +53,9 @@ def alarms_context(
     )
     curve = state.fleet.alarms.curves.of_alarm(alarm) if alarm else None
     return AlarmsContext(
-        **choice_context(state.fleet.panel, choice, taken),
-        rows=shown,
+        **choice_context(state.fleet.panel, choice, listed.taken),
+        rows=listed.rows,
+        rows_query="&".join(filter(None, (choice.address(), f"limit={MAX_ROWS}"))),
         details=f"alarms?{address}{'&' if address else ''}alarm=",
         list_address=f"alarms?{address}" if address else "alarms",
         chosen=row,
@@ -65,7 +65,7 @@ def alarms_context(
         curve=shown_curve(alarm, curve) if alarm and curve else None,
         firsts={follower["follows"] for follower in rows},
         followers=[follower for follower in rows if follower["follows"] == row["id"]] if row else [],
-        more=say("alarms_more", count=number(str(len(listed) - len(shown)))) if listed != shown else "",
+        more=more_text(listed.more),
         steps=_lines(row["action"], language) if row else [],
         with_sheet=with_sheet and row is not None,
     )

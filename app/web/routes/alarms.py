@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
 from app.alarms.history import read_history
+from app.alarms.shown import more_text
 from app.alarms.transition_json import finite, transition
 from app.commands.acts import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
@@ -35,6 +36,7 @@ from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import PAGE, Described, described_body, errors, fields, refusals
+from app.web.rendering.alarm_choice import chosen_rows, segment_counts
 from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import act_body_of, as_model
 from app.web.routes.press_forms import is_second_tap
@@ -103,9 +105,23 @@ async def alarms(
         older = rows[-1].seq if len(rows) == query.limit else None
         content = {"history": [transition(row) for row in rows], "older": older}
     else:
-        content = {"alarms": [finite(row) for row in state.fleet.alarms.rows()]}
+        content = _chosen(state, query, language_of(request))
     answer = localized(content, language_of(request))
     return JSONResponse(answer, headers={"cache-control": "no-store"})
+
+
+def _chosen(state: AppState, query: AlarmQuery, language: str) -> dict[str, Any]:
+    """The alarms that a query chooses, and how many there are of all that it might list."""
+    rows, limit = state.fleet.alarms.rows(), query.rows_limit
+    choice = query.choice()
+    listed = chosen_rows(choice, rows, language, limit)
+    return {
+        "alarms": [finite(row) for row in listed.rows],
+        "more": listed.more,
+        "more_text": more_text(listed.more),
+        "counts": segment_counts(listed.taken),
+        "alarm": next((finite(row) for row in rows if row["id"] == choice.alarm), None),
+    }
 
 
 def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
