@@ -153,14 +153,13 @@ async def _app_state(
         kinds = {*KINDS} if settings.dev else used  # the gallery shows all
         static_files, templates = shipped_path("static"), shipped_path("templates")
         require_files(static_files, templates)
-        own = (panel.picture_files, panel.styles, panel.templates)
+        own = (panel.picture_files, panel.styles, panel.templates, panel.brand, panel.fonts)
         assets = load_assets(
             static_files,
             templates,
             panel.mm_per_px,
             kinds,
             *own,
-            panel.brand,
             has_alarms=panel.may_raise,
         )
         revision = f"{panel.revision}-{assets.revision}"

@@ -15,7 +15,7 @@ ARROW: Final = "→"
 ABSENT: Final = "–"
 MORE: Final = "… more"
 # The groups of files whose changes are named by file; the program's are many, and its list is one.
-BY_FILE: Final = ("templates", "styles", "definitions", "catalogues", "pictures")
+BY_FILE: Final = ("templates", "styles", "definitions", "catalogues", "pictures", "fonts")
 
 
 def flat(tables: Mapping[str, Any]) -> dict[str, str]:

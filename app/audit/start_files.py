@@ -24,10 +24,11 @@ USER_IN_URL: Final = re.compile(r"(?<=//)[^/@\s]+@")
 HIDDEN: Final = "…"
 
 # The groups of files, in the order in which they are kept. The Zenoh file may have a password and the
-# program is in its wheel: of the one only the hash is, of the other the list of hashes.
+# program is in its wheel: of the one only the hash is, of the other the list of hashes. Fonts are
+# large, and say nothing of what the panel does: only their hashes are kept.
 PANEL: Final = "panel"
 KEPT: Final = (PANEL, "templates", "styles", "definitions", "catalogues", "pictures")
-GROUPS: Final = (*KEPT, "zenoh", "program")
+GROUPS: Final = (*KEPT, "fonts", "zenoh", "program")
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +133,7 @@ def _paths(settings: Settings, panel: "Panel") -> Iterator[tuple[str, str, Path]
     for tag, path in catalogues().items():
         yield "catalogues", f"{tag}.po", Path(path)
     yield from (("pictures", name, path) for name, path in panel.picture_files.items())
+    yield from (("fonts", _name(path, beside), path) for path in panel.font_files)
     yield "zenoh", settings.zenoh.name, settings.zenoh
 
 

@@ -119,12 +119,17 @@ def _named(
         yield "interfaces", name, package_files
     for name in _texts([tables.get("pictures")]):
         yield "pictures", name, lambda folder: picture_files(folder).values()
-    pages = tables.get("page")
-    for page in pages if isinstance(pages, list) else ():
-        if isinstance(page, dict):
-            for key in OF_PAGES:
-                for name in _texts([page.get(key)]):
-                    yield key, name, lambda file: [file]
+    for font in _tables(tables.get("font")):
+        for name in _texts([font.get("regular"), font.get("bold")]):
+            yield "font", name, lambda file: [file]
+    for page in _tables(tables.get("page")):
+        for key in OF_PAGES:
+            for name in _texts([page.get(key)]):
+                yield key, name, lambda file: [file]
+
+
+def _tables(value: Any) -> list[dict[str, Any]]:
+    return [table for table in value if isinstance(table, dict)] if isinstance(value, list) else []
 
 
 def _texts(value: Any) -> list[str]:

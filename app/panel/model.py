@@ -54,6 +54,11 @@ class Panel(PanelKeys):
         """The files of the folder of pictures by their names."""
         return picture_files(self.pictures) if self.pictures else {}
 
+    @property
+    def font_files(self) -> tuple[Path, ...]:
+        """The files of its fonts, each once."""
+        return tuple(dict.fromkeys(file for font in self.fonts for file in font.files.values()))
+
     @cached_property
     def styles(self) -> tuple[Path, ...]:
         """The stylesheets of its pages, each once."""

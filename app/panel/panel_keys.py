@@ -19,6 +19,7 @@ from app.panel.base import (
 )
 from app.panel.condition import NamedCondition
 from app.panel.demo import DemoEntry
+from app.panel.font import Font
 from app.panel.interlock import Interlock
 from app.panel.language_choice import Language, Languages
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
@@ -60,6 +61,7 @@ class PanelKeys(Description):
     hand: Hand = "right"
     screens: Screens = ()
     pictures: PictureFolder | None = None
+    fonts: Annotated[tuple[Font, ...], Field(strict=False, max_length=4)] = Field((), alias="font")
     keyboard: Keyboard = "auto"
     screen: ScreenRules = ScreenRules()
     brand: BrandRules | None = None

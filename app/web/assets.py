@@ -11,12 +11,13 @@ are indented by and what only sets styles apart stay here.
 import gzip
 import hashlib
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Final
 
 from app.errors import KindError
+from app.panel.font import Font, font_format
 from app.panel.rules import BrandRules
 from app.panel.widgets.kinds import KINDS
 
@@ -43,6 +44,7 @@ LEFT_OUT: Final = {
 }
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 FONTS: Final = "fonts"
+FONT_WEIGHTS: Final = {"regular": "400", "bold": "600 700"}
 PICTURES: Final = "pictures"
 NO_PICTURES: Final[Mapping[str, Path]] = {}
 PICTURE_TYPES: Final = {
@@ -76,6 +78,7 @@ class Assets:
 
     files: dict[str, Asset]
     revision: str
+    own_fonts: tuple[str, ...] = ()  # the names of the files of the panel's fonts
     # The kinds of widgets that have a script of their own, and those that have a stylesheet.
     scripts: ClassVar[frozenset[str]] = frozenset(name for name, kind in KINDS.items() if kind.script)
     styles: ClassVar[frozenset[str]] = frozenset(
@@ -98,6 +101,28 @@ def picture(file: Path) -> Asset:
     return Asset(content, PICTURE_TYPES[file.suffix], packed)
 
 
+def font(file: Path) -> Asset:
+    """A font of the panel. WOFF2 is packed already."""
+    content, form = file.read_bytes(), font_format(file)
+    return Asset(content, f"font/{form}", b"" if form == "woff2" else gzip.compress(content, mtime=0))
+
+
+def font_styles(fonts: Sequence[Font]) -> Iterator[str]:
+    """What names the panel's fonts, and puts them before the shipped ones."""
+    for number in range(len(fonts)):
+        for key, weight in FONT_WEIGHTS.items():
+            yield (
+                f'@font-face{{font-family:"Own {number}";font-weight:{weight};font-display:optional;'
+                f'src:url("{FONTS}/{font_name(number, key)}")}}'
+            )
+    families = ",".join(f'"Own {number}"' for number in range(len(fonts)))
+    yield f":root{{--own-fonts:{families}}}\n" if fonts else ""
+
+
+def font_name(number: int, key: str) -> str:
+    return f"own-{number}-{key}"
+
+
 def load_assets(
     static: Path,
     templates: Path,
@@ -107,6 +132,7 @@ def load_assets(
     styles: Collection[Path] = (),
     own_templates: Collection[Path] = (),
     brand: BrandRules | None = None,
+    own_fonts: Sequence[Font] = (),
     has_alarms: bool = False,
 ) -> Assets:
     """Reads `static`, and the templates for the revision only.
@@ -114,7 +140,7 @@ def load_assets(
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
     widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
     layer, so that they win, and as they are written. `brand` gives the colour of its
-    corner; `has_alarms`: pages have the line of alarms.
+    corner; `has_alarms`: pages have the line of alarms. Pages use `own_fonts` before the shipped ones.
     """
     needed = [name for name in SHARED if any(name in KINDS[kind].styles for kind in kinds)]
     needed += ALARMS if has_alarms else ()
@@ -123,7 +149,8 @@ def load_assets(
     if brand is not None and brand.colour:
         own += f";--brand:{brand.colour};--brand-ink:{brand.ink}"
     millimetre = f":root{{{own}}}\n".encode()
-    sheet = asset(b"".join([*layers, millimetre]), ".css")
+    named_fonts = "".join(font_styles(own_fonts)).encode()
+    sheet = asset(b"".join([*layers, named_fonts, millimetre]), ".css")
     files = {"kiosk.css": _with_styles(sheet, styles)}
     of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}
     apart = {name: static / "css" / f"{name}.css" for name in (*OWN_PAGES, LATER)}
@@ -137,12 +164,18 @@ def load_assets(
     files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
     fonts = sorted((static / FONTS).glob("*.woff2"))  # packed already
     files |= {f"{FONTS}/{file.name}": Asset(file.read_bytes(), "font/woff2", b"") for file in fonts}
+    of_panel = {
+        font_name(number, key): font(file)
+        for number, own_font in enumerate(own_fonts)
+        for key, file in own_font.files.items()
+    }
+    files |= {f"{FONTS}/{name}": sent for name, sent in of_panel.items()}
     digest = hashlib.sha256()
     for name, sent in sorted(files.items()):
         digest.update(name.encode() + b"\0" + sent.content + b"\0")
     for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
-    return Assets(files, digest.hexdigest()[:12])
+    return Assets(files, digest.hexdigest()[:12], tuple(of_panel))
 
 
 def require_files(static: Path, templates: Path) -> None:

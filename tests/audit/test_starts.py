@@ -36,6 +36,9 @@ PANEL = """
 title = "Cell 1"
 mode = "demo"
 pictures = "pictures"
+[[font]]
+regular = "own.ttf"
+bold = "own.ttf"
 [[page]]
 id = "main"
 title = "Main"
@@ -47,6 +50,7 @@ topic = "/start"
 type = "std_msgs/msg/Bool"
 message = { data = true }
 """
+FONT = b"\0\1\0\0 letters"
 ENV = {"PATH": os.environ["PATH"], "TZ": "UTC"}
 
 
@@ -56,6 +60,7 @@ def settings(tmp_path: Path) -> Settings:
     (tmp_path / "pictures/plan.svg").write_text("<svg/>")
     (tmp_path / "cell1.toml").write_text(PANEL)
     (tmp_path / "zenoh.json5").write_text('{ transport: { auth: { usrpwd: { password: "canary" } } } }')
+    (tmp_path / "own.ttf").write_bytes(FONT)
     return Settings(
         panel=tmp_path / "cell1.toml", zenoh=tmp_path / "zenoh.json5", data=tmp_path / "data"
     )
@@ -96,6 +101,8 @@ def test_a_start_has_the_hashes_of_all_that_it_runs_with(settings: Settings) -> 
     assert about["zenoh"] == hashlib.sha256(settings.zenoh.read_bytes()).hexdigest()
     picture = hashlib.sha256(b"<svg/>").hexdigest()
     assert about["pictures"] == hashlib.sha256(f"{picture}  plan.svg\n".encode()).hexdigest()
+    font = hashlib.sha256(FONT).hexdigest()
+    assert about["fonts"] == hashlib.sha256(f"{font}  own.ttf\n".encode()).hexdigest()
     assert {"version", "settings", "catalogues", "program", "files"} <= about.keys()
     assert "changes" not in about  # there is no start before
 
@@ -275,6 +282,7 @@ def test_the_panel_of_a_server_can_be_asked_for_by_its_time(tmp_path: Path) -> N
     """Two starts of a real server, with an edit between them."""
     data = tmp_path / "data"
     text = PANEL.replace('pictures = "pictures"\n', "")
+    (tmp_path / "own.ttf").write_bytes(FONT)
     with demo_server(tmp_path, text, KIOSK_DATA=str(data)) as server:
         first = time.time()
         assert server.http.get("/log").status_code == 200

@@ -58,6 +58,7 @@ def install(host: Host, panel: Path, zenoh: Path | None = None) -> None:
         (PAGE + 'styles = "css/a.css"', "css/a.css", "shadow"),
         (PAGE + 'template = "pages/shadow"', "pages", "."),
         ('pictures = "plans"', "plans/plan.svg", "plan.svg"),
+        ('[[font]]\nregular = "a.ttf"', "a.ttf", "shadow"),
         ('pictures = "plans"', "plans", "."),
         ('interfaces = ["cell_msgs"]', "cell_msgs/msg/Key.msg", "msg/Key.msg"),
         ('interfaces = ["cell_msgs"]', "cell_msgs/msg", "msg"),

@@ -122,6 +122,8 @@ def test_files_that_the_panel_names_are_installed_with_the_panel(host: Host, tmp
         "install/cell_msgs/share/cell_msgs/package.xml": "<name>cell_msgs</name>",
         "pictures/plan.svg": "<svg/>",
         "pages/cell.html": "{{ widget('start') }}",
+        "fonts/regular.ttf": "letters",
+        "fonts/bold.ttf": "bold letters",
     }
     for name, text in {**files, "install/cell_msgs/lib/driver": "a program"}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -130,6 +132,7 @@ def test_files_that_the_panel_names_are_installed_with_the_panel(host: Host, tmp
     mine.write_text(
         f'interfaces = ["install", "{package}"]\npictures = "./pictures"\n'
         '[[page]]\ntemplate = "pages/cell.html"\n'
+        '[[font]]\nregular = "fonts/regular.ttf"\nbold = "fonts/bold.ttf"\n'
     )
 
     def plan() -> list[InstallStep]:

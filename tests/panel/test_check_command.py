@@ -9,6 +9,7 @@ from app.cli.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE
+from tests.support.beside_panel import put_beside
 from tests.support.parts import REFERENCE, TESTS
 from tests.support.processes import command
 
@@ -157,7 +158,7 @@ def test_the_whole_message_of_each_press_is_printed(
     jog = tmp_path / "msgs/cell_msgs/msg/Jog.msg"
     jog.parent.mkdir(parents=True)
     jog.write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
-    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
+    put_beside(tmp_path)
     assert main(["-v", str(path)]) == 0
     first, _, said = capsys.readouterr().out.partition("\n")
     assert "good" in first

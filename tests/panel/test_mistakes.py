@@ -22,6 +22,7 @@ from app.panel.same_widgets import SameWidget
 from app.panel.source import NAME as SOURCE
 from app.panel.widgets.families import Command
 from app.panel.widgets.kinds import KINDS
+from tests.support.beside_panel import put_beside
 from tests.support.form import LONG, several
 from tests.support.parts import TESTS
 
@@ -49,7 +50,7 @@ def faults_of(tmp_path_factory: pytest.TempPathFactory) -> FaultsOf:
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
     (messages / "Wear.msg").write_text("float65 hours\n")
-    (folder / "msgs/plan.svg").write_text("<svg/>")
+    put_beside(folder)
     path = folder / "cell.toml"
 
     def faults(text: str) -> list[Fault]:

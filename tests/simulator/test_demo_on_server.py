@@ -11,6 +11,7 @@ import pytest
 from app.panel import Panel, load_panel
 from app.panel.widgets.families import Display
 from app.panel.widgets.parameter import Parameter
+from tests.support.beside_panel import put_beside
 from tests.support.holds import PATIENT
 from tests.support.parts import ROOT, TESTS, Process, Server, free_port, until, zenoh_file
 
@@ -26,7 +27,7 @@ def everything(tmp_path: Path) -> Path:
     messages = tmp_path / "msgs/cell_msgs/msg"
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
-    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
+    put_beside(tmp_path)
     path = Path(shutil.copy(TESTS / "everything.toml", tmp_path))
     path.write_text(path.read_text().replace("within_s = 2.0", "within_s = 20.0"))
     return path

@@ -24,6 +24,7 @@ from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
 from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_peer import ANY_PORT, Simulator
+from tests.support.beside_panel import put_beside
 from tests.support.builders import INTERFACES
 from tests.support.parts import REFERENCE, TESTS
 from tests.support.stepped import STEP_S, Stepped
@@ -686,7 +687,7 @@ def test_everything_is_simulated_in_each_distribution(tmp_path: Path, distro: st
     messages = tmp_path / "msgs/cell_msgs/msg"
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
-    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
+    put_beside(tmp_path)
     path = tmp_path / "cell.toml"
     text = (TESTS / "everything.toml").read_text()
     path.write_text(text.replace('distro = "jazzy"', f'distro = "{distro}"'))

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from app.i18n import TextLike, render
 from app.panel.widgets.tiles import Screen
-from app.panel.widths.letters import text_width
+from app.panel.widths.letters import SHIPPED, Fonts, text_width
 from app.panel.widths.lines import NEAR, line_count, widest_piece
 
 
@@ -31,6 +31,7 @@ class Cell:
     screen: Screen
     sizes: Sizes
     fit: bool
+    fonts: Fonts = SHIPPED
 
 
 class Cut(NamedTuple):
@@ -64,30 +65,29 @@ class Box:
     least_beside: float = 0.0
     name: str = "place"
 
-    def cut(self, language: str) -> Cut | None:
+    def cut(self, language: str, fonts: Fonts = SHIPPED) -> Cut | None:
         """What is cut of the text in a language; None for nothing."""
         if self.beside:
-            return replace(self, width=self.width - self.width_beside(language), beside="").cut(
-                language
-            )
+            width = self.width - self.width_beside(language, fonts)
+            return replace(self, width=width, beside="").cut(language, fonts)
         text = render(self.text, language)
         after = render(self.after, language)
-        tail = text_width(after, self.after_size or self.size, bold=self.after_bold)
+        tail = text_width(after, self.after_size or self.size, fonts, bold=self.after_bold)
         if not self.wraps:
-            needs = self.indent + text_width(text, self.size, bold=self.bold) + tail
+            needs = self.indent + text_width(text, self.size, fonts, bold=self.bold) + tail
             return _too_wide(text + after, needs, self) if needs > self.width + NEAR else None
-        word, needs = widest_piece(text, self.size, bold=self.bold)
+        word, needs = widest_piece(text, self.size, fonts, bold=self.bold)
         if needs > self.width + NEAR:
             return _too_wide(word, needs, self)
         whole = f"{text} {after.replace(' ', NO_BREAK)}" if after else text
-        lines = line_count(whole, self.width, self.size, bold=self.bold, indent=self.indent)
+        lines = line_count(whole, self.width, self.size, fonts, bold=self.bold, indent=self.indent)
         if lines <= self.lines:
             return None
         return Cut(text, f"{lines} lines", f"{self.lines} of {self.width:.0f} px")
 
-    def width_beside(self, language: str) -> float:
+    def width_beside(self, language: str, fonts: Fonts = SHIPPED) -> float:
         size = self.beside_size or self.size
-        width = text_width(render(self.beside, language), size, bold=self.beside_bold)
+        width = text_width(render(self.beside, language), size, fonts, bold=self.beside_bold)
         return max(width, self.least_beside)
 
 

@@ -19,6 +19,7 @@ from app.panel.widgets.tiles import (
     Screen,
 )
 from app.panel.widths.boxes import SIZES, Box, Cell, Cut
+from app.panel.widths.panel_fonts import font_notes, fonts_of
 from app.panel.widths.reasons import reason_texts
 from app.panel.widths.texts import MANY, face_texts, texts
 
@@ -43,7 +44,9 @@ class Finding(NamedTuple):
 
 
 def cut_notes(panel: Panel) -> Iterator[Note]:
-    """A note for each text that is cut on a screen of the panel."""
+    """A note for each text that is cut on a screen of the panel, and for each font whose letters
+    have no known widths."""
+    yield from font_notes(panel)
     needs: dict[tuple[str, str, str], dict[tuple[str, str], list[str]]] = {}
     for finding in findings(panel):
         cut, key = finding.cut, (finding.place, finding.cut.text, finding.language)
@@ -68,11 +71,12 @@ def _said(widths: Mapping[tuple[str, str], Iterable[str]]) -> str:
 
 def findings(panel: Panel) -> Iterator[Finding]:
     """Every text that is cut, for each screen and language."""
+    fonts = fonts_of(panel)
     for size in panel.screens or KIOSK_SCREENS:
         screen = Screen.from_size(size, panel.mm_per_px)
         for place, box in boxes(panel, screen):
             for language in panel.readers_languages:
-                if cut := box.cut(language):
+                if cut := box.cut(language, fonts):
                     yield Finding(f"{place}.{box.part}", box, language, cut, size)
 
 
@@ -101,7 +105,7 @@ def _rail(panel: Panel, screen: Screen) -> Placed:
             continue
         is_low = screen.height <= LOW_SCREEN and widget.id not in stops
         height = screen.touch(ENTRY_MM if is_low else KEY_MM) + FRAME_FACE_PADS
-        cell = Cell(screen.rail, height, screen, sizes, fit=True)
+        cell = Cell(screen.rail, height, screen, sizes, fit=True, fonts=fonts_of(panel))
         inside = screen.rail - FRAME_KEY_PAD
         for box in face_texts(widget, inside, cell, sizes.text):
             yield f"frame.widget[{w}]", box
@@ -142,7 +146,8 @@ def _cells(panel: Panel, page: Page, group: Group, screen: Screen, width: float)
         if is_button(widget):
             height -= gap - GAP
             height = min(height, MAX_KEY_MM * screen.mm) if page.fit else height
-        yield Cell(column * span + gap * (span - 1), height, screen, SIZES[panel.text_size], page.fit)
+        width_of_widget, sizes = column * span + gap * (span - 1), SIZES[panel.text_size]
+        yield Cell(width_of_widget, height, screen, sizes, page.fit, fonts_of(panel))
 
 
 def _headings(panel: Panel, page: Page, number: int, screen: Screen, width: float) -> Iterator[Box]:

@@ -1,10 +1,12 @@
-"""The width of a text in CSS pixels, in the shipped fonts.
+"""The width of a text in CSS pixels, in the shipped fonts and those of a panel.
 
 `fonts.json` has the widths of the letters in thousandths of the font's size: `make fonts` writes it. A
 letter of neither font counts as wide as an average one of the system's.
 """
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -39,19 +41,36 @@ def letters(name: str, *, bold: bool) -> Letters:
     return Letters(widths, kerning)
 
 
+@dataclass(frozen=True, eq=False)
+class Fonts:
+    """The fonts of a page: the panel's own, regular and bold, then the shipped ones."""
+
+    regular: tuple[Letters, ...] = ()
+    bold: tuple[Letters, ...] = ()
+
+    def faces(self, *, bold: bool) -> Sequence[Letters]:
+        """A letter is of the first one that has it."""
+        own = self.bold if bold else self.regular
+        return (*own, letters(LATIN, bold=bold), letters(JAPANESE, bold=bold))
+
+
+SHIPPED: Final = Fonts()
+
+
 @lru_cache(maxsize=4096)
-def text_width(text: str, size: float, *, bold: bool = False) -> float:
+def text_width(text: str, size: float, fonts: Fonts = SHIPPED, *, bold: bool = False) -> float:
     """The width of a line of text whose font is `size` pixels high."""
-    latin, japanese = letters(LATIN, bold=bold), letters(JAPANESE, bold=bold)
-    total, last = 0, ""
+    faces = fonts.faces(bold=bold)
+    total, last, last_face = 0, "", None
     for sign in text:
-        if (width := latin.widths.get(sign)) is not None:
-            total += width + latin.kerning.get((last, sign), 0)
-        elif (width := japanese.widths.get(sign)) is not None:
-            total += width + japanese.kerning.get((last, sign), 0)
-        else:
+        face = next((face for face in faces if sign in face.widths), None)
+        if face is None:
             total += FULL if ord(sign) >= FULL_WIDTH else OTHER
-        last = sign
+        else:
+            total += face.widths[sign]
+            if face is last_face:
+                total += face.kerning.get((last, sign), 0)
+        last, last_face = sign, face
     return total * size / 1000
 
 

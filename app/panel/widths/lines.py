@@ -7,7 +7,14 @@ A browser that knows Japanese phrases breaks between them only, and may need a l
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from app.panel.widths.letters import SOFT_HYPHEN, ZERO_WIDTH_SPACE, is_full_width, text_width
+from app.panel.widths.letters import (
+    SHIPPED,
+    SOFT_HYPHEN,
+    ZERO_WIDTH_SPACE,
+    Fonts,
+    is_full_width,
+    text_width,
+)
 
 # No line begins, or ends, with these characters.
 NOT_FIRST: Final = frozenset(
@@ -54,26 +61,35 @@ def _may_end(sign: str, following: str, part: str) -> bool:
     return (is_full_width(sign) or is_full_width(following)) and following != " "
 
 
-def widest_piece(text: str, size: float, *, bold: bool) -> tuple[str, float]:
+def widest_piece(text: str, size: float, fonts: Fonts = SHIPPED, *, bold: bool) -> tuple[str, float]:
     """The part of a text that needs the widest line, and its width."""
     widths = {
-        piece.text: text_width(piece.text + piece.hyphen, size, bold=bold) for piece in pieces(text)
+        piece.text: text_width(piece.text + piece.hyphen, size, fonts, bold=bold)
+        for piece in pieces(text)
     }
     widest = max(widths, key=lambda part: widths[part], default="")
     return widest, widths.get(widest, 0.0)
 
 
-def line_count(text: str, width: float, size: float, *, bold: bool, indent: float = 0.0) -> int:
+def line_count(
+    text: str,
+    width: float,
+    size: float,
+    fonts: Fonts = SHIPPED,
+    *,
+    bold: bool,
+    indent: float = 0.0,
+) -> int:
     """How many lines a text has; the first one is shorter by `indent`. A part that is wider than a line
     has as many lines as it fills."""
     lines, room = 1, width - indent
     for piece in pieces(text):
-        needed = text_width(piece.text, size, bold=bold)
-        if needed + text_width(piece.hyphen, size, bold=bold) > room + NEAR and room < width:
+        needed = text_width(piece.text, size, fonts, bold=bold)
+        if needed + text_width(piece.hyphen, size, fonts, bold=bold) > room + NEAR and room < width:
             lines, room = lines + 1, width
         while needed > width + NEAR:
             lines, needed = lines + 1, needed - width
-        room -= needed + text_width(piece.end, size, bold=bold)
+        room -= needed + text_width(piece.end, size, fonts, bold=bold)
     return lines
 
 

@@ -62,7 +62,7 @@ def reason_texts(
             size,
             lines=lines,
             wraps=True,
-            indent=ICON + text_width(" ", size),
+            indent=ICON + text_width(" ", size, cell.fonts),
             after=more,
             after_bold=True,
             name="button",

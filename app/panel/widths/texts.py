@@ -132,7 +132,7 @@ def _figure(widget: Figure, cell: Cell) -> Iterator[Box]:
 def _beside(figure: Figure, cell: Cell) -> float:
     """The width of the lines beside the number, with the gap."""
     widths = [
-        text_width(text, cell.sizes.small if number else cell.sizes.label, bold=not number)
+        text_width(text, cell.sizes.small if number else cell.sizes.label, cell.fonts, bold=not number)
         for number, line in enumerate(figure.lines)
         for text in each_language(with_some_value(line.text)).values()
     ]
