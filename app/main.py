@@ -153,7 +153,7 @@ async def _app_state(
         kinds = {*KINDS} if settings.dev else used  # the gallery shows all
         static_files, templates = shipped_path("static"), shipped_path("templates")
         require_files(static_files, templates)
-        own = (panel.picture_files, panel.styles, panel.templates, panel.brand, panel.fonts)
+        own = (panel.shown_pictures, panel.styles, panel.templates, panel.brand, panel.fonts)
         assets = load_assets(
             static_files,
             templates,

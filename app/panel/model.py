@@ -34,7 +34,7 @@ from app.panel.widgets.recipe_load import RecipeLoad, loads_of
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
-from app.pictures import picture_files
+from app.pictures import picture_files, shipped_pictures
 
 Kind = TypeVar("Kind", bound=BaseWidget)
 
@@ -53,6 +53,13 @@ class Panel(PanelKeys):
     def picture_files(self) -> dict[str, Path]:
         """The files of the folder of pictures by their names."""
         return picture_files(self.pictures) if self.pictures else {}
+
+    @cached_property
+    def shown_pictures(self) -> dict[str, Path]:
+        """The pictures that it may show, by their names: its own and the shipped ones."""
+        return self.picture_files | {
+            name: file for name, file in shipped_pictures().items() if name not in self.picture_files
+        }
 
     @property
     def font_files(self) -> tuple[Path, ...]:

@@ -58,7 +58,7 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
             if condition is not None:
                 yield from condition_faults(f"{place}.{key}", condition, interfaces)
         yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
-        yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.picture_files)
+        yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.shown_pictures)
         yield from _source_faults(place, alarm, interfaces, panel.language)
 
 

@@ -29,8 +29,8 @@ def help_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def _picture_faults(place: str, name: str, panel: Panel) -> Iterator[Fault]:
-    if name not in panel.picture_files:
-        names = list_names(panel.picture_files) if panel.picture_files else "none"
+    if name not in panel.shown_pictures:
+        names = list_names(panel.shown_pictures)
         message = f'no picture "{name}" in the folder `pictures`; there is {names}'
         yield Fault(place, message, cause=f"picture {name}")
 

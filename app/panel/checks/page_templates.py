@@ -50,5 +50,5 @@ def _run(panel: Panel, page: Page) -> "tuple[PageParts | None, TemplateFault | N
     from app.panel.page_template import TemplateFault, run_template
 
     assert page.template is not None
-    result = run_template(page.template, page, panel.picture_files, panel.readers_languages)
+    result = run_template(page.template, page, panel.shown_pictures, panel.readers_languages)
     return (None, result) if isinstance(result, TemplateFault) else (result, None)

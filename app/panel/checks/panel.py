@@ -163,7 +163,7 @@ def _check_context(
         types=panel.subscriptions(),
         faulty=faulty,
         pages=[page.id for page in panel.pages],
-        pictures=panel.picture_files,
+        pictures=panel.shown_pictures,
         alarms={alarm.id: alarm.has_action for alarm in panel.alarms},
         alarm_groups=tuple(dict.fromkeys(str(a.group) for a in panel.alarms if a.group)),
     )

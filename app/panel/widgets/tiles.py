@@ -42,7 +42,7 @@ CONDITION, LOW_CONDITION = 42.0, 36.0
 CONDITIONS_WIDTH: Final = 200.0
 SEQUENCE_FRAME: Final = 33.0  # the line above the steps
 SEQUENCE_STEP, LOW_SEQUENCE_STEP = 46.0, 40.0
-SEQUENCE_PICTURE: Final = 80.0  # above the steps; on a narrow screen it is beside them
+SEQUENCE_PICTURE, LOW_PICTURE = 80.0, 64.0  # above the steps; on a narrow screen it is beside them
 SEQUENCE_WIDTH: Final = 240.0
 UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
 GAUGE_WIDTH: Final = 126.0
@@ -170,9 +170,10 @@ def _conditions_height(widget: Conditions, screen: Screen) -> float:
 
 
 def _sequence_height(widget: Sequence, screen: Screen) -> float:
-    row = LOW_SEQUENCE_STEP if screen.height <= LOW_SCREEN else SEQUENCE_STEP
-    has_picture = widget.has_picture and screen.width >= MIDDLE
-    picture = SEQUENCE_PICTURE if has_picture else 0.0
+    is_low = screen.height <= NO_NAMES
+    row = LOW_SEQUENCE_STEP if is_low else SEQUENCE_STEP
+    above = widget.has_picture and screen.width >= MIDDLE
+    picture = (LOW_PICTURE if is_low else SEQUENCE_PICTURE) if above else 0.0
     return SEQUENCE_FRAME + picture + widget.rows_at_most * row
 
 

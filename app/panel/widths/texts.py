@@ -245,7 +245,7 @@ def _joints(widget: Joints, cell: Cell) -> Iterator[Box]:
 def _sequence(widget: Sequence, cell: Cell) -> Iterator[Box]:
     beside = widget.has_picture and cell.screen.width < MIDDLE
     width = ((cell.width - 12) * 3 / 5 if beside else cell.width) - 12 - STEP_NUMBER
-    is_low = cell.screen.height <= LOW_SCREEN
+    is_low = cell.screen.height <= NO_NAMES
     height = 40.0 if is_low else 46.0
     yield Box("label", widget.label, TOP * cell.width, cell.sizes.text, bold=True)
     for place, step in widget.all_steps:
