@@ -16,7 +16,7 @@ from app.alarms.store import AlarmStore
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import ReusedPage, sized
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import Server
 from tests.web.test_alarms import HEALTHY, server_with
 
@@ -161,3 +161,23 @@ def test_an_alarm_that_chatters_is_shown_with_its_delay(tmp_path: Path, page: Pa
         expect(row).to_contain_text("5 in 40 s at ")
         expect(row).to_contain_text("off_delay_s = 9 would leave 1.")
         expect(row).to_contain_text("on_delay_s = 3 would leave 0.")
+
+
+@pytest.mark.parametrize("path", ["/alarms/history", "/log"])
+def test_the_keyboard_writes_what_to_search_for(cell: Server, touch_page: Page, path: str) -> None:
+    page = started(touch_page, cell.url + path)
+    for width, height in SIZES:
+        sized(page, width, height).evaluate(DRAWN)
+        text = page.locator("#text")
+        text.tap()
+        keyboard = page.locator(".sheet.keyboard")
+        expect(keyboard).to_be_visible()
+        keys, field = place(keyboard), place(text)
+        assert keys["y"] + keys["height"] <= height
+        assert field["y"] + field["height"] <= keys["y"] or keys["y"] + keys["height"] <= field["y"]
+        keyboard.get_by_role("button", name="q", exact=True).tap()
+        keyboard.locator(".set-entry").tap()
+        expect(keyboard).to_be_hidden()
+    expect(text).to_have_value(re.compile("^q+$", re.IGNORECASE))
+    page.locator("form.filter button[type=submit]").tap()
+    expect(page).to_have_url(re.compile(r"text=q+", re.IGNORECASE))
