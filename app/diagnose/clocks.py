@@ -10,6 +10,7 @@ from app.diagnose.findings import Report
 from app.diagnose.names import PanelRobot
 from app.diagnose.received import ReceivedSamples
 from app.errors import DecodeError, InterfaceError
+from app.i18n import say
 from app.interfaces import Interfaces
 from app.robot.sample import Sample
 
@@ -46,7 +47,7 @@ def _compare(report: Report, robot: str, about: str, offsets: Iterable[float]) -
     if abs(seconds) < APART_S:
         report.fact(f"the clock of {about} is within {APART_S:g} s of this machine's")
         return False
-    direction = "ahead of" if seconds > 0 else "behind"
+    direction = say("finding_ahead" if seconds > 0 else "finding_behind")
     report.find("clock_differs", about, robot=robot, seconds=f"{abs(seconds):.1f}", direction=direction)
     return True
 

@@ -1,5 +1,6 @@
 """The findings of `operator-panel doctor`: each has a stable code, a severity, what is wrong and what
-to do about it. A new finding is a row of `wording.py`; docs/how-to/doctor.md is made from them.
+to do about it. A new finding is a code in `wording.py` and its two sentences in the catalogue;
+docs/how-to/doctor.md is made from them.
 """
 
 from collections import Counter
@@ -8,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal, get_args
 
 from app.diagnose import wording
+from app.i18n import ENGLISH, Text, TextLike, render, say, sentences
 from app.printable import one_line
 
 MOST_ALIKE: Final = 20  # findings of one code about one robot; others are counted
@@ -23,29 +25,33 @@ SEVERITIES: Final[tuple[Severity, ...]] = get_args(Severity)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """`sentence` and `do` are sentences with `{name}` placeholders."""
+    """`sentence` and `do` are the English sentences, with `{name}` placeholders."""
 
     severity: Severity
     sentence: str
     do: str
 
 
-_ROWS: Final[Mapping[Severity, wording.Rows]] = {
+_CODES: Final[Mapping[Severity, Sequence[str]]] = {
     "error": wording.ERRORS,
     "warning": wording.WARNINGS,
     "note": wording.NOTES,
 }
 KINDS: Final[Mapping[str, Kind]] = {
-    code: Kind(severity, sentence, do)
-    for severity, rows in _ROWS.items()
-    for code, (sentence, do) in rows.items()
+    code: Kind(
+        severity,
+        sentences(ENGLISH)[wording.sentence_code(code)],
+        sentences(ENGLISH)[wording.remedy_code(code)],
+    )
+    for severity, codes in _CODES.items()
+    for code in codes
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
     """`about` is the name of what is wrong: a topic, an endpoint, a path. `robot` is the id of one of
-    several robots, "" where the panel has one."""
+    several robots, "" where the panel has one. A detail that a person reads may be a Text."""
 
     code: str
     about: str = ""
@@ -58,29 +64,42 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        return self._filled(KINDS[self.code].sentence)
+        return render(self.text)
 
     @property
     def do(self) -> str:
-        return self._filled(KINDS[self.code].do)
+        return render(say(wording.remedy_code(self.code), **self._params()))
+
+    @property
+    def text(self) -> Text:
+        """What is wrong."""
+        return say(wording.sentence_code(self.code), **self._params())
 
     @property
     def is_named(self) -> bool:
         """Whether the sentence has the name that it is about."""
         return not self.about or "{about}" in KINDS[self.code].sentence
 
-    def _filled(self, sentence: str) -> str:
-        """The sentence with its details. Texts of robots and other programs are made printable."""
-        details = {name: one_line(str(text), MOST_TEXT) for name, text in self.details.items()}
-        return sentence.format(about=one_line(self.about, MOST_TEXT), **details)
+    def _params(self) -> dict[str, TextLike]:
+        """The details. Texts of robots and other programs are made printable."""
+        return {
+            name: text if isinstance(text, Text) else one_line(str(text), MOST_TEXT)
+            for name, text in {**self.details, "about": self.about}.items()
+        }
 
-    def as_json(self) -> dict[str, str]:
+    def as_json(self) -> dict[str, Any]:
         finding = {
             "severity": self.severity,
             "code": self.code,
             "about": one_line(self.about, MOST_TEXT),
         }
-        return finding | {"robot": self.robot, "what": self.sentence, "do": self.do}
+        written = {
+            name: text.as_json() if isinstance(text, Text) else text
+            for name, text in self._params().items()
+            if name != "about"
+        }
+        told = {"robot": self.robot, "what": self.sentence, "do": self.do}
+        return finding | told | {"details": written}
 
 
 def few(names: Sequence[str]) -> str:

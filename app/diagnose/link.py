@@ -13,6 +13,7 @@ from typing import Final, Protocol
 from app.diagnose.findings import Report
 from app.dialect.dialect import Dialect
 from app.errors import LinkError, SettingsError
+from app.i18n import say
 from app.transport.admin_space import AdminSpace
 from app.transport.zenoh_config import config_from, endpoints_of
 from app.transport.zenoh_session import ZenohSession
@@ -42,7 +43,7 @@ def configured(report: Report, zenoh: Path, connect: Sequence[str], robot: str) 
         report.find("zenoh_config", str(zenoh), robot=robot, detail=" ".join(str(error).split()))
         return ()
     if not endpoints:
-        detail = f"{zenoh} names no endpoint to connect to: connect.endpoints is empty"
+        detail = say("finding_no_endpoint", file=str(zenoh))
         report.find("zenoh_config", str(zenoh), robot=robot, detail=detail)
     return endpoints
 
@@ -72,7 +73,12 @@ def connects(report: Report, endpoint: str, robot: str) -> bool:
     except ConnectionRefusedError:
         report.find("no_router", endpoint, robot=robot)
     except TimeoutError:
-        report.find("no_route", endpoint, robot=robot, detail=f"no connection within {CONNECT_S:g} s")
+        report.find(
+            "no_route",
+            endpoint,
+            robot=robot,
+            detail=say("finding_no_connection", seconds=f"{CONNECT_S:g}"),
+        )
     except OSError as error:
         detail = (error.strerror or str(error)).lower()
         report.find("no_route", endpoint, robot=robot, detail=detail)

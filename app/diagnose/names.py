@@ -6,6 +6,7 @@ from typing import Literal
 
 from app.dialect.dialect import DialectName
 from app.dialect.endpoint import within
+from app.i18n import TextLike, say
 from app.interfaces.names import GLOBAL, PARAMETER_EVENTS, SHARED_TOPICS, key_of, possible_keys
 from app.panel.model import Panel, RobotEntry
 from app.survey.forwarding import (
@@ -145,7 +146,7 @@ class PanelNames:
         keys = self.robot.possible_keys(name)
         return [route for graph in self.graphs for route in graph.routes if route.key in keys]
 
-    def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
+    def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> TextLike:
         """A sentence with similar names in the graph; "" if there are none."""
         there = [
             f"{graph.namespace}{server.name}"
@@ -156,7 +157,7 @@ class PanelNames:
         similar = [self._written(near_name) for near_name in near(f"/{self.robot.key(name)}", there)]
         if own and f"/{name}" not in similar and name in there:
             similar = [f"/{name}", *similar]  # the same name, not below the namespace
-        return f" Did you mean {' or '.join(similar)}?" if similar else ""
+        return say("finding_hint", names=tuple(similar)) if similar else ""
 
     def _written(self, whole: str) -> str:
         """A whole name as a panel file has it."""

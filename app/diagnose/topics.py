@@ -6,6 +6,7 @@ from typing import Final
 
 from app.diagnose.findings import Report
 from app.diagnose.names import PanelNames
+from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 from app.interfaces.names import Qos
 from app.panel.widgets.parameter import DESCRIBE, EVENTS, GET, SET
@@ -14,10 +15,10 @@ from app.robot.definitions import differs, own_hash
 from app.survey.forwarding import Forwarding, ServerList, TopicList
 from app.survey.model import Server, TopicEndpoint
 
-BEST_EFFORT: Final = "it is published best effort, and the panel asks for reliable."
-VOLATILE: Final = "it is published volatile, and the panel asks for transient local."
-WANTS_RELIABLE: Final = "its node asks for reliable, and the panel publishes best effort."
-WANTS_LATCHED: Final = "its node asks for transient local, and the panel publishes volatile."
+BEST_EFFORT: Final = say("finding_best_effort")
+VOLATILE: Final = say("finding_volatile")
+WANTS_RELIABLE: Final = say("finding_wants_reliable")
+WANTS_LATCHED: Final = say("finding_wants_latched")
 
 
 class TopicChecks:
@@ -158,7 +159,7 @@ class TopicChecks:
                 self._find("wrong_rmw", node, vendor=server.dds)
 
 
-def _misfit(subscriber: TopicEndpoint, qos: Qos) -> str:
+def _misfit(subscriber: TopicEndpoint, qos: Qos) -> TextLike:
     """Why a subscriber does not get what is published with this QoS; "" where it does."""
     if subscriber.qos.reliable and not qos.reliable:
         return WANTS_RELIABLE

@@ -44,7 +44,8 @@ LAST_LINE: Final = 300  # characters
 
 class FoundFault(BaseModel):
     """A finding of the doctor: the `sentence` of what is wrong, in JSON `what`, and what to `do`.
-    `about` names it, `robot` is the id of one of several."""
+    `about` names it, `robot` is the id of one of several. `details` are the values in both, each a text
+    or a sentence of the catalogue by its code."""
 
     severity: str
     code: str
@@ -52,6 +53,7 @@ class FoundFault(BaseModel):
     robot: str
     sentence: Annotated[str, Field(alias="what")]
     do: str
+    details: dict[str, Any] = Field(default_factory=dict, exclude=True)
 
 
 class DoctorReport(BaseModel):

@@ -250,6 +250,7 @@ def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.Captur
         "robot": "",
         "what": f"Another program listens on {at}, and it is not a panel server.",
         "do": KINDS["port_in_use"].do,
+        "details": {},
     }
 
 

@@ -25,6 +25,7 @@ PREFIXES = (
     "alarms_sort_",
     "condition_",
     "diagnostics_",
+    "finding_",
     "look_",
     "gauge_",
     "joint_",
@@ -96,7 +97,11 @@ def test_every_sentence_is_said_somewhere() -> None:
     sources += [path for path in shown if path.parent.name != "fonts"]
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
     ends = {
-        code: {code.removesuffix("_after").removeprefix(prefix) for prefix in ("", *PREFIXES)}
+        code: {
+            code.removesuffix("_after").removesuffix(doing).removeprefix(prefix)
+            for prefix in ("", *PREFIXES)
+            for doing in ("", "_do")
+        }
         for code in SENTENCES
     }
     assert [code for code, said in ends.items() if not words & said] == []

@@ -1,16 +1,19 @@
 """Values of the page of diagnostics as texts, in no language yet."""
 
+import json
 from typing import Any, Final
 
 from app.clock import format_age, format_time
 from app.dialect.peer_traits import EVERY_SENTENCES
-from app.i18n import Param, Text, TextLike, number, say
+from app.i18n import Param, Text, TextLike, number, render, say, text_in
 from app.runtime.doctor_process import FoundFault
 from app.view.diagnostic_rows import TopicRow
 
 NOTHING: Final = "–"
 LINK_FINDINGS: Final = frozenset(
-    code for sentences in EVERY_SENTENCES for code in (sentences.absent, sentences.silent)
+    code
+    for sentences in EVERY_SENTENCES
+    for code in (sentences.absent, sentences.silent, "link_two_kinds")
 )
 
 
@@ -58,9 +61,26 @@ def qos_words(row: TopicRow) -> TextLike:
 
 
 def finding_text(finding: FoundFault) -> TextLike:
-    """What is wrong, in the reader's language where it is about a link: as the page says it. Other
-    findings are in English."""
-    return say(finding.code) if finding.code in LINK_FINDINGS else finding.sentence
+    """What is wrong. In English if another version of the doctor says what this catalogue does not
+    have."""
+    code = finding.code if finding.code in LINK_FINDINGS else f"finding_{finding.code}"
+    return _said(finding, code) or finding.sentence
+
+
+def remedy_text(finding: FoundFault) -> TextLike:
+    """What to do about it."""
+    return _said(finding, f"finding_{finding.code}_do") or finding.do
+
+
+def _said(finding: FoundFault, code: str) -> TextLike:
+    """The sentence with the details of a finding; "" if the catalogue has none that they fit."""
+    stored = {"code": code, "params": {**finding.details, "about": finding.about}}
+    try:
+        text = text_in(json.dumps(stored))
+        render(text)
+    except (KeyError, ValueError):
+        return ""
+    return text
 
 
 def _short(qos: str) -> str:
@@ -88,6 +108,7 @@ TEXTS: Final[dict[str, Any]] = {
     "age_text": age_text,
     "qos_words": qos_words,
     "finding_text": finding_text,
+    "remedy_text": remedy_text,
     "undecodable_text": undecodable_text,
     "time_text": lambda wall: format_time(wall) if wall else NOTHING,
 }
