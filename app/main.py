@@ -187,7 +187,8 @@ async def _app_state(
 def _check_protected(settings: Settings, panel: Panel, server: ServerConfig | None) -> None:
     """SettingsError if a live panel would be open to the network. A demo moves nothing."""
     if mode_of(settings, panel) == "live":
-        check_protected(server, users_configured(data_folder(settings, panel)), settings.without)
+        has_users = panel.access.oidc is not None or users_configured(data_folder(settings, panel))
+        check_protected(server, has_users, settings.without)
 
 
 def _doctor(settings: Settings, server: ServerConfig | None) -> DoctorProcess:

@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from app.access.access_log import AccessLog, AccessLogWriter
 from app.access.delays import SignInDelays
+from app.access.oidc import ExternalUser, OidcSignIns
 from app.access.secret_checker import SecretChecker
 from app.access.secrets_hash import Cost, Way, cost_of_machine, memory_of_machine
 from app.access.sessions import Session, Sessions
-from app.access.users import Edit, User, UserBook
+from app.access.users import Edit, User, UserBook, rights_of
 from app.access.users_file import Loaded, Stamp, UsersFile
 from app.i18n import TextLike, say
 from app.panel.rules import AccessRules
@@ -75,6 +76,7 @@ class Access:
         self.fault: TextLike = ""
         self.book = UserBook()
         self.file = file
+        self.oidc = OidcSignIns(rules.oidc, rules.groups, monotonic) if rules.oidc else None
         self._reader = ThreadPoolExecutor(1, "users")
         self._stamp: Stamp | None = None
         self._monotonic = monotonic
@@ -85,8 +87,9 @@ class Access:
 
     @property
     def configured(self) -> bool:
-        """Whether clients have roles: there are users, or their file can't be read, which locks."""
-        return self.book.configured or bool(self.fault)
+        """Whether clients have roles: there are users, their file can't be read, which locks, or the
+        plant's provider has them."""
+        return self.book.configured or bool(self.fault) or self.oidc is not None
 
     @property
     def has_roles(self) -> bool:
@@ -124,10 +127,9 @@ class Access:
         return fault
 
     def _end_changed(self, before: UserBook) -> None:
-        """Ends the sessions of users who may do something else now. A changed secret ends them too."""
-        names = {
-            user.name for user in before.users if _rights(user) != _rights(self.book.user(user.name))
-        }
+        """Ends the sessions of users who may do something else now, or have another secret."""
+        now = {user.name: rights_of(user) for user in self.book.users}
+        names = {user.name for user in before.users if rights_of(user) != now.get(user.name)}
         for session in self.sessions.end_users(frozenset(names)):
             self._ended(session, "changed")
 
@@ -138,6 +140,9 @@ class Access:
         if bearer:
             return self._program(client, bearer)
         session = self.sessions.get(session_id, client.id) if session_id else None
+        if session is not None and session.role:
+            role = self._capped(client, session.role)
+            return Principal(client, session.user, role, session.groups)
         user = self.book.user(session.user) if session else None
         if user is None:
             return Principal(client, role=VIEWER)
@@ -184,7 +189,7 @@ class Access:
             self.book, attempt.name, attempt.way, attempt.secret, client.local
         )
         now = self.book.user(user.name) if user else None  # the file may have changed
-        if user is None or now is None or _rights(now) != _rights(user):
+        if user is None or now is None or rights_of(now) != rights_of(user):
             left = self.delays.tries_left(attempt.name, address)
             code = f"sign_in_wrong_{attempt.way}"
             wait_s = self.delays.wait_s(attempt.name, address)
@@ -195,20 +200,26 @@ class Access:
 
     async def _failed(self, client: Client, attempt: Attempt, code: str) -> None:
         user = self.book.user(attempt.name)
-        await self.log.failed(client, user.name if user else "", code)
+        await self.log.failed(client, user.name if user else "", say(code))
 
     async def sign_in(self, client: Client, attempt: Attempt) -> tuple[Checked, Session | None]:
         """Signs a user in at a browser, in place of the user who is signed in there."""
         checked = await self.check(client, attempt)
         if checked.user is None:
             return checked, None
+        return checked, self._begin(client, attempt.way, checked.user.name)
+
+    def sign_in_external(self, client: Client, user: ExternalUser) -> Session:
+        """Signs in a user whom the plant's provider has checked."""
+        return self._begin(client, "oidc", user.name, user.role, user.groups)
+
+    def _begin(self, client: Client, way: Way | Literal["oidc"], *about: Any) -> Session:
         if before := self.sessions.end_client(client.id):
             self._ended(before, "hand_over")
-        session = self.sessions.begin(checked.user.name, client)
-        who = self.principal(client, session.id)
-        self.log.signed_in(who, attempt.way)
+        session = self.sessions.begin(about[0], client, *about[1:])
+        self.log.signed_in(self.principal(client, session.id), way)
         self._changed()
-        return checked, session
+        return session
 
     def sign_out(self, session: Session) -> None:
         self.sessions.end(session)
@@ -282,11 +293,6 @@ class Access:
 
     def close(self) -> None:
         self.checker.close()
+        if self.oidc is not None:
+            self.oidc.close()
         self._reader.shutdown(wait=False, cancel_futures=True)
-
-
-def _rights(user: User | None) -> tuple[object, ...] | None:
-    """What a session depends on; None for a user who can't sign in."""
-    if user is None or user.disabled:
-        return None
-    return user.role, frozenset(user.groups), user.pin, user.password, user.badge

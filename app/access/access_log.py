@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final, Literal, Protocol
 
 from app.access.secrets_hash import Way
 from app.access.sessions import Session
@@ -16,7 +16,7 @@ from app.access.users import Change, UserBook
 from app.audit.entry import Entry, Origin, new_entry
 from app.audit.press_record import origin_of
 from app.errors import LogError
-from app.i18n import TextLike, say
+from app.i18n import Text, TextLike, say
 from app.permission.clients import Client
 from app.permission.principal import Principal
 
@@ -67,12 +67,13 @@ class AccessLogWriter:
         self._used_at: dict[str, float] = {}
         self._places: dict[str, Origin] = {}
 
-    def signed_in(self, who: Principal, way: Way) -> None:
+    def signed_in(self, who: Principal, way: Way | Literal["oidc"]) -> None:
         origin = origin_of(who)
         self._places[who.client.id] = origin
         at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._wall()))
-        self._state.last.users[who.user] = at
-        self._write()
+        if way != "oidc":
+            self._state.last.users[who.user] = at
+            self._write()
         reason = say(f"log_signed_in_{way}", name=who.user)
         self._add(
             new_entry(
@@ -91,7 +92,7 @@ class AccessLogWriter:
         except LogError as error:
             log.warning("%s is not in the operator's log: %s", entry.reason, error)
 
-    async def failed(self, client: Client, user: str, code: str) -> None:
+    async def failed(self, client: Client, user: str, reason: Text) -> None:
         """A failed sign-in, if the quota of refusals permits an entry. `user` is the name of a user
         that exists, else "": what was typed as a name may be a secret."""
         origin = origin_of(Principal(client))
@@ -100,7 +101,7 @@ class AccessLogWriter:
             return
         about = {"user": user} if user else {}
         await self._log.closed(
-            new_entry("access", origin, about, say(code), action="sign_in", outcome="refused")
+            new_entry("access", origin, about, reason, action="sign_in", outcome="refused")
         )
 
     def changes(self, book: UserBook) -> None:

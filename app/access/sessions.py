@@ -17,13 +17,16 @@ MOST: Final = 500
 @dataclass(slots=True)
 class Session:
     """`client` is the browser that has it. `touched_at` is monotonic seconds; `holds`
-    are the holds under way, during which it does not become idle."""
+    are the holds under way, during which it does not become idle. `role` and `groups` are those of a
+    user whom the plant's provider knows, "" for a user of the users' file."""
 
     user: str
     client: Client
     touched_at: float
     id: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
     holds: int = 0
+    role: str = ""
+    groups: frozenset[str] = frozenset()
 
 
 class Sessions:
@@ -35,10 +38,12 @@ class Sessions:
         self._monotonic = monotonic
         self._sessions: OrderedDict[str, Session] = OrderedDict()
 
-    def begin(self, user: str, client: Client) -> Session:
+    def begin(
+        self, user: str, client: Client, role: str = "", groups: frozenset[str] = frozenset()
+    ) -> Session:
         """A new session of this browser, in place of the one that it had."""
         self.end_client(client.id)
-        session = Session(user, client, self._monotonic())
+        session = Session(user, client, self._monotonic(), role=role, groups=groups)
         self._sessions[session.id] = session
         while len(self._sessions) > MOST:
             self._sessions.popitem(last=False)

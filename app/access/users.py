@@ -59,6 +59,13 @@ class User:
         return tuple(way for way in every if self.hash_of(way))
 
 
+def rights_of(user: User | None) -> tuple[object, ...] | None:
+    """What a session depends on; None for a user who can't sign in."""
+    if user is None or user.disabled:
+        return None
+    return user.role, frozenset(user.groups), user.pin, user.password, user.badge
+
+
 @dataclass(frozen=True, slots=True)
 class ApiToken:
     """A token of a program; `hash` is SHA-256 in hex."""

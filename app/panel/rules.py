@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.panel.base import Description, Id, Note, Seconds, TopicName
+from app.panel.oidc import OidcRules
 from app.pictures import PICTURE
 from app.roles import ENGINEER, ROLES
 
@@ -27,6 +28,7 @@ class AccessRules(Description):
         tuple[Annotated[Id, AfterValidator(_not_a_role)], ...], Field(strict=False, max_length=20)
     ] = ()
     remote: Literal["viewer", "operator", "maintenance", "engineer"] = ENGINEER
+    oidc: OidcRules | None = None
 
 
 class BrandRules(Description):

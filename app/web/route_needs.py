@@ -41,6 +41,8 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/session": ANYBODY,
     "/session/end": ANYBODY,
     "/session/here": ANYBODY,
+    "/session/oidc": ANYBODY,
+    "/session/oidc/back": ANYBODY,
     "/session/pad": ANYBODY,
     "/signin": ANYBODY,
     # Judged where they are made. A cancel stops, and needs nothing.

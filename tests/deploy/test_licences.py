@@ -40,7 +40,9 @@ def locked(lock: str) -> set[str]:
 
 
 SHIPPED: Final = locked("deploy/requirements.lock")
-EXTRAS: Final = {"paho-mqtt", "rosbags", "apsw", "numpy", "ruamel-yaml"}  # with the extras only
+EXTRAS: Final = {
+    "apsw", "authlib", "joserfc", "numpy", "paho-mqtt", "rosbags", "ruamel-yaml",
+}  # with the extras only  # fmt: skip
 TESTS: Final = locked("tests/requirements.lock")
 
 

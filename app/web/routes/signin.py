@@ -65,6 +65,7 @@ async def page(
         "by_password": by_password,
         "can_pin": "pin" in ways,
         "can_password": "password" in ways,
+        "oidc": say("signin_oidc", name=rules.name) if (rules := state.access.rules.oidc) else "",
         "has_badges": any(known.badge for known in book.users),
         "typed": len(state.access.typed_digits(who.client.id, chosen.name)) if chosen else 0,
         "failed": _said(state, refused, chosen.name if chosen else "", who.client.address, here),
@@ -116,6 +117,6 @@ def _said(state: AppState, refused: str, user: str, address: str, here: bool) ->
     if wait_s := state.access.delays.wait_s(user, key):
         return say("sign_in_wait", seconds=str(wait_s)) if refused else ""
     if refused not in WRONG:
-        return ""
+        return state.access.oidc.reason(refused) if state.access.oidc else ""
     left = str(state.access.delays.tries_left(user, key))
     return say("signin_tries_left", why=say(refused), count=left)

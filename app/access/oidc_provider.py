@@ -1,0 +1,236 @@
+"""The plant's OpenID Connect provider: its description, its keys, and the ID token of a code.
+
+Blocking, for a thread. The description and the keys are kept for ten minutes. Authlib and joserfc come
+with the extra `oidc`.
+"""
+
+import base64
+import importlib
+import json
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from http.client import HTTPException
+from pathlib import Path
+from typing import IO, Any, Final
+from urllib.error import HTTPError
+from urllib.parse import quote, urlencode
+from urllib.request import HTTPRedirectHandler, Request, build_opener
+
+from app.errors import KioskError
+from app.i18n import Text, say
+from app.panel.oidc import OidcRules, is_protected
+
+TIMEOUT_S: Final = 5.0  # of each step of a request
+WITHIN_S: Final = 10.0  # a whole answer
+KEPT_S: Final = 600.0
+KEYS_AGAIN_S: Final = 30.0  # between two fetches of the keys for a token whose key is not known
+AWAY_S: Final = 3.0  # for so long a failed fetch is not repeated
+MOST_BYTES: Final = 256 * 1024
+LEEWAY_S: Final = 60  # between the clocks
+ALGORITHMS: Final = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "Ed25519")
+DISCOVERY: Final = "/.well-known/openid-configuration"
+
+
+class OidcError(KioskError):
+    """A sign-in that failed; the text is a sentence for the page of sign-in. `why` is for the server's
+    log."""
+
+    status = 502
+
+    def __init__(self, text: Text, why: str = "") -> None:
+        super().__init__(text)
+        self.why = why
+        self.reason = text
+
+
+class _NoRedirect(HTTPRedirectHandler):
+    """Another address is not the provider."""
+
+    def redirect_request(
+        self, req: Request, fp: IO[bytes], code: int, msg: str, headers: Any, newurl: str
+    ) -> None:
+        return None
+
+
+class OidcProvider:
+    """Used on several threads."""
+
+    def __init__(
+        self,
+        rules: OidcRules,
+        monotonic: Callable[[], float] = time.monotonic,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self.rules = rules
+        self._monotonic = monotonic
+        self._wall = wall
+        self._lock = threading.Lock()
+        self._kept: dict[str, tuple[float, Any]] = {}  # by address: when it was fetched
+        self._away: tuple[float, str] = (-AWAY_S, "")
+        self._opener = build_opener(_NoRedirect)
+
+    @property
+    def why_away(self) -> str:
+        """Why the last fetch failed."""
+        return self._away[1]
+
+    def authorization_url(self, redirect_uri: str, state: str, nonce: str, verifier: str) -> str:
+        """Where the browser goes to sign in. The provider asks for the secret again, even if somebody
+        is signed in there: the one before may have left the panel."""
+        parameters = _authlib("oauth2.rfc6749.parameters")
+        challenge = _authlib("oauth2.rfc7636").create_s256_code_challenge(verifier)
+        url: str = parameters.prepare_grant_uri(
+            self._endpoint("authorization_endpoint"),
+            self.rules.client_id,
+            "code",
+            redirect_uri,
+            "openid profile",
+            state,
+            nonce=nonce,
+            code_challenge=challenge,
+            code_challenge_method="S256",
+            prompt="login",
+        )
+        return url
+
+    def claims(self, code: str, redirect_uri: str, nonce: str, verifier: str) -> Mapping[str, Any]:
+        """The checked claims of the ID token that a code stands for; OidcError for one that is not
+        valid."""
+        form = {
+            "grant_type": "authorization_code",
+            "code": code,
+            "redirect_uri": redirect_uri,
+            "client_id": self.rules.client_id,
+            "code_verifier": verifier,
+        }
+        headers, secret = {"accept": "application/json"}, self._secret()
+        methods = self._metadata().get("token_endpoint_auth_methods_supported") or []
+        if secret and methods and "client_secret_basic" not in methods:
+            form["client_secret"] = secret
+        elif secret:
+            pair = f"{quote(self.rules.client_id, safe='')}:{quote(secret, safe='')}"
+            headers["authorization"] = f"Basic {base64.b64encode(pair.encode()).decode()}"
+        answer = self._fetch(self._endpoint("token_endpoint"), urlencode(form).encode(), headers)
+        token = answer.get("id_token")
+        if not isinstance(token, str):
+            raise self._invalid("it has no ID token")
+        return self._checked(token, nonce)
+
+    def _checked(self, token: str, nonce: str) -> Mapping[str, Any]:
+        jose, jwt = importlib.import_module("joserfc.errors"), importlib.import_module("joserfc.jwt")
+        oidc = _authlib("oidc.core")
+        rules = self.rules
+        options = {
+            "iss": {"essential": True, "value": rules.issuer},
+            "aud": {"essential": True, "value": rules.client_id},
+        }
+        try:
+            decoded = self._decoded(jwt, token)
+            claims = oidc.CodeIDToken(
+                decoded.claims, decoded.header, options, {"nonce": nonce, "client_id": rules.client_id}
+            )
+            claims.validate(int(self._wall()), LEEWAY_S)
+        except (jose.JoseError, ValueError, TypeError, KeyError) as error:
+            raise self._invalid(f"{type(error).__name__}: {error}") from error
+        audience = claims["aud"] if isinstance(claims["aud"], list) else [claims["aud"]]
+        if len(audience) > 1 and claims.get("azp") != rules.client_id:
+            raise self._invalid("it is for several clients, and not named for this one")
+        checked: Mapping[str, Any] = dict(claims)
+        return checked
+
+    def _decoded(self, jwt: Any, token: str) -> Any:
+        """The token, its signature checked by the provider's keys. A key that is not known is fetched,
+        as providers renew theirs."""
+        jwk = importlib.import_module("joserfc.jwk")
+        try:
+            return jwt.decode(token, jwk.KeySet.import_key_set(self._keys(KEPT_S)), ALGORITHMS)
+        except Exception:
+            keys = self._keys(KEYS_AGAIN_S)
+            return jwt.decode(token, jwk.KeySet.import_key_set(keys), ALGORITHMS)
+
+    def _metadata(self) -> Mapping[str, Any]:
+        """The description of the provider."""
+        about: Mapping[str, Any] = self._cached(self.rules.issuer.rstrip("/") + DISCOVERY, KEPT_S)
+        if about.get("issuer") != self.rules.issuer:
+            raise self._invalid(f'its issuer is "{about.get("issuer")}"')
+        return about
+
+    def _keys(self, kept_s: float) -> Any:
+        return self._cached(self._endpoint("jwks_uri"), kept_s)
+
+    def _endpoint(self, name: str) -> str:
+        url = self._metadata().get(name)
+        if not isinstance(url, str) or not is_protected(url):
+            raise self._invalid(f"its {name} is not an https:// address")
+        return url
+
+    def _cached(self, url: str, kept_s: float) -> Any:
+        with self._lock:
+            at, content = self._kept.get(url, (float("-inf"), None))
+            if self._monotonic() - at < kept_s:
+                return content
+            failed_at, why = self._away
+            if self._monotonic() - failed_at < AWAY_S:
+                raise self._lost(why)
+            content = self._fetch(url)
+            self._kept[url] = self._monotonic(), content
+            return content
+
+    def _fetch(
+        self, url: str, data: bytes | None = None, headers: Mapping[str, str] = {}
+    ) -> dict[str, Any]:
+        """The JSON object that the provider answers; OidcError if it is away, refuses, or takes too
+        long."""
+        ends = time.monotonic() + WITHIN_S
+        request = Request(url, data, dict(headers))
+        try:
+            with self._opener.open(request, timeout=TIMEOUT_S) as answer:
+                content = b""
+                while part := answer.read1(65_536):
+                    content += part
+                    if len(content) > MOST_BYTES or time.monotonic() > ends:
+                        raise self._lost("its answer is too long")
+        except HTTPError as error:
+            with error:
+                if data is not None and 400 <= error.code < 500:
+                    raise OidcError(say("oidc_refused", name=self.rules.name), str(error)) from None
+                raise self._lost(f"HTTP {error.code}") from None
+        except (OSError, HTTPException) as error:
+            reason = getattr(error, "reason", error)
+            raise self._lost(str(getattr(reason, "strerror", None) or reason)) from error
+        try:
+            decoded = json.loads(content)
+        except ValueError:
+            decoded = None
+        if not isinstance(decoded, dict):
+            raise self._invalid("it is not a JSON object")
+        return decoded
+
+    def _secret(self) -> str:
+        """The secret of the client, "" for a public one."""
+        rules = self.rules
+        if rules.secret_env is not None and (secret := os.environ.get(rules.secret_env)):
+            return secret
+        if rules.secret_file is None:
+            return ""
+        try:
+            return Path(rules.secret_file).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise OidcError(say("oidc_secret", file=rules.secret_file), str(error)) from error
+
+    def _lost(self, why: str) -> OidcError:
+        self._away = self._monotonic(), why
+        return OidcError(say("oidc_away", name=self.rules.name, why=why), why)
+
+    def _invalid(self, why: str) -> OidcError:
+        return OidcError(say("oidc_invalid", name=self.rules.name), why)
+
+
+def _authlib(module: str) -> Any:
+    """A module of Authlib; OidcError without it."""
+    try:
+        return importlib.import_module(f"authlib.{module}")
+    except ImportError:
+        raise OidcError(say("oidc_not_installed")) from None
