@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from typing import Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page
 
+from tests.browser.test_widths_in_browser import opened
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server
@@ -73,8 +74,7 @@ def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -
     page.goto(server.url)
     paths = page.locator(".pages a").evaluate_all("(tabs) => tabs.map((tab) => tab.href)")
     for path in paths or [server.url]:
-        page.goto(path)
-        expect(page.locator("html[data-floor]")).to_be_attached()
+        opened(page, server, language, path.removeprefix(server.url))
         for width, height in SIZES:
             sized(page, width, height).evaluate(DRAWN)
             tabs = page.locator(".group-tab:visible")
