@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Literal
 
 from app.access.access_log import AccessLog, AccessLogWriter
@@ -33,6 +34,7 @@ DIGITS: Final = frozenset("0123456789")
 MOST_DIGITS: Final = 12
 TYPED_KEPT_S: Final = 60.0
 TYPED_KEPT: Final = 100  # browsers
+CheckedFor = Literal["sign_in", "confirm"]
 EndReason = Literal["sign_out", "hand_over", "idle", "changed"]
 
 
@@ -144,8 +146,10 @@ class Access:
             role = self._capped(client, session.role)
             return Principal(client, session.user, role, session.groups)
         user = self.book.user(session.user) if session else None
-        if user is None:
-            return Principal(client, role=VIEWER)
+        return self.person(client, user) if user else Principal(client, role=VIEWER)
+
+    def person(self, client: Client, user: User) -> Principal:
+        """This user at a browser."""
         return Principal(client, user.name, self._capped(client, user.role), frozenset(user.groups))
 
     def knows(self, bearer: str) -> bool:
@@ -166,7 +170,7 @@ class Access:
             return Principal(client, role=VIEWER)
         self.log.token_used(token.name)
         named = Client(public_id(token.hash), client.address, client.local, 0)
-        return Principal(named, token.name, self._capped(client, token.role))
+        return Principal(named, token.name, self._capped(client, token.role), program=True)
 
     def _capped(self, client: Client, role: str) -> str:
         """The role, or the panel's `remote` if that is lower and the client is on another machine."""
@@ -174,14 +178,18 @@ class Access:
             return role
         return ROLES[min(ROLES.index(role), ROLES.index(self.rules.remote))]
 
-    async def check(self, client: Client, attempt: Attempt) -> Checked:
-        """Checks a PIN, password or badge, with the delays after failures; logs a failure. TooMany if
-        others do that already."""
+    async def check(
+        self, client: Client, attempt: Attempt, action: CheckedFor = "sign_in", widget: str = ""
+    ) -> Checked:
+        """Checks a PIN, password or badge, with the delays after failures; logs a failure, with the
+        `widget` whose press it confirms. TooMany if others do that already."""
         if self.fault:
             return Checked(None, self.fault, "users_unreadable")
         address = "127.0.0.1" if client.local else client_key(client.address)
+        named = self.book.user(attempt.name)
+        failed = partial(self.log.failed, client, named.name if named else "", action, widget)
         if wait_s := self.delays.wait_s(attempt.name, address):
-            await self._failed(client, attempt, "sign_in_wait_logged")
+            await failed(say(f"{action}_wait_logged"))
             return Checked(None, say("sign_in_wait", seconds=str(wait_s)), "sign_in_wait", wait_s)
         self.checker.admit(client.local)
         self.delays.failed(attempt.name, address)
@@ -191,16 +199,12 @@ class Access:
         now = self.book.user(user.name) if user else None  # the file may have changed
         if user is None or now is None or rights_of(now) != rights_of(user):
             left = self.delays.tries_left(attempt.name, address)
-            code = f"sign_in_wrong_{attempt.way}"
+            code = f"{action}_wrong_{attempt.way}"
             wait_s = self.delays.wait_s(attempt.name, address)
-            await self._failed(client, attempt, code)
+            await failed(say(code))
             return Checked(None, say(code), code, wait_s, 0 if wait_s else left)
         self.delays.succeeded(attempt.name, address)
         return Checked(now)
-
-    async def _failed(self, client: Client, attempt: Attempt, code: str) -> None:
-        user = self.book.user(attempt.name)
-        await self.log.failed(client, user.name if user else "", say(code))
 
     async def sign_in(self, client: Client, attempt: Attempt) -> tuple[Checked, Session | None]:
         """Signs a user in at a browser, in place of the user who is signed in there."""

@@ -92,16 +92,19 @@ class AccessLogWriter:
         except LogError as error:
             log.warning("%s is not in the operator's log: %s", entry.reason, error)
 
-    async def failed(self, client: Client, user: str, reason: Text) -> None:
-        """A failed sign-in, if the quota of refusals permits an entry. `user` is the name of a user
-        that exists, else "": what was typed as a name may be a secret."""
+    async def failed(
+        self, client: Client, user: str, action: str, widget: str, reason: TextLike
+    ) -> None:
+        """A failed sign-in, or confirmation of a press of `widget`, if the quota of refusals permits an
+        entry. `user` is the name of a user that exists, else "": what was typed as a name may be a
+        secret."""
         origin = origin_of(Principal(client))
         if not self._log.allowed(origin):
             self._log.suppress(origin)
             return
         about = {"user": user} if user else {}
         await self._log.closed(
-            new_entry("access", origin, about, reason, action="sign_in", outcome="refused")
+            new_entry("access", origin, about, reason, action=action, widget=widget, outcome="refused")
         )
 
     def changes(self, book: UserBook) -> None:

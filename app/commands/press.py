@@ -10,6 +10,7 @@ from app.audit import Origin
 from app.audit.press_record import LoggedPress, PressAction, origin_of
 from app.panel.template import needed_inputs
 from app.panel.widgets.families import Command
+from app.permission.confirmations import ConfirmedBy
 from app.permission.principal import Principal
 from app.robot.command_status import FinalCheck, OnCorrection, no_check
 
@@ -26,7 +27,8 @@ class Press(Generic[Widget]):
     """A press or a hold of a widget by a client. A cancel has no id and no inputs.
 
     `inputs` are JSON values by input id. `seen` is the id of the last event that the operator saw, ""
-    if unknown. `at` is the time of the press in the server's time, None if unknown.
+    if unknown. `at` is the time of the press in the server's time, None if unknown. `confirmed` is who
+    confirmed it with a PIN, None for nobody.
     """
 
     id: str
@@ -35,6 +37,7 @@ class Press(Generic[Widget]):
     principal: Principal
     seen: str = ""
     at: float | None = None
+    confirmed: ConfirmedBy | None = None
 
     @property
     def origin(self) -> Origin:

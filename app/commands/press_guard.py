@@ -13,6 +13,7 @@ from app.commands.press import EVENT_ID, Press
 from app.errors import InputError
 from app.i18n import TextLike, number, say
 from app.panel.widgets.families import Command
+from app.permission.confirmations import UNKNOWN_USERS, ConfirmLocks
 from app.permission.control_authority import ControlAuthority
 from app.permission.press_permission import ServerConditions
 from app.permission.principal import Principal
@@ -39,10 +40,12 @@ class PressGuard:
         shared: Collection[str] = (),
         publisher_by_id: Callable[[str], ViewPublisher | None] = lambda _: None,
         needs: Mapping[str, frozenset[str]] = NO_NEEDS,
+        confirm_locks: ConfirmLocks = UNKNOWN_USERS,
     ) -> None:
         """`instance_ids`: those of the views of all robots. A press with another robot's is refused,
         unless its widget is on the pages of all (`shared`). `inhibited` returns the locks by alarms, by
-        the widgets' ids; `needs` has the roles and groups that a command needs, by its id."""
+        the widgets' ids; `needs` has the roles and groups that a command needs, by its id.
+        `confirm_locks` says why no person can confirm a press."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
@@ -52,6 +55,7 @@ class PressGuard:
         self._shared = shared
         self._publisher_by_id = publisher_by_id
         self._needs = needs
+        self._confirm_locks = confirm_locks
         self._ended = False
 
     def close(self) -> None:
@@ -68,7 +72,9 @@ class PressGuard:
     def conditions(self, who: Principal) -> ServerConditions:
         """The server's own locks for a client: shutdown, log, control, alarms."""
         control, lock = self._control.verdict(who), self._log.lock
-        return ServerConditions(control, lock, self._ended, who, self._inhibited(), self._needs)
+        return ServerConditions(
+            control, lock, self._ended, who, self._inhibited(), self._needs, self._confirm_locks
+        )
 
     def stale_reason(self, press: Press[Command]) -> TextLike:
         """Why the view that the operator saw is stale, "" if it is not. It is not if the press has

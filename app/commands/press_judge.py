@@ -11,6 +11,7 @@ from app.commands.receipts import MAX_FINAL_CHECKS, Refusal
 from app.errors import PressRefused
 from app.i18n import say
 from app.panel.model import Panel
+from app.panel.widgets.confirmed import confirmation_of
 from app.panel.widgets.families import Command
 from app.permission.press_permission import cause_of, judged, with_hint
 from app.permission.verdict import Verdict
@@ -62,6 +63,8 @@ class PressJudge:
         """The verdict of the permission's checks at `now` (monotonic seconds). Ingests nothing."""
         interlocks = self._panel.interlocks_of(press.widget)
         conditions = self._guard.conditions(press.principal)
+        if confirmation_of(press.widget):
+            conditions = replace(conditions, pressed=True, confirmed=press.confirmed)
         verdict = judged(press.widget, interlocks, self._robot, now, conditions)
         return with_hint(self._panel, press.widget, verdict)
 

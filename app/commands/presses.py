@@ -31,6 +31,7 @@ from app.commands.receipts import (
     outcome_text,
     receipt_of,
     refused_receipt,
+    with_confirmation,
 )
 from app.commands.refusals import EarlyRefusals
 from app.commands.repeated_after_restart import RepeatedPresses
@@ -158,7 +159,7 @@ class Presses:
             self._receipts.record_press(logged)
             with _always_closed(pending):
                 receipt = await self._judge_and_send(press, pending)
-            receipt = await close_entry(pending, receipt)
+            receipt = await close_entry(pending, with_confirmation(receipt, press))
         self._log_receipt(press, logged, receipt)
         return receipt
 

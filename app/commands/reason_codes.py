@@ -5,6 +5,7 @@ from typing import Final
 
 from app.dialect.peer_traits import EVERY_SENTENCES
 from app.i18n import BETWEEN, Text, TextLike
+from app.permission.confirmations import CONFIRMED_CODES
 
 # Sentences that only frame another one → the parameter with that sentence.
 FRAMES: Final[Mapping[str, str]] = {
@@ -16,7 +17,9 @@ FRAMES: Final[Mapping[str, str]] = {
     "log_not_on_disk": "said",
 }
 # They follow a reason and are none themselves.
-ADVICE: Final = frozenset(s.timeout_hint for s in EVERY_SENTENCES if s.timeout_hint)
+ADVICE: Final = frozenset(
+    {*(s.timeout_hint for s in EVERY_SENTENCES if s.timeout_hint), *CONFIRMED_CODES}
+)
 
 
 def reason_code(reason: TextLike) -> str | None:

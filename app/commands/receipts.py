@@ -13,7 +13,7 @@ from app.clock import format_time
 from app.commands.press import Press
 from app.commands.reason_codes import reason_code
 from app.errors import Cause
-from app.i18n import TextLike, render, say
+from app.i18n import TextLike, joined, render, say
 from app.panel.widgets.families import Command, EntryWidget
 from app.robot.command_status import GOOD_OUTCOMES as GOOD_OUTCOMES
 from app.robot.command_status import Outcome, OutcomeCode
@@ -134,6 +134,13 @@ def receipt_of(press: Press[Command], answer: Outcome, cause: Cause = "") -> Rec
     return Receipt(
         press.id, press.widget.id, *outcome, inputs, press.fingerprint, _if_short(press.inputs)
     )
+
+
+def with_confirmation(receipt: Receipt, press: Press[Command]) -> Receipt:
+    """The receipt, with who confirmed its press; as it is if nobody did, or if it was refused."""
+    if press.confirmed is None or receipt.outcome == "refused":
+        return receipt
+    return replace(receipt, reason=joined((receipt.reason, press.confirmed.said)))
 
 
 def refused_receipt(press: Press[Command], refusal: Refusal, sentence: str = "refused") -> Receipt:

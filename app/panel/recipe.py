@@ -50,6 +50,7 @@ class RecipeSet(Description):
         tuple[Id, ...], Field(strict=False, max_length=MAX_FIELDS), AfterValidator(non_empty)
     ]
     interlocks: Interlocks = Field(default=(), alias="interlock")
+    confirm_press: Literal["pin", "two_persons"] | None = None
     topic: TopicName | None = None
     service: TopicName | None = None
     node: NodeName | None = None

@@ -10,14 +10,15 @@ UniformButtons = dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]
 
 
 def uniform_buttons(commands: Iterable[Command], alarms: Iterable[Alarm]) -> UniformButtons:
-    """Buttons that publish and that no alarm locks, by their interlocks and whether they stop: many
-    are judged as one, as these and the graph decide their lock, which is all that is shown."""
+    """Buttons that publish, that no alarm locks and that no person confirms, by their interlocks and
+    whether they stop: many are judged as one, as these and the graph decide their lock, which is all
+    that is shown."""
     inhibited = {widget for alarm in alarms for widget in alarm.inhibits}
     groups: UniformButtons = {}
     for widget in commands:
         if not isinstance(widget, PublishPress) or widget.shows_more:
             continue
-        if widget.id not in inhibited:
+        if widget.id not in inhibited and not widget.confirmation:
             key = widget.interlocks, widget.role == "stop"
             groups[key] = (*groups.get(key, ()), widget)
     return groups

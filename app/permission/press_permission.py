@@ -14,8 +14,11 @@ from app.errors import Cause
 from app.i18n import TextLike
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
+from app.panel.widgets.confirmed import confirmation_of
 from app.panel.widgets.families import Command
 from app.panel.widgets.templated import is_stop, needs_control
+from app.permission.confirmations import LOCK_CODES as CONFIRM_CODES
+from app.permission.confirmations import UNKNOWN_USERS, ConfirmedBy, ConfirmLocks, unconfirmed
 from app.permission.interlocks import (
     LINK_CODES,
     blocked_buttons,
@@ -37,6 +40,8 @@ class ServerConditions:
     `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
     whether the client has control. `who` is None in a question for all clients. `inhibited`: the locks
     by alarms, by the widgets' ids. `needs`: the roles and groups that a command needs, by its id.
+    `confirm_locks`: why no person can confirm a press. `pressed`: the question is about a press, which
+    a person has `confirmed`, or None.
     """
 
     control: Verdict = PERMITTED
@@ -45,6 +50,9 @@ class ServerConditions:
     who: Principal | None = None
     inhibited: Mapping[str, Verdict] = field(default_factory=dict, hash=False)
     needs: Mapping[str, frozenset[str]] = field(default_factory=dict, hash=False)
+    confirm_locks: ConfirmLocks = field(default=UNKNOWN_USERS, hash=False)
+    pressed: bool = False
+    confirmed: ConfirmedBy | None = None
 
 
 NO_CONDITIONS: Final = ServerConditions()
@@ -82,6 +90,18 @@ def _role(request: PermissionRequest) -> Verdict | None:
     return role_verdict(request.grounds.needs.get(request.widget.id, ()), who)
 
 
+def _confirmation(request: PermissionRequest) -> Verdict | None:
+    """Locks what a person confirms, if nobody can, or if nobody has confirmed this press."""
+    confirmation, grounds = confirmation_of(request.widget), request.grounds
+    if not confirmation:
+        return None
+    if lock := grounds.confirm_locks.of(request.widget.id):
+        return lock
+    if not grounds.pressed or grounds.who is None:
+        return None
+    return unconfirmed(confirmation, grounds.who, grounds.confirmed)
+
+
 def _ending(request: PermissionRequest) -> Verdict | None:
     return locked("server_shutting_down") if request.grounds.ending else None
 
@@ -98,6 +118,8 @@ def _control(request: PermissionRequest) -> Verdict:
 
 CHECKS: Final = (
     Check("role", _role, alike=True),
+    # Uniform buttons are those that no person confirms and no alarm locks.
+    Check("confirmation", _confirmation, alike=True),
     Check("link", lambda request: request.link, alike=True),
     Check("ending", _ending, alike=True),
     Check("log", _log, alike=True),
@@ -114,7 +136,6 @@ CHECKS: Final = (
         alone=False,
         alike=True,
     ),
-    # Uniform buttons are those that no alarm locks.
     Check(
         "alarms",
         lambda request: request.grounds.inhibited.get(request.widget.id),
@@ -137,7 +158,7 @@ CAUSES: Final[Mapping[str, Cause]] = {
         "link",
     ),
     "log": "log",
-    ROLE_LOCK: "role",
+    **dict.fromkeys((ROLE_LOCK, *CONFIRM_CODES), "role"),
 }
 
 

@@ -13,13 +13,14 @@ class Principal:
 
     `client` is the browser or program. `user` is the name of the user who is signed in, "" for nobody.
     `role` is one of `ROLES`, `groups` are the panel's own groups that the user is in. While there are
-    no users, everybody is an engineer.
+    no users, everybody is an engineer. `program`: it has a token, and no person is there.
     """
 
     client: Client
     user: str = ""
     role: str = ENGINEER
     groups: frozenset[str] = frozenset()
+    program: bool = False
 
     def meets(self, needs: str) -> bool:
         """Whether this principal has the role or is in the group `needs`; "" needs nothing."""

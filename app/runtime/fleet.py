@@ -17,6 +17,7 @@ from app.errors import NotFound
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import widget_robots
+from app.permission.confirmations import ConfirmLocks
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.runtime.alarms import Alarms
@@ -63,6 +64,7 @@ class Fleet:
         self._sessions: dict[str | None, RobotSession] = {}
         self.alarms = Alarms(panel)
         self.recipes = Recipes(panel)
+        self.confirm_locks = ConfirmLocks()  # locked until the users are known
         self.states: Path | None = None  # the file of the machine's states
         server = ServerParts(
             panel,
@@ -75,6 +77,7 @@ class Fleet:
             self.alarms,
             doctor or NoDoctor(),
             self.recipes,
+            self.confirm_locks,
         )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]

@@ -22,6 +22,7 @@ from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import panel_of, widget_robots
 from app.panel.widgets.trend import trends_of
+from app.permission.confirmations import UNKNOWN_USERS, ConfirmLocks
 from app.permission.control_authority import ControlAuthority
 from app.robot.log_lines import LogListener
 from app.robot.slices import Slices
@@ -69,6 +70,7 @@ class ServerParts:
     alarms: Alarms | None = None
     doctor: Doctor = field(default_factory=NoDoctor)
     recipes: Recipes | None = None
+    confirm_locks: ConfirmLocks = UNKNOWN_USERS
 
 
 def wire_session(
@@ -108,6 +110,7 @@ def wire_session(
         recipes.revisions,
         pages,
         needs,
+        server.confirm_locks,
     )
     refresher = ViewRefresher(panel, robot, server.revision, sources)
     publisher = refresher.publisher
@@ -121,6 +124,7 @@ def wire_session(
         robots,
         others.publisher,
         needs.commands,
+        server.confirm_locks,
     )
     press_log = PressLog(operators_log, robot.name, lambda: publisher.id)
     act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)

@@ -17,6 +17,7 @@ from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.panel.widgets.families import DisplayWidget
+from app.permission.confirmations import UNKNOWN_USERS, ConfirmLocks
 from app.permission.control_authority import ControlAuthority
 from app.permission.verdict import Verdict
 from app.robot.state import RobotState
@@ -98,6 +99,7 @@ class ViewSources:
     recipes: Callable[[], Mapping[str, int]] = dict
     pages: Mapping[str, Collection[str]] | None = None  # of all robots
     needs: PanelNeeds = NO_NEEDS  # of all robots
+    confirm_locks: ConfirmLocks = UNKNOWN_USERS
 
     def context(self) -> ViewContext:
         """The context of a view that is built now."""
@@ -114,6 +116,7 @@ class ViewSources:
             alarms=self.alarms(),
             inhibited=self.inhibited(),
             recipes=self.recipes(),
+            confirm_locks=self.confirm_locks,
         )
 
 

@@ -14,6 +14,7 @@ from app.i18n import Text, TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
+from app.permission.confirmations import UNKNOWN_USERS, ConfirmLocks
 from app.permission.control_authority_view import NO_CONTROL, ControlView, for_role
 from app.permission.interlocks import interlock_verdict, link_verdict
 from app.permission.press_permission import NO_CONDITIONS, ServerConditions, permissions
@@ -87,7 +88,7 @@ class ViewContext(NamedTuple):
     `robots` has the lamp of each robot if the panel has several. `fault` is shown above the page,
     `log_lock` locks all commands; "" for none. `control_lock` locks for clients without control; time
     alone changes `control` at `control_until` (monotonic seconds). `inhibited` has the locks by alarms,
-    by the widgets' ids.
+    by the widgets' ids, `confirm_locks` those of presses that nobody can confirm.
     """
 
     robots: Mapping[str, Lamp] = {}
@@ -100,6 +101,7 @@ class ViewContext(NamedTuple):
     alarms: AlarmsView = NO_ALARMS
     inhibited: Mapping[str, Verdict] = {}
     recipes: Mapping[str, int] = {}
+    confirm_locks: ConfirmLocks = UNKNOWN_USERS
 
 
 ALONE: Final = ViewContext()  # one robot, its log is written, and control is not required
@@ -112,8 +114,12 @@ def build_view(
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now, passable) for i in panel.every_interlock}
     grounds = NO_CONDITIONS
-    if context.log_lock or context.inhibited:
-        grounds = ServerConditions(log_lock=context.log_lock, inhibited=context.inhibited)
+    if context.log_lock or context.inhibited or context.confirm_locks is not UNKNOWN_USERS:
+        grounds = ServerConditions(
+            log_lock=context.log_lock,
+            inhibited=context.inhibited,
+            confirm_locks=context.confirm_locks,
+        )
     verdicts = permissions(panel, robot, now, passable, interlocks, grounds)
     failures: dict[str, Exception] = {}
     uniform = _uniform(panel, robot, now, verdicts, failures)

@@ -8,6 +8,7 @@ from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
 
 from app.access.access import Access
+from app.access.confirmer import Confirmer
 from app.audit import NullLog, OperatorLog
 from app.audit.press_record import PressLog
 from app.commands.acts import ActContext, ActRunner
@@ -40,11 +41,13 @@ class AppState:
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
     user_acts: ActRunner[Access] = field(init=False)
+    confirmer: Confirmer = field(init=False)
 
     def __post_init__(self) -> None:
         guard, nothing_shown = self.fleet.first.press_guard, lambda: None
         context = ActContext(guard, PressLog(self.log), "", nothing_shown)
         self.user_acts = ActRunner("access", USER_ACTS, self.access, context)
+        self.confirmer = Confirmer(self.access)
 
     @property
     def root(self) -> str:

@@ -28,7 +28,7 @@ SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds 
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
 OWN_PAGES: Final = (
     "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "diagnostics", "recipes", "help",
-    "overview", "signin", "users",
+    "overview", "signin", "users", "confirm",
 )  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it

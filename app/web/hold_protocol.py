@@ -15,6 +15,8 @@ had it: so each one's age is known. Without an answer no browser shows that some
 A joystick's beats have its deflection, `x` to the right and `y` to the front, each from -1 to 1; the
 answer has `moves`, what was sent of it. One out of these limits is no message, and ends the hold.
 
+A begin may have a `confirmation`, for a widget whose press a person confirms.
+
 An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
 a begin, too, and is answered as any other.
 """
@@ -28,6 +30,7 @@ from app.commands.holds.deflection import Deflection
 from app.commands.holds.receipts import RELEASED
 from app.commands.press import EVENT_ID
 from app.errors import InputError
+from app.web.confirmations import LONGEST_TOKEN
 from app.web.request_body import json_of
 
 # What a browser may say of why it ends a hold → the code of the sentence.
@@ -61,6 +64,7 @@ class Begin(HoldMessage):
     do: Literal["begin"]
     inputs: dict[str, JsonValue]
     seen: Annotated[str, Field(pattern=EVENT_ID)]
+    confirmation: Annotated[str, Field(max_length=LONGEST_TOKEN)] = ""
 
 
 class Beat(HoldMessage):

@@ -48,6 +48,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     # Judged where they are made. A cancel stops, and needs nothing.
     "/widgets/{widget}": ANYBODY,
     "/widgets/{widget}/cancel": ANYBODY,
+    "/widgets/{widget}/confirm": ANYBODY,
     "/widgets/{widget}/hold": ANYBODY,
     "/presses": ANYBODY,
     "/alarms/acknowledge": ANYBODY,

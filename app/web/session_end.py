@@ -1,11 +1,19 @@
 """What follows when a user is no longer signed in at a browser."""
 
+import logging
 from functools import partial
 
 from app.access.access import EndReason
+from app.access.confirmer import able_users
 from app.access.sessions import Session
+from app.panel.widgets.confirmed import confirmation_of
+from app.permission.confirmations import confirm_lock
 from app.permission.principal import Principal
+from app.permission.role_locks import hardest, role_name
+from app.permission.verdict import Verdict
 from app.web.app_state import AppState
+
+log = logging.getLogger("kiosk.access")
 
 
 def renew_audiences(state: AppState) -> None:
@@ -24,7 +32,29 @@ def release_control(state: AppState, session: Session, reason: EndReason) -> Non
             robot.show()
 
 
+def renew_confirm_locks(state: AppState) -> None:
+    """Presses that nobody, or too few users, can confirm are locked, and unlocked when they can."""
+    panel, users = state.fleet.panel, able_users(state.access)
+    locks: dict[str, Verdict] = {}
+    for command in panel.commands:
+        needs = panel.needs.commands[command.id]
+        if confirmation := confirmation_of(command):
+            role = role_name(hardest(needs))
+            if lock := confirm_lock(confirmation, needs, users, role):
+                locks[command.id] = lock
+    if locks == state.fleet.confirm_locks.verdicts:
+        return
+    before, state.fleet.confirm_locks.verdicts = state.fleet.confirm_locks.verdicts, locks
+    for name, lock in locks.items():
+        if (before or {}).get(name) != lock:
+            log.warning('widget "%s" is locked: %s', name, lock.reason)
+    for robot in state.fleet.sessions:
+        robot.show()
+
+
 def follow_users(state: AppState) -> None:
     """Has control released and the browsers' views renewed when users sign in or out."""
+    renew_confirm_locks(state)
+    state.access.on_change(partial(renew_confirm_locks, state))
     state.access.on_end(partial(release_control, state))
     state.access.on_change(partial(renew_audiences, state))

@@ -1,6 +1,7 @@
 // Hold-to-run, by a key or a joystick: acts while it is held. Every event that may mean a release ends the hold, and
 // only a new press starts another one. The page shows the server's response, nothing else.
 import { enteredValues } from "./entries.js";
+import { HoldProof } from "./hold-proof.js";
 import { showOutcome } from "./receipts.js";
 import { find } from "./show.js";
 
@@ -15,6 +16,7 @@ export class Holding {
   button;
   /** @type {import("./source.js").Source} */
   #source;
+  #proof;
   /** @type {WebSocket | null} */
   #socket = null; // of the current hold; null without one
   #lease = "";
@@ -34,6 +36,7 @@ export class Holding {
     this.root = root;
     this.button = find(root, "button.hold");
     this.#source = source;
+    this.#proof = new HoldProof(root, (outcome, reason) => this.#show(outcome, reason));
     // A long touch must not open a menu; pointer events arrive all the same.
     this.button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     this.button.addEventListener("dragstart", (event) => event.preventDefault());
@@ -67,6 +70,11 @@ export class Holding {
   }
 
   begin() {
+    if (this.#proof.isMissing) {
+      this.pointer = this.key = null;
+      return void this.#proof.ask();
+    }
+    const proof = this.#proof.take();
     this.root.dataset.hold = "asked";
     this.#show("", "");
     this.#lease = "";
@@ -83,7 +91,8 @@ export class Holding {
       const message = JSON.parse(data);
       this.#stamp = message.stamp;
       this.#stampedAt = performance.now();
-      if (!begun && isCurrent) this.#send(socket, { do: "begin", inputs: enteredValues(), seen: this.#source.seen });
+      const begin = { do: "begin", inputs: enteredValues(), seen: this.#source.seen, ...proof };
+      if (!begun && isCurrent) this.#send(socket, begin);
       else if (!begun) this.#send(socket, { do: "end", why: this.#ending.get(socket) });
       begun = true;
       if (message.state === "held") isCurrent && this.#held(socket, message);

@@ -120,8 +120,11 @@ export class Presser {
     if (isCancel) click.press = byPointer ? this.#downValue : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
     Object.assign(inputs, hooksOf(root).values?.(button, byPointer ? this.#downValue : button.value));
-    if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
-    else this.#confirm(root, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
+    const asks = root.querySelector("dialog.ask") || pageGuard.page.confirms.includes(root.dataset.widget ?? "");
+    /** @param {Event} yes @param {object} [proof] */
+    const answered = (yes, proof) => this.#press(root, button, inputs, { ...this.#moment(yes), ...proof });
+    if (isCancel || !asks) this.#press(root, button, inputs, click);
+    else this.#confirm(root, answered, button, inputs);
   }
 
   // The view at an event, and the event's time by the server's clock.

@@ -74,7 +74,7 @@ type Lamp = { state: string; text: string; since?: string; locks?: string; reaso
 type Show = (root: HTMLElement, value: Data) => void;
 type Handlers = Record<string, (data?: Data) => void>;
 
-type Click = { seen: string | null; at: string; press?: string };
+type Click = { seen: string | null; at: string; press?: string; confirmation?: string };
 type Press = Click & { id: string; inputs: Record<string, Data>; widget?: string };
 type Receipt = { outcome: string; reason: string; id?: string };
 type Entry = HTMLInputElement | HTMLSelectElement;
@@ -141,5 +141,6 @@ interface PageData {
   dimAfterS: number | null;
   sections: string[];
   kinds: string[];
+  confirms: string[];
   sentences: Record<string, string>;
 }

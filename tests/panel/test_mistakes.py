@@ -143,9 +143,8 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
         own |= {"grow": True, "show_label": False, "robot": "r1"}  # of any kind, but of few widgets
         own |= {"needs": "operator"} if issubclass(model, Command) else {}
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
-        # A switch switches back; options are the file's or the robot's.
+        # Options are the file's or the robot's.
         refused = {
-            "switch": ["confirm_press", "consequence"],
             "select": ["options_from"],
             "trend": ["right_min", "right_max"],  # its pen is on the left
         }.get(kind, [])

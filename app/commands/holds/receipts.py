@@ -20,6 +20,7 @@ from app.commands.receipts import (
     outcome_text,
     receipt_of,
     refused_receipt,
+    with_confirmation,
 )
 from app.dialect.peer_traits import PeerSentences
 from app.i18n import Text, TextLike, joined, number, say
@@ -82,7 +83,7 @@ class HoldReceipts:
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
                 press.id, press.widget.id, origin_text(press.origin), seconds, holding.sent,
                 code, text)  # fmt: skip
-        return self._recorded(receipt_of(press, Outcome(outcome, text)))
+        return self._recorded(with_confirmation(receipt_of(press, Outcome(outcome, text)), press))
 
     def record_refusal(self, press: Press[HoldCommand], refusal: Refusal) -> Receipt:
         """The receipt of a hold that may not begin, logged and recorded."""

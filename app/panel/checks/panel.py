@@ -10,7 +10,7 @@ from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.languages import language_faults
 from app.panel.checks.look import brand_faults, grow_faults, help_faults, label_faults
 from app.panel.checks.names import spelling_faults
-from app.panel.checks.needs import needs_faults
+from app.panel.checks.needs import confirmation_faults, needs_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.recipes import recipe_faults
 from app.panel.checks.robots import (
@@ -85,6 +85,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from grow_faults(panel)
     yield from label_faults(panel)
     yield from needs_faults(panel)
+    yield from confirmation_faults(panel)
     yield from brand_faults(panel)
     yield from help_faults(panel)
     yield from language_faults(panel)

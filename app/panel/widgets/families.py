@@ -32,6 +32,7 @@ from app.panel.base import (
 from app.panel.checks.types import field_faults, whole_field
 from app.panel.faults.wording import list_names
 from app.panel.field_paths import FieldPath
+from app.panel.widgets.confirmed import Confirmed
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, SIGNS, KeyColour, KeyRole
 from app.panel.widgets.sent_message import SentMessage
 
@@ -268,11 +269,8 @@ class KeyCommand(Command):
         yield from super().faults(place, checking)
 
 
-class PressCommand(Command):
-    """A command that one press sends; with `confirm_press` the page asks, and says `consequence`."""
-
-    confirm_press: bool = False
-    consequence: Label | None = None
+class PressCommand(Confirmed, Command):
+    """A command that one press sends."""
 
     @property
     @abstractmethod

@@ -15,6 +15,7 @@ from app.panel.checks.types import type_fault
 from app.panel.field_paths import WrittenField
 from app.panel.template import set_field
 from app.panel.values import number_text
+from app.panel.widgets.confirmed import Confirmed
 from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand
 from app.panel.widgets.roles import KeyRole
 from app.panel.widgets.sent_message import SentMessage
@@ -23,7 +24,7 @@ DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64
 COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
-class HoldCommand(KeyCommand, PublishCommand):
+class HoldCommand(Confirmed, KeyCommand, PublishCommand):
     """Publishes a message `rate_hz` times a second while its key is held, and another one once after.
 
     `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
@@ -101,6 +102,9 @@ class HoldCommand(KeyCommand, PublishCommand):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
+        if self.asks:
+            message = 'asks nothing of a hold, which ends with the finger: "pin" or "two_persons" do'
+            yield Fault(f"{place}.confirm_press", message)
         try:
             checking.interfaces.require(self.type)
         except InterfaceError as error:

@@ -131,6 +131,8 @@ def loads_of(tables: Iterable[RecipeSet], widgets: Iterable[BaseWidget]) -> tupl
 
 def _load_of(table: RecipeSet, inputs: Mapping[str, Input]) -> RecipeLoad:
     keys: dict[str, Any] = {"id": table.id, "label": table.label, "interlocks": table.interlocks}
+    if table.confirm_press:
+        keys["confirm_press"] = table.confirm_press
     fields = tuple(inputs[name] for name in table.fields if name in inputs)
     return RecipeLoad.model_construct(None, kind="recipe", table=table, inputs=fields, **keys)
 

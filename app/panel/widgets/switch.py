@@ -148,8 +148,11 @@ class Switch(EntryWidget, PartedCommand):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
-        if self.confirm_press:
-            reason = "is not for a switch: a touch on the other position switches back"
+        if self.asks:
+            reason = (
+                "asks nothing of a switch, as a touch on the other position switches back: "
+                '"pin" or "two_persons" do'
+            )
             yield Fault(f"{place}.confirm_press", reason)
         if (self.topic is None) == (self.service is None):
             message = (

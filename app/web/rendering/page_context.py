@@ -42,7 +42,7 @@ from app.web.rendering.display_choice import (
     display_of,
     language_choice,
 )
-from app.web.rendering.page_data import page_json, panel_data
+from app.web.rendering.page_data import confirmed_commands, page_json, panel_data
 from app.web.rendering.page_words import page_words
 from app.web.rendering.sign_in_words import SignedIn, signed_in
 
@@ -91,6 +91,7 @@ class PageContext(TypedDict):
     alarm_refused: TextLike
     own_path: str
     me: SignedIn
+    confirms: bool
 
 
 def page_context(
@@ -166,6 +167,7 @@ def page_context(
         is_recipes=is_recipes,
         own_path=own_path,
         me=signed_in(state, who),
+        confirms=bool(confirmed_commands(panel, page)),
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",

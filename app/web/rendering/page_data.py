@@ -9,6 +9,8 @@ from markupsafe import Markup
 from app.i18n import localized, say
 from app.panel.layout import Page
 from app.panel.model import Panel
+from app.panel.widgets.confirmed import confirmation_of
+from app.panel.widgets.families import Command
 from app.view.sections import SECTIONS
 
 # The sentences that the browser shows by itself, by their names in the scripts.
@@ -35,8 +37,15 @@ def panel_data(panel: Panel, page: Page, scripts: frozenset[str]) -> Mapping[str
         "keyboard": panel.keyboard,
         "dimAfterS": panel.screen.dim_after_s,
         "sections": [section.name for section in SECTIONS if section.on_page],
+        "confirms": [widget.id for widget in confirmed_commands(panel, page)],
         "kinds": [kind for kind in kinds if kind in scripts],
     }
+
+
+def confirmed_commands(panel: Panel, page: Page) -> list[Command]:
+    """The commands that a page may press and that a person confirms."""
+    shown = (*page.widgets, *panel.frame.widgets, *panel.recipe_loads)
+    return [w for w in shown if isinstance(w, Command) and confirmation_of(w)]
 
 
 def page_json(data: Mapping[str, Any], language: str) -> Markup:

@@ -8,8 +8,9 @@ from app.i18n import Text, joined, number, say
 from app.panel.layout import Page
 from app.panel.robot_panels import opened_page, page_for
 from app.panel.template import input_ids
-from app.panel.widgets.families import EntryWidget, PressCommand
+from app.panel.widgets.families import Command, EntryWidget, PressCommand
 from app.panel.widgets.log_view import LogView
+from app.panel.widgets.parts import PartedCommand
 from app.panel.widgets.trend import Trend
 from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
@@ -122,13 +123,15 @@ def _lines_now(
 def asks_of(fleet: Fleet, session: RobotSession, page: Page) -> dict[str, Ask]:
     """The questions before presses of a page, by the ids of the widgets that need one."""
     shown = (*page.widgets, *fleet.panel.frame.widgets)
-    pressed = (w for w in shown if isinstance(w, PressCommand) and w.confirm_press)
+    pressed = (w for w in shown if isinstance(w, PressCommand) and w.asks)
     return {w.id: ask_of(fleet.session_for(session, str(w.id)), w) for w in pressed}
 
 
-def ask_of(session: RobotSession, widget: PressCommand) -> Ask:
+def ask_of(session: RobotSession, widget: Command) -> Ask:
     """The question before a press of `widget`; it names the robot if the panel has several."""
     inputs = {w.id: w for w in session.panel.widgets() if isinstance(w, EntryWidget)}
     robot = session.entry.name if session.entry else ""
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
-    return Ask(sentence=sentence, inputs=[inputs[name] for name in input_ids(widget)])
+    own = widget.id if isinstance(widget, PartedCommand) else ""  # its button says it
+    names = (name for name in input_ids(widget) if name in inputs and name != own)
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in names])

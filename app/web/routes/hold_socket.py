@@ -25,6 +25,7 @@ from app.panel.widgets.hold import HoldCommand
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import Caller, caller
+from app.web.confirmations import confirmed
 from app.web.hold_protocol import END_REASONS, Beat, Begin, End, HoldMessage, Message, read_message
 from app.web.language import language_of
 from app.web.request_body import received
@@ -133,7 +134,9 @@ class _HoldSocket:
     async def _begin(self, message: Begin, sent: float) -> Receipt | ActiveHold:
         """Begins the hold, sent at `sent` (monotonic seconds) at the latest."""
         holds, seen = self._session.holds, replace(self._press, seen=message.seen)
-        press = self._session.dispatcher.with_defaults(replace(seen, inputs=message.inputs))
+        press = replace(seen, inputs=message.inputs)
+        press = confirmed(self._state, self._who, press, message.confirmation)
+        press = self._session.dispatcher.with_defaults(press)
         try:
             self._session.press_guard.receive(press)
             self._press = seen

@@ -43,6 +43,7 @@ GRACE_S = 5
 COMPILED_AFTER_S = 0.1
 OTHER_PAGES = (
     "ask.html",
+    "_confirm.html",
     "error.html",
     "gallery.html",
     "log.html",

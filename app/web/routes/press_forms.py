@@ -4,8 +4,8 @@ import math
 import re
 import secrets
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Any, Final
 from urllib.parse import quote
 
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -13,36 +13,17 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from app import clock
 from app.commands.press import PRESS_ID, Press
 from app.errors import InputError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.widgets.families import PressCommand
 from app.panel.widgets.recipe_load import RecipeLoad
-from app.permission.principal import Principal
+from app.panel.widgets.switch import Switch
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
-from app.web.rendering.display_choice import DisplaySettings
 from app.web.rendering.page_words import ask_of
-
-
-class Reader(NamedTuple):
-    """The language and the display choices of a browser."""
-
-    language: str
-    display: DisplaySettings
-
-
-@dataclass(frozen=True, slots=True)
-class PressForm:
-    """A form that presses a widget. `fields` are the texts of inputs, and fields of the page, whose
-    names begin with "_"; the latter are removed as they are read."""
-
-    widget: PressCommand
-    principal: Principal
-    fields: dict[str, str]
-    reader: Reader
-
+from app.web.routes.confirm_forms import PressForm, confirmed_by_form
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
@@ -57,9 +38,14 @@ async def pressed_by_form(
     fields, refusals = form.fields, session.presses.early_refusals
     too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
     shown_on = fields.pop("_page", "")
-    if form.widget.confirm_press and (fields.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(state, page, session, form, shown_on)
-    press = _press_of(state, session, form)
+    by, answered = None, fields.pop(CONFIRMED, "") == "yes" and not too_soon
+    if form.widget.confirmation and form.principal.user:
+        by, sheet = await confirmed_by_form(state, session, form, too_soon)
+        if by is None:
+            return _ask(state, page, session, form, shown_on, sheet)
+    elif form.widget.asks and not answered:
+        return _ask(state, page, session, form, shown_on, {})
+    press = replace(_press_of(state, session, form), confirmed=by)
     if not state.limits.admit(press.principal):
         receipt = refusals.limited(press, shown=True)
     else:
@@ -84,9 +70,15 @@ def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[
 
 
 def _ask(
-    state: AppState, page: RobotSession, session: RobotSession, form: PressForm, shown_on: str
+    state: AppState,
+    page: RobotSession,
+    session: RobotSession,
+    form: PressForm,
+    shown_on: str,
+    sheet: Mapping[str, Any],
 ) -> Response:
-    """The page that asks before a press; its answer is the press."""
+    """The page that asks before a press; its answer is the press. `sheet` is that of a person who
+    confirms it."""
     widget = form.widget
     html = state.templates.render(
         "ask.html",
@@ -95,7 +87,7 @@ def _ask(
         display=form.reader.display,
         panel=state.fleet.panel,
         banner=session.publisher.view["notice"]["banner"],
-        question=ask_of(session, widget),
+        **({} if sheet else {"question": ask_of(session, widget)}),
         action=f"{page.base}/widgets/{widget.id}",
         back=page_after(state, page, widget.id, "", shown_on),
         fields={
@@ -109,9 +101,18 @@ def _ask(
         entries=printable_texts(form.fields),
         no=say("back"),
         empty=say("empty"),
-        label=widget.label,
+        label=_label(form),
+        **sheet,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+def _label(form: PressForm) -> TextLike:
+    """The label of the button that was touched."""
+    widget = form.widget
+    if isinstance(widget, Switch):
+        return widget.on if form.fields.get(widget.id) == "true" else widget.off
+    return widget.label
 
 
 def _page_of(panel: Panel, widget: str, shown_on: str) -> Page:

@@ -26,6 +26,7 @@ from app.errors import InputError, KioskError
 from app.i18n import TextLike, localized, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import caller
+from app.web.confirmations import confirmed
 from app.web.language import language_of
 from app.web.request_body import as_model, json_of, received
 from app.web.routes.presses import STATUS, PressBody, receipt_of_press
@@ -106,6 +107,7 @@ class _PressSocket:
             session = state.fleet.session_for(shown, body.widget)
             who = self._caller.principal(state)
             press = body.press(session.presses.widget(body.widget), who)
+            press = confirmed(state, self._caller, press, body.confirmation)
             receipt = await receipt_of_press(state, session, press)
         except KioskError as error:
             await self._answer(body.id, error.status, error=error.text)

@@ -17,7 +17,8 @@ from app.panel.widgets.families import PressCommand
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession
-from app.web.client_cookie import principal_of
+from app.web.client_cookie import caller, principal_of
+from app.web.confirmations import LONGEST_TOKEN, confirmed
 from app.web.language import language_of
 from app.web.openapi_parts import (
     FORM,
@@ -34,7 +35,8 @@ from app.web.openapi_parts import (
 from app.web.receipt_answer import ReceiptAnswer
 from app.web.rendering.display_choice import display_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.press_forms import PressForm, Reader, page_after, pressed_by_form
+from app.web.routes.confirm_forms import PressForm, Reader
+from app.web.routes.press_forms import page_after, pressed_by_form
 
 router = APIRouter()
 
@@ -63,6 +65,7 @@ class PressBody(BaseModel):
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(pattern=EVENT_ID)] | None = None
     at: AwareDatetime | None = None
+    confirmation: Annotated[str, Field(max_length=LONGEST_TOKEN)] = ""
 
     def press(self, widget: PressCommand, principal: Principal) -> Press[PressCommand]:
         """The press of a widget by a client. A press without an id gets one."""
@@ -117,11 +120,12 @@ async def press(
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
-        pressed = as_model(PressBody, json_of(body)).press(command, who)
+        posted = as_model(PressBody, json_of(body))
+        pressed = confirmed(state, caller(request), posted.press(command, who), posted.confirmation)
         return _answer(request, await receipt_of_press(state, session, pressed))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        form = PressForm(command, who, form_of(body), reader)
+        form = PressForm(command, who, form_of(body), reader, caller(request).session)
         return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 

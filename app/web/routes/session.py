@@ -13,6 +13,9 @@ from app.access.secrets_hash import LONGEST, WAYS
 from app.access.users import LONGEST_NAME
 from app.errors import InputError
 from app.i18n import render, say
+from app.permission.confirmations import BY_PROGRAM
+from app.permission.confirmations import SIGN_IN as SIGN_IN_FIRST
+from app.permission.role_locks import ROLE_LOCK
 from app.roles import ROLES
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import (
@@ -22,12 +25,16 @@ from app.web.client_cookie import (
     set_session_cookie,
 )
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, described_body, errors
+from app.web.openapi_parts import FORM, JSON, Described, described_body, errors
 from app.web.request_body import act_body_of, as_model
 
 router = APIRouter()
 
 FIELDS_MOST: Final = 8
+# Of a confirmation: what is no wrong secret.
+NOT_ASKED: Final = frozenset(
+    {SIGN_IN_FIRST, BY_PROGRAM, ROLE_LOCK, "confirm_same_person", "confirm_second_role"}
+)
 Secret = Annotated[str, Field(max_length=LONGEST)]
 
 
@@ -70,7 +77,7 @@ class SignInRefused(BaseModel):
     tries_left: int
 
 
-REFUSED: Final = {
+REFUSED: Final[Described] = {
     401: {"model": SignInRefused, "description": "the name, PIN, password or badge is wrong"},
     429: {
         "model": SignInRefused,
@@ -210,6 +217,11 @@ def _refused(
     if form:
         query = urlencode({"user": attempt.name, "refused": checked.code})
         return RedirectResponse(f"{state.root}/signin?{query}", status_code=303)
+    return refused_answer(request, checked)
+
+
+def refused_answer(request: Request, checked: Checked) -> JSONResponse:
+    """Why a PIN, password or badge was not taken."""
     reason, left = checked.reason, checked.tries_left
     if left:
         reason = say("signin_tries_left", why=reason, count=str(left))
@@ -223,4 +235,6 @@ def _refused(
         status, headers = 429, headers | {"retry-after": str(checked.wait_s)}
     if checked.code == "users_unreadable":
         status = 503
+    if checked.code in NOT_ASKED:
+        status = 403
     return JSONResponse(content, status, headers)

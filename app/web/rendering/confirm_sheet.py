@@ -1,0 +1,79 @@
+"""What the sheet shows in which a person confirms a press with a PIN, password or badge."""
+
+from typing import Any, Final, TypedDict
+
+from app.access.confirmer import able_users
+from app.i18n import Text, TextLike, say
+from app.panel.widgets.confirmed import Confirmed, confirmation_of
+from app.panel.widgets.families import Command
+from app.panel.widgets.hold import HoldCommand
+from app.permission.confirmations import SIGN_IN
+from app.permission.principal import Principal
+from app.runtime.robot_session import RobotSession
+from app.web.app_state import AppState
+from app.web.rendering.page_words import Ask, ask_of
+
+WORDS: Final = ("clear", "delete", "password", "badge", "name")
+
+
+class ConfirmSheet(TypedDict):
+    """`lock`: why nobody can confirm it at this browser, "" if somebody can. `people` are those who can
+    be chosen as the second person; without names (`typed`) they are typed. `by_pin`, `by_password` and
+    `by_badge` are what can be entered, `typed_digits` how many digits the server has already."""
+
+    title: TextLike
+    question: Ask
+    consequence: TextLike
+    lock: TextLike
+    people: list[str]
+    typed: bool
+    by_pin: bool
+    by_password: bool
+    by_badge: bool
+    yes: TextLike
+    chosen: str
+    typed_digits: int
+    words_of: dict[str, Text]
+
+
+def confirm_sheet(
+    state: AppState, session: RobotSession, command: Command, who: Principal, chosen: str = ""
+) -> ConfirmSheet:
+    """The sheet for a press of a command by a client. Names of users are shown at the kiosk's own
+    machine only: elsewhere they are typed. `chosen` is the second person so far."""
+    two, book = confirmation_of(command) == "two_persons", state.access.book
+    needs = state.fleet.panel.needs.commands.get(command.id, frozenset())
+    others = [
+        user.user
+        for user in able_users(state.access)
+        if user.user != who.user and all(user.meets(need) for need in needs)
+    ]
+    here = who.client.local
+    names = (others if here else []) if two else [who.user]
+    users = [user for user in map(book.user, names) if user is not None]
+    ways = {way for user in users for way in user.ways} or {"pin", "password", "badge"}
+    title = say("confirm_title_two") if two else say(_title(ways), name=who.user)
+    return ConfirmSheet(
+        title=title,
+        question=ask_of(session, command),
+        consequence=command.consequence or "" if isinstance(command, Confirmed) else "",
+        lock="" if who.user and not who.program else say(SIGN_IN),
+        people=names if two else [],
+        typed=two and not here,
+        by_pin="pin" in ways,
+        by_password="password" in ways and (two or "pin" not in ways),
+        by_badge="badge" in ways,
+        yes=say("confirm_done") if isinstance(command, HoldCommand) else command.label,
+        chosen=chosen,
+        typed_digits=len(state.access.typed_digits(who.client.id, digits_key(command))),
+        words_of={name: say(f"signin_{name}") for name in WORDS} | {"second": say("confirm_second")},
+    )
+
+
+def digits_key(command: Command) -> str:
+    """Under which the server keeps the digits that a browser without scripts types."""
+    return f"\0{command.id}"
+
+
+def _title(ways: set[Any]) -> str:
+    return next(f"confirm_title_{way}" for way in ("pin", "password", "badge") if way in ways)

@@ -1,0 +1,103 @@
+"""A person confirms one press with a PIN, password or badge: the sheet for it, and its check."""
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, JSONResponse, Response
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
+
+from app.access.access import Checked
+from app.access.confirmer import VALID_S
+from app.access.secrets_hash import LONGEST
+from app.access.users import LONGEST_NAME
+from app.i18n import localized, say
+from app.panel.widgets.hold import HoldCommand
+from app.permission.confirmations import SIGN_IN
+from app.web.app_state import CurrentSession, CurrentState
+from app.web.client_cookie import caller
+from app.web.confirmations import confirmed_command, question_of
+from app.web.language import language_of
+from app.web.openapi_parts import PAGE, described_body, errors
+from app.web.rendering.confirm_sheet import confirm_sheet
+from app.web.request_body import as_model, body_of, json_of
+from app.web.routes.presses import INPUTS
+from app.web.routes.session import REFUSED, SignIn, attempt_of, refused_answer
+
+router = APIRouter()
+
+UNCACHED: Final = {"cache-control": "no-store"}
+Secret = Annotated[str, Field(max_length=LONGEST)]
+
+
+class ConfirmBody(BaseModel):
+    """The inputs of the press that is confirmed, and a PIN, password or badge: of the signed-in user,
+    or with `user` or a badge of the second person."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, title="Confirm")
+
+    inputs: Annotated[dict[str, JsonValue], WithJsonSchema(INPUTS)] = {}
+    user: Annotated[str, Field(max_length=LONGEST_NAME)] = ""
+    pin: Secret = ""
+    password: Secret = ""
+    badge: Secret = ""
+
+    def sign_in(self, own: str) -> SignIn:
+        """Who confirms; `own` is the signed-in user, where only that one can."""
+        user = "" if self.badge else own or self.user
+        return SignIn(user=user, pin=self.pin, password=self.password, badge=self.badge)
+
+
+class ConfirmAnswer(BaseModel):
+    """`confirmation` goes with the press, within `valid_s` seconds."""
+
+    confirmation: str
+    valid_s: float
+    reason: str
+
+
+@router.get(
+    "/widgets/{widget}/confirm",
+    response_class=HTMLResponse,
+    summary="The sheet in which a person confirms a press, as a part of a page",
+    responses=errors(403, 404, 422) | {200: {"content": PAGE}},
+)
+async def sheet(
+    widget: str, request: Request, state: CurrentState, session: CurrentSession
+) -> Response:
+    command = confirmed_command(session, widget)
+    who = caller(request).principal(state)
+    context = confirm_sheet(state, session, command, who)
+    html = state.templates.render("_confirm.html", language_of(request), scripted=True, **context)
+    return HTMLResponse(html, headers=UNCACHED)
+
+
+@router.post(
+    "/widgets/{widget}/confirm",
+    response_model=ConfirmAnswer,
+    summary="Confirm a press with a PIN, a password or a badge",
+    responses=errors(403, 404, 408, 413, 422, 503) | REFUSED,
+    openapi_extra=described_body(ConfirmBody, None, required=True),
+)
+async def confirm(
+    widget: str, request: Request, state: CurrentState, session: CurrentSession
+) -> Response:
+    command = confirmed_command(session, widget)
+    body = as_model(ConfirmBody, json_of(await body_of(request)))
+    client = caller(request)
+    who = client.principal(state)
+    if not who.user:
+        return refused_answer(request, Checked(None, say(SIGN_IN), SIGN_IN))
+    question = question_of(state, command, body.inputs)
+    own = who.user if question.confirmation == "pin" else ""
+    attempt = attempt_of(body.sign_in(own))
+    user_session = state.access.sessions.get(client.session, who.client.id)
+    checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
+    if not token:
+        return refused_answer(request, checked)
+    hold = isinstance(command, HoldCommand)
+    content: dict[str, Any] = {
+        "confirmation": token,
+        "valid_s": VALID_S,
+        "reason": say("confirm_hold_now", seconds=f"{VALID_S:.0f}") if hold else "",
+    }
+    return JSONResponse(localized(content, language_of(request)), headers=UNCACHED)

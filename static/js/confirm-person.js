@@ -1,0 +1,121 @@
+// A person confirms a press with a PIN, password or badge, in a sheet beside its button. The server checks it and answers
+// with the confirmation of this one press; what was entered is kept nowhere.
+import { fillValues } from "./ask.js";
+import { openAsking } from "./asking.js";
+import { post } from "./press.js";
+import { closest, find, setText } from "./show.js";
+
+const NOT_NOW_MS = 60_000; // without a touch the sheet goes
+const TIMEOUT_MS = 10_000;
+const SCANNED_MS = 35; // between two characters of a badge reader, which types faster than a person
+const SHORTEST_BADGE = 4;
+const MOST_DIGITS = 12;
+
+/** @typedef {{ confirmation: string, valid_s: number, reason: string }} Proof */
+
+// `onYes` gets the confirmation. `pressed` is the button whose word is on that of the sheet.
+/** @param {HTMLElement} root @param {Record<string, Data>} inputs @param {(event: Event, proof: Proof) => void} onYes @param {HTMLElement | null} pressed */
+export async function confirmByPerson(root, inputs, onYes, pressed) {
+  const dialog = find(document, "dialog#person");
+  const { base, embed } = pageGuard.page;
+  const address = `${base}/widgets/${root.dataset.widget}/confirm${embed}`;
+  const form = find(dialog, "form");
+  if (dialog.matches(":popover-open")) return;
+  const part = await sheetOf(address);
+  if (dialog.matches(":popover-open")) return;
+  form.replaceChildren(part);
+  fillValues(dialog);
+  followTyping(form);
+  const yes = form.querySelector("button.yes");
+  if (yes && pressed) setText(yes, pressed.querySelector(".name")?.textContent ?? pressed.textContent);
+  /** @param {boolean} isBusy */
+  const busy = (isBusy) => {
+    if (yes) yes.disabled = isBusy;
+  };
+  busy(true);
+  const asking = openAsking(root, dialog, NOT_NOW_MS, () => busy(false));
+  for (const name of /** @type {const} */ (["pointerdown", "keydown"])) asking.on(name, asking.stay);
+  asking.on("click", ({ target }) => closest(target, "button.no") && asking.close());
+  dialog.addEventListener("beforetoggle", () => form.replaceChildren(), { once: true });
+  asking.on("submit", async (event) => {
+    event.preventDefault();
+    const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "enter";
+    if (digit !== "enter") return typed(form, digit);
+    if (!yes || yes.disabled) return;
+    busy(true);
+    const answer = await check(address, { inputs, ...entered(form) });
+    busy(false);
+    if (!dialog.matches(":popover-open")) return;
+    setText(form.querySelector(".said"), answer.error);
+    asking.place();
+    if (!answer.confirmation) return;
+    asking.close();
+    onYes(event, answer);
+  });
+  const fields = ["select", "[name=_user]", "[name=_pin]", "[name=_password]", "input"];
+  const first = fields.map((field) => form.querySelector(field)).find(Boolean);
+  (first ?? find(dialog, "button.no")).focus();
+}
+
+/** @param {string} address @returns {Promise<HTMLElement>} */
+async function sheetOf(address) {
+  const lost = document.createElement("p");
+  lost.textContent = pageGuard.page.sentences.lost;
+  try {
+    const answer = await fetch(address, { cache: "no-store", signal: AbortSignal.timeout(TIMEOUT_MS) });
+    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    const part = answer.ok && page.querySelector("div.person");
+    return part ? document.importNode(part, true) : lost;
+  } catch {
+    return lost;
+  }
+}
+
+/** @param {string} address @param {object} body @returns {Promise<Data>} */
+async function check(address, body) {
+  try {
+    return await (await post(address, body, TIMEOUT_MS)).json();
+  } catch {
+    return { error: pageGuard.page.sentences.lost };
+  }
+}
+
+// What was entered, which the fields lose with it.
+/** @param {HTMLFormElement} form @returns {Record<string, string>} */
+function entered(form) {
+  /** @param {string} name */
+  const taken = (name) => {
+    const input = form.querySelector(`input[name=${name}]`);
+    if (!(input instanceof HTMLInputElement)) return "";
+    const { value } = input;
+    input.value = "";
+    return value;
+  };
+  const user = form.querySelector("select")?.value ?? form.querySelector("input[name=_user]")?.value ?? "";
+  const [badge, password, pin] = [taken("_badge"), taken("_password"), taken("_pin")];
+  const isScanned = form.dataset.scanned !== undefined && form.querySelector("input[name=_badge]");
+  delete form.dataset.scanned;
+  if (badge || (isScanned && pin)) return { badge: badge || pin };
+  return password ? { user, password } : { user, pin };
+}
+
+/** @param {HTMLFormElement} form @param {string} digit */
+function typed(form, digit) {
+  const input = find(form, "input[name=_pin]");
+  const edited = { clear: "", delete: input.value.slice(0, -1) };
+  input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, MOST_DIGITS);
+  delete form.dataset.scanned;
+}
+
+// A badge reader types into the field that has the focus, faster than a person.
+/** @param {HTMLFormElement} form */
+function followTyping(form) {
+  let last = 0;
+  let quick = 0;
+  form.querySelector("input[name=_pin]")?.addEventListener("input", () => {
+    const now = performance.now();
+    quick = now - last < SCANNED_MS ? quick + 1 : 0;
+    last = now;
+    form.toggleAttribute("data-scanned", quick >= SHORTEST_BADGE - 1);
+  });
+}
