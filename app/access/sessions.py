@@ -84,12 +84,17 @@ class Sessions:
     def end(self, session: Session) -> None:
         self._sessions.pop(session.id, None)
 
+    def of_client(self, client: str) -> Session | None:
+        """The session of this browser, None without one."""
+        found = (session for session in self._sessions.values() if session.client.id == client)
+        return next(found, None)
+
     def end_client(self, client: str) -> Session | None:
         """Ends the session of this browser, and returns it."""
-        for session in [kept for kept in self._sessions.values() if kept.client.id == client]:
+        session = self.of_client(client)
+        if session is not None:
             self.end(session)
-            return session
-        return None
+        return session
 
     def end_idle(self) -> list[Session]:
         """Ends the sessions that are idle for too long, and returns them."""

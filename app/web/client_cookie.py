@@ -35,6 +35,12 @@ class Caller:
         """The principal at this moment; an anonymous one without a token."""
         return state.access.principal(self.client(state), self.session, self.bearer)
 
+    def signed_in_since(self, state: AppState) -> bool:
+        """Whether somebody has signed in at this browser since the connection began, which then has
+        not the cookie of that session."""
+        session = state.access.sessions.of_client(self.client(state).id) if self.token else None
+        return session is not None and session.id != self.session
+
     def client(self, state: AppState) -> Client:
         if not self.token:
             return anonymous(self.address)

@@ -16,7 +16,7 @@ async function report() {
     const answer = await fetch(`${who.dataset.here}`, { method: "POST", headers, body });
     if (!answer.ok) return;
     const session = await answer.json();
-    if (session.user !== who.dataset.user) return location.assign(who.href);
+    if (session.user !== who.dataset.user) return session.user ? location.reload() : location.assign(who.href);
     warn(session.left_s !== null && session.left_s < WARNED_S);
   } catch {
     touched ||= body.includes("true");
@@ -30,6 +30,13 @@ function warn(soon) {
 }
 
 if (document.querySelector("main.sign-in")) import("./signin.js").catch(pageGuard.fail);
+else followTabs();
+// Another tab of this browser may have signed in: the server ends the streams that began before.
+function followTabs() {
+  const reconnected = () => "cut" in document.body.dataset || void report();
+  new MutationObserver(reconnected).observe(document.body, { attributeFilter: ["data-cut"] });
+}
+
 if (who.dataset.user) {
   setInterval(() => void report(), EVERY_MS);
   find(document, "#idle").addEventListener("click", () => void report());

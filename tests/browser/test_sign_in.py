@@ -71,6 +71,21 @@ def test_everything_of_the_page_is_within_the_screen(
             assert min(box["width"], box["height"]) >= 40, selector
 
 
+def test_a_sign_in_reaches_the_other_tabs_of_the_browser(own_page: Page, kiosk: Server) -> None:
+    page = own_page
+    other = page.context.new_page()
+    other.goto(kiosk.url)
+    page.goto(kiosk.url)
+    signed_in_by_pad(page, kiosk, "M. Sato", "2580")
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
+    expect(other.locator("a.user")).to_have_attribute("data-user", "M. Sato")
+    button = other.locator('[data-widget="operation1"] button:not(.more)')
+    expect(button).to_be_enabled()
+    page.locator("a.user").click()
+    page.locator("form[action$='/session/end'] button").click()
+    expect(button).to_be_disabled()
+
+
 def test_a_wrong_pin_says_so_and_is_not_kept(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(kiosk.url)

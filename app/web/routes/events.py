@@ -68,7 +68,8 @@ async def events(
         everything = publisher.snapshot(current(), shown) + first + beat(language)
         answer = Response(everything, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(publisher, first, state.metrics.streams, shown, current)
+        renewed = partial(asks.signed_in_since, state)
+        answer = EventStream(publisher, first, state.metrics.streams, shown, current, renewed)
     return set_client_cookie(answer, request, token)
 
 
@@ -109,14 +110,17 @@ class EventStream(Response):
         streams: Open,
         page: str = "",
         audience: Callable[[], Audience] = _everyone,
+        is_outdated: Callable[[], bool] = bool,
     ) -> None:
         """`first` is sent with the snapshot; `streams` counts the open streams; `page` is the page
-        whose widgets it sends, "" for all; `audience` returns that of the client now."""
+        whose widgets it sends, "" for all; `audience` returns that of the client now. It ends when it
+        `is_outdated`: the browser opens another one, with the cookie of its new session."""
         self._publisher = publisher
         self._first = first
         self._streams = streams
         self._page = page
         self._audience = audience
+        self._is_outdated = is_outdated
         self.status_code = 200
         self.background = None
         self.init_headers(HEADERS)
@@ -138,6 +142,8 @@ class EventStream(Response):
         await send(_body(self._beginning(audience)))
         while not publisher.closed:
             await publisher.wait_for_change(version, beats)
+            if publisher.version > version and self._is_outdated():
+                break
             chunk = b""
             if publisher.version > version:
                 before, audience = audience, self._audience()

@@ -27,8 +27,8 @@ from app.i18n import render, say
 from app.panel.widgets.camera import Camera
 from app.robot.pictures import NoPicture, Picture
 from app.runtime.frames import Feed, Frame
-from app.web.app_state import CurrentSession, CurrentState
-from app.web.client_cookie import client_of
+from app.web.app_state import AppState, CurrentSession, CurrentState
+from app.web.client_cookie import caller, client_of
 from app.web.language import language_of
 from app.web.openapi_parts import Described, errors
 from app.web.request_body import received
@@ -43,6 +43,7 @@ BAD_PAUSE_S: Final = 0.2  # between two pictures that can't be shown
 SILENT_S: Final = 10.0  # without a request while none is open
 TRY_AGAIN_LATER: Final = 4429  # 4000 + HTTP's
 SILENT: Final = 4408
+SIGNED_OUT: Final = 4403
 IMAGES: Final[Described] = {
     200: {
         "content": {
@@ -83,9 +84,10 @@ async def frame(
 async def frames(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
     camera = session.panel.widget(widget, Camera)
     await socket.accept()
-    with suppress(WebSocketDisconnect):
+    served = _FrameSocket(socket, session.frames.feed(camera), camera, state)
+    with suppress(WebSocketDisconnect), state.access.notifying(served.check_user):
         try:
-            await _FrameSocket(socket, session.frames.feed(camera), camera).run()
+            await served.run()
         except TooMany:
             await socket.close(TRY_AGAIN_LATER)
 
@@ -104,13 +106,31 @@ async def _next(feed: Feed, camera: Camera, after: int) -> tuple[Frame, Picture]
 class _FrameSocket:
     """One browser that shows one camera."""
 
-    def __init__(self, socket: WebSocket, feed: Feed, camera: Camera) -> None:
+    def __init__(self, socket: WebSocket, feed: Feed, camera: Camera, state: AppState) -> None:
         self._socket = socket
+        self._state = state
+        self._who = caller(socket)
+        self._then = self._who.principal(state)
+        self._ended = False
         self._feed = feed
         self._camera = camera
         self._requested = asyncio.Event()
         self._waits = False  # for the picture that it asked for
         self._language = language_of(socket)
+
+    def check_user(self) -> None:
+        """Closes the socket of a user who has signed out, is disabled, or may do something else now; a
+        page that may see the camera opens another one."""
+        now, then = self._who.principal(self._state), self._then
+        same = (now.user, now.role, now.groups) == (then.user, then.role, then.groups)
+        if self._ended or (same and not self._who.signed_in_since(self._state)):
+            return
+        self._ended = True
+        spawn_logged(self._close(), log, "closing a camera's socket failed")
+
+    async def _close(self) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster
+            await self._socket.close(SIGNED_OUT)
 
     async def run(self) -> None:
         """Sends frames until the browser closes the WebSocket."""
@@ -146,8 +166,12 @@ class _FrameSocket:
         loop, number = asyncio.get_running_loop(), 0
         while True:
             await self._requested.wait()
+            if self._ended:
+                return
             self._requested.clear()
             shown, picture = await _next(self._feed, self._camera, number)
+            if self._ended:
+                return
             due, number = loop.time() + 1 / self._camera.max_hz, shown.number
             about: dict[str, Any] = {
                 "number": number,
