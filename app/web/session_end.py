@@ -54,6 +54,9 @@ def renew_confirm_locks(state: AppState) -> None:
 
 def follow_users(state: AppState) -> None:
     """Has control released and the browsers' views renewed when users sign in or out."""
+    if not state.access.configured:
+        may = "may do everything" if state.access.rules.open else "may only watch"
+        log.info('no users: everybody at this panel %s. "operator-panel users add" adds users', may)
     renew_confirm_locks(state)
     state.access.on_change(partial(renew_confirm_locks, state))
     state.access.on_end(partial(release_control, state))

@@ -201,6 +201,8 @@ def test_without_enough_users_the_button_is_locked_and_says_what_to_do(
         assert press(server.http, "start").json()["code"] == "confirm_without_users"
         assert "confirm_without_users" not in server.process.text
         assert 'widget "start" is locked' in server.process.text
+        assert "no users: everybody at this panel may do everything" in server.process.text
+        assert '"operator-panel users add" adds users' in server.process.text
         add_user(tmp_path, "K. Novak", "maintenance", pin="1470")
         until(lambda: server.widget("start")["reason"] == "Sign in as Operator.", "there is a user")
         client = browsers.signed_in(server.url, "K. Novak", pin="1470")
