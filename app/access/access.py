@@ -34,7 +34,6 @@ DIGITS: Final = frozenset("0123456789")
 MOST_DIGITS: Final = 12
 TYPED_KEPT_S: Final = 60.0
 TYPED_KEPT: Final = 100  # browsers
-CheckedFor = Literal["sign_in", "confirm"]
 EndReason = Literal["sign_out", "hand_over", "idle", "changed"]
 
 
@@ -179,7 +178,7 @@ class Access:
         return ROLES[min(ROLES.index(role), ROLES.index(self.rules.remote))]
 
     async def check(
-        self, client: Client, attempt: Attempt, action: CheckedFor = "sign_in", widget: str = ""
+        self, client: Client, attempt: Attempt, action: str = "sign_in", widget: str = ""
     ) -> Checked:
         """Checks a PIN, password or badge, with the delays after failures; logs a failure, with the
         `widget` whose press it confirms. TooMany if others do that already."""
@@ -193,9 +192,8 @@ class Access:
             return Checked(None, say("sign_in_wait", seconds=str(wait_s)), "sign_in_wait", wait_s)
         self.checker.admit(client.local)
         self.delays.failed(attempt.name, address)
-        user = await self.checker.user_of(
-            self.book, attempt.name, attempt.way, attempt.secret, client.local
-        )
+        asked = attempt.name, attempt.way, attempt.secret
+        user = await self.checker.user_of(self.book, *asked, client.local)
         now = self.book.user(user.name) if user else None  # the file may have changed
         if user is None or now is None or rights_of(now) != rights_of(user):
             left = self.delays.tries_left(attempt.name, address)

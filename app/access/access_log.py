@@ -16,7 +16,7 @@ from app.access.users import Change, UserBook
 from app.audit.entry import Entry, Origin, new_entry
 from app.audit.press_record import origin_of
 from app.errors import LogError
-from app.i18n import Text, TextLike, say
+from app.i18n import TextLike, say
 from app.permission.clients import Client
 from app.permission.principal import Principal
 

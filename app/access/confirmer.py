@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from app.access.access import Access, Attempt, Checked
-from app.access.users import User, rights_of
 from app.access.sessions import Session
+from app.access.users import rights_of
 from app.i18n import say
 from app.permission.clients import anonymous
 from app.permission.confirmations import BY_PROGRAM, SIGN_IN, ConfirmedBy

@@ -80,7 +80,7 @@ async def back(
                 raise OidcError(say("oidc_refused", name=sign_ins.rules.name), error)
             user = await sign_ins.user_of(begun, code)
         except OidcError as refused:
-            await state.access.log.failed(begun.client, "", refused.reason)
+            await state.access.log.failed(begun.client, "", "sign_in", "", refused.reason)
             raise
         session_id = state.access.sign_in_external(begun.client, user).id
     except OidcError as refused:
