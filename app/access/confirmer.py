@@ -52,7 +52,7 @@ class Confirmer:
     def __init__(self, access: Access, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._access = access
         self._monotonic = monotonic
-        self._given: OrderedDict[str, _Given] = OrderedDict()
+        self._unused: OrderedDict[str, _Given] = OrderedDict()
 
     async def confirm(
         self, who: Principal, session: Session | None, question: Question, attempt: Attempt
@@ -78,9 +78,9 @@ class Confirmer:
             return refused, ""
         token = secrets.token_urlsafe(16)
         until = self._monotonic() + VALID_S
-        self._given[token] = _Given(session.id, question, by, rights_of(checked.user), until)
-        while len(self._given) > MOST:
-            self._given.popitem(last=False)
+        self._unused[token] = _Given(session.id, question, by, rights_of(checked.user), until)
+        while len(self._unused) > MOST:
+            self._unused.popitem(last=False)
         return checked, token
 
     def _refused_person(self, who: Principal, question: Question, checked: Checked) -> Checked | None:
@@ -101,14 +101,14 @@ class Confirmer:
     def take(self, token: str, session: str, widget: str, inputs: str) -> ConfirmedBy | None:
         """Who confirmed a press, which uses the confirmation up; None if nobody did, or it is too old,
         or the user may do something else now."""
-        given = self._given.pop(token, None)
-        if given is None or self._monotonic() > given.until:
+        kept = self._unused.pop(token, None)
+        if kept is None or self._monotonic() > kept.until:
             return None
-        asked = (given.session, given.question.widget, given.question.inputs)
+        asked = (kept.session, kept.question.widget, kept.question.inputs)
         if asked != (session, widget, inputs):
             return None
-        person = self._access.book.user(given.by.second or given.by.user)
-        return given.by if rights_of(person) == given.rights else None
+        person = self._access.book.user(kept.by.second or kept.by.user)
+        return kept.by if rights_of(person) == kept.rights else None
 
 
 def able_users(access: Access) -> list[Principal]:

@@ -86,8 +86,8 @@ class Sessions:
 
     def of_client(self, client: str) -> Session | None:
         """The session of this browser, None without one."""
-        found = (session for session in self._sessions.values() if session.client.id == client)
-        return next(found, None)
+        sessions = (session for session in self._sessions.values() if session.client.id == client)
+        return next(sessions, None)
 
     def end_client(self, client: str) -> Session | None:
         """Ends the session of this browser, and returns it."""

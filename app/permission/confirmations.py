@@ -44,7 +44,7 @@ class ConfirmLocks:
 
     verdicts: Mapping[str, Verdict] | None = None
 
-    def of(self, command: str) -> Verdict | None:
+    def lock_of(self, command: str) -> Verdict | None:
         if self.verdicts is None:
             return locked(WITHOUT_USERS)
         return self.verdicts.get(command)

@@ -95,7 +95,7 @@ def _confirmation(request: PermissionRequest) -> Verdict | None:
     confirmation, grounds = confirmation_of(request.widget), request.grounds
     if not confirmation:
         return None
-    if lock := grounds.confirm_locks.of(request.widget.id):
+    if lock := grounds.confirm_locks.lock_of(request.widget.id):
         return lock
     if not grounds.pressed or grounds.who is None:
         return None

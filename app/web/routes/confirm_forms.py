@@ -46,35 +46,35 @@ async def confirmed_by_form(
 ) -> tuple[ConfirmedBy | None, dict[str, Any]]:
     """Who has confirmed the press of a form; else the sheet to be shown, with what is missing. A tap
     that comes `too_soon` confirms nothing."""
-    given = {name: form.fields.pop(name, "")[:LONGEST] for name in FIELDS}
+    entered = {name: form.fields.pop(name, "")[:LONGEST] for name in FIELDS}
     widget, who, digits = form.widget, form.principal, digits_key(form.widget)
     failed: TextLike = ""
-    if given["_digit"] not in ("", "enter"):
-        state.access.type_digit(who.client.id, digits, given["_digit"])
-    elif given["_digit"] == "enter" and not too_soon:
-        given["_pin"] = given["_pin"] or state.access.typed_digits(who.client.id, digits)
+    if entered["_digit"] not in ("", "enter"):
+        state.access.type_digit(who.client.id, digits, entered["_digit"])
+    elif entered["_digit"] == "enter" and not too_soon:
+        entered["_pin"] = entered["_pin"] or state.access.typed_digits(who.client.id, digits)
         state.access.type_digit(who.client.id, digits, "clear")
-        confirmed, failed = await _checked(state, form, given)
+        confirmed, failed = await _checked(state, form, entered)
         if confirmed is not None:
             return confirmed, {}
-    sheet = confirm_sheet(state, session, widget, who, given["_user"])
+    sheet = confirm_sheet(state, session, widget, who, entered["_user"])
     return None, {**sheet, "failed": failed, "scripted": False}
 
 
 async def _checked(
-    state: AppState, form: PressForm, given: dict[str, str]
+    state: AppState, form: PressForm, entered: dict[str, str]
 ) -> tuple[ConfirmedBy | None, TextLike]:
     """Who confirmed it with what was entered; else why nobody did."""
-    entered = [way for way in ("_badge", "_password", "_pin") if given[way]]
-    if not entered:
+    ways = [way for way in ("_badge", "_password", "_pin") if entered[way]]
+    if not ways:
         return None, say("confirm_empty")
-    (way, *_) = entered
-    name = given["_user"][:LONGEST_NAME] if way != "_badge" else ""
+    (way, *_) = ways
+    name = entered["_user"][:LONGEST_NAME] if way != "_badge" else ""
     inputs = dict(form.fields)
     question = question_of(state, form.widget, inputs)
     if question.confirmation == "two_persons" and way != "_badge" and not name:
         return None, say("confirm_who")
-    attempt = Attempt(name, _WAYS[way], given[way])
+    attempt = Attempt(name, _WAYS[way], entered[way])
     user_session = state.access.sessions.get(form.session, form.principal.client.id)
     try:
         checked, token = await state.confirmer.confirm(form.principal, user_session, question, attempt)
