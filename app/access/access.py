@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Literal
 
-from app.access.access_log import AccessLog, AccessLogWriter
+from app.access.access_log import WAITS, WRONG, AccessLog, AccessLogWriter
 from app.access.delays import SignInDelays
 from app.access.oidc import ExternalUser, OidcSignIns
 from app.access.secret_checker import SecretChecker
@@ -188,7 +188,7 @@ class Access:
         named = self.book.user(attempt.name)
         failed = partial(self.log.failed, client, named.name if named else "", action, widget)
         if wait_s := self.delays.wait_s(attempt.name, address):
-            await failed(say(f"{action}_wait_logged"))
+            await failed(say(WAITS[action]))
             return Checked(None, say("sign_in_wait", seconds=str(wait_s)), "sign_in_wait", wait_s)
         self.checker.admit(client.local)
         self.delays.failed(attempt.name, address)
@@ -197,7 +197,7 @@ class Access:
         now = self.book.user(user.name) if user else None  # the file may have changed
         if user is None or now is None or rights_of(now) != rights_of(user):
             left = self.delays.tries_left(attempt.name, address)
-            code = f"{action}_wrong_{attempt.way}"
+            code = WRONG[action][attempt.way]
             wait_s = self.delays.wait_s(attempt.name, address)
             await failed(say(code))
             return Checked(None, say(code), code, wait_s, 0 if wait_s else left)

@@ -4,7 +4,7 @@ import json
 import logging
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +24,20 @@ log = logging.getLogger("kiosk.access")
 
 STATE: Final = "users.logged"  # what the operator's log has of the users' file
 USED_EVERY_S: Final = 3600.0  # the last use of a token is kept this coarsely
+# Why a secret is not taken, by what it is for.
+WAITS: Final = {"sign_in": "sign_in_wait_logged", "confirm": "confirm_wait_logged"}
+WRONG: Final[Mapping[str, Mapping[Way, str]]] = {
+    "sign_in": {
+        "pin": "sign_in_wrong_pin",
+        "password": "sign_in_wrong_password",
+        "badge": "sign_in_wrong_badge",
+    },
+    "confirm": {
+        "pin": "confirm_wrong_pin",
+        "password": "confirm_wrong_password",
+        "badge": "confirm_wrong_badge",
+    },
+}
 ACTS: Final = (
     "add", "role", "groups", "pin", "password", "badge", "disable", "enable", "remove", "token",
     "revoke",

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final, Literal
 
 from app.i18n import Text, TextLike, say
 from app.permission.principal import Principal
@@ -15,9 +15,17 @@ WITHOUT_USERS: Final = "confirm_without_users"
 WITHOUT_SECOND: Final = "confirm_without_second"
 SIGN_IN: Final = "confirm_sign_in"
 BY_PROGRAM: Final = "confirm_by_program"
-CONFIRMED_CODES: Final = frozenset(
-    f"{said}_{means}" for said in ("confirmed", "confirmed_two") for means in get_args(Means)
-)
+BY_ONE: Final[Mapping[Means, str]] = {
+    "pin": "confirmed_pin",
+    "password": "confirmed_password",
+    "badge": "confirmed_badge",
+}
+BY_TWO: Final[Mapping[Means, str]] = {
+    "pin": "confirmed_two_pin",
+    "password": "confirmed_two_password",
+    "badge": "confirmed_two_badge",
+}
+CONFIRMED_CODES: Final = frozenset((*BY_ONE.values(), *BY_TWO.values()))
 LOCK_CODES: Final = (*NEEDED.values(), WITHOUT_USERS, WITHOUT_SECOND, SIGN_IN, BY_PROGRAM)
 
 
@@ -33,8 +41,8 @@ class ConfirmedBy:
     def said(self) -> Text:
         """For the receipt and the operator's log."""
         if self.second:
-            return say(f"confirmed_two_{self.means}", user=self.user, second=self.second)
-        return say(f"confirmed_{self.means}", user=self.user)
+            return say(BY_TWO[self.means], user=self.user, second=self.second)
+        return say(BY_ONE[self.means], user=self.user)
 
 
 @dataclass(slots=True, eq=False)

@@ -13,6 +13,11 @@ from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
 from app.web.rendering.page_words import Ask, ask_of
 
+TITLES: Final = {
+    "pin": "confirm_title_pin",
+    "password": "confirm_title_password",
+    "badge": "confirm_title_badge",
+}
 WORDS: Final = ("clear", "delete", "password", "badge", "name")
 
 
@@ -76,4 +81,4 @@ def digits_key(command: Command) -> str:
 
 
 def _title(ways: set[Any]) -> str:
-    return next(f"confirm_title_{way}" for way in ("pin", "password", "badge") if way in ways)
+    return next(title for way, title in TITLES.items() if way in ways)
