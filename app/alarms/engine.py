@@ -50,7 +50,7 @@ class AlarmEngine:
         self._by_robot: dict[str, list[str]] = {}
         self._sources: dict[tuple[str, str], Definition] = {}  # (robot, alarm's id) → of its entries
         self._entries: dict[tuple[str, str], list[AlarmInstance]] = {}  # by the same
-        self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, widget)
+        self._inhibitors: dict[tuple[str, str], list[AlarmInstance]] = {}  # by (robot, control)
         self._watch = SourceWatch()
         self._first_out = FirstOut(panel.alarm_rules.first_out_s)
         self._entry_count = 0
@@ -83,8 +83,8 @@ class AlarmEngine:
         return alarm
 
     def _inhibit(self, alarm: AlarmInstance) -> None:
-        for widget in alarm.definition.alarm.inhibits:
-            self._inhibitors.setdefault((alarm.definition.robot, widget), []).append(alarm)
+        for control in alarm.definition.inhibits:
+            self._inhibitors.setdefault(control, []).append(alarm)
 
     @property
     def due(self) -> float:
@@ -274,7 +274,8 @@ class AlarmEngine:
         return sorted(listed, key=lambda alarm: alarm.order)
 
     def inhibited(self, robot: str) -> Mapping[str, AlarmInstance]:
-        """The controls of a robot that alarms lock now, each with the most urgent of them."""
+        """The controls of a robot that alarms lock now, each with the most urgent of them: also alarms
+        of other robots."""
         locks: dict[str, AlarmInstance] = {}
         for (known, widget), alarms in self._inhibitors.items():
             inhibiting = [alarm for alarm in alarms if alarm.inhibits] if known == robot else []
@@ -283,7 +284,7 @@ class AlarmEngine:
         return locks
 
     def _note_lock(self, alarm: AlarmInstance, before: tuple[bool, bool, TextLike]) -> None:
-        if alarm.definition.alarm.inhibits and alarm.lock != before:
+        if alarm.definition.inhibits and alarm.lock != before:
             self._lock_changes += 1
 
     def _transition(

@@ -11,13 +11,16 @@ from app.alarms.states import AlarmKind
 from app.alarms.status import NORMAL, AlarmRules, AlarmStatus, Moment
 from app.i18n import TextLike
 from app.panel.alarm import Alarm
+from app.panel.inhibits import inhibited_controls
 from app.panel.model import Panel
+from app.panel.robot_panels import widget_robots
 
 
 @dataclass(frozen=True, slots=True)
 class Definition:
     """An alarm of the panel file, of one robot ("" for the only one). `thresholds` are its limits, or
-    one None for a condition without a limit. `id` is unique in the panel."""
+    one None for a condition without a limit. `id` is unique in the panel. `inhibits` are the (robot,
+    control) that it locks."""
 
     id: str
     robot: str
@@ -25,6 +28,7 @@ class Definition:
     rules: AlarmRules
     delays: Delays
     thresholds: tuple[Limit | None, ...]
+    inhibits: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_of_robot(self) -> bool:
@@ -36,18 +40,19 @@ class Definition:
         rules = self.rules
         if entry.priorities != rules.priorities:
             rules = replace(rules, priorities=entry.priorities)
-        name = f"{self.id}:{entry.name}"
-        return Definition(name, self.robot, self.alarm, rules, self.delays, self.thresholds)
+        return replace(self, id=f"{self.id}:{entry.name}", rules=rules)
 
 
 def define(panel: Panel, robot: str) -> Iterator[Definition]:
     """The definitions of all alarms of a robot."""
+    robots, of_widgets = tuple(str(each.id) for each in panel.robots), widget_robots(panel)
     for alarm in panel.alarms:
         if alarm.is_for(robot or None):
-            yield _define(alarm, robot)
+            controls = inhibited_controls(alarm.inhibits, robot, robots, of_widgets)
+            yield _define(alarm, robot, tuple(dict.fromkeys(controls)))
 
 
-def _define(alarm: Alarm, robot: str) -> Definition:
+def _define(alarm: Alarm, robot: str, inhibits: tuple[tuple[str, str], ...]) -> Definition:
     limits = (
         Limit(cast(LimitName, name), value, alarm.deadband) for name, value in alarm.limits.items()
     )
@@ -59,6 +64,7 @@ def _define(alarm: Alarm, robot: str) -> Definition:
         AlarmRules(kind, alarm.priorities, alarm.on_unknown == "raise", alarm.max_shelf_s),
         Delays(alarm.on_delay_s, alarm.off_delay_s),
         tuple(limits) or (None,),
+        inhibits,
     )
 
 

@@ -23,6 +23,7 @@ from app.panel.base import (
 )
 from app.panel.condition import Condition
 from app.panel.field_paths import FieldPath, MessageField
+from app.panel.inhibits import InhibitedNames
 from app.panel.number_format import Factor
 from app.panel.widgets.displays import StateValue
 from app.panel.widgets.families import TopicSource
@@ -68,13 +69,6 @@ def _parse_patterns(value: Any) -> tuple[str, ...]:
     return tuple(patterns)
 
 
-def _check_unique(ids: tuple[str, ...]) -> tuple[str, ...]:
-    for i, name in enumerate(ids):
-        if name in ids[:i]:
-            raise ValueError(f"names {format_value(name)} twice")
-    return ids
-
-
 def _check_levels(value: Mapping[str, int]) -> Mapping[str, int]:
     for level in value:
         if not LEVEL.fullmatch(level):
@@ -85,7 +79,6 @@ def _check_levels(value: Mapping[str, int]) -> Mapping[str, int]:
 TIME_OF_DAY: Final = re.compile(r"([01][0-9]|2[0-3]):[0-5][0-9]")
 LEVEL: Final = re.compile(r"-?[0-9]{1,10}|[A-Z][A-Z0-9_]*")
 Patterns = Annotated[tuple[str, ...], BeforeValidator(_parse_patterns)]
-Widgets = Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(_check_unique)]
 
 
 class AlarmList(Description):
@@ -137,7 +130,7 @@ class Alarm(Description):
     group: AlarmText | None = None
     latched: bool = False
     ack: Literal["required", "none"] = "required"
-    inhibits: Widgets = ()
+    inhibits: InhibitedNames = ()
     state: StateValue | None = None
     needs: Id | None = None
     ack_command: Id | None = None

@@ -76,8 +76,21 @@ class RobotAlarms:
         if self._locks_version != self._engine.lock_changes:
             self._locks_version = self._engine.lock_changes
             inhibited = self._engine.inhibited(self.robot_id)
-            self._locks = {widget: _lock(alarm) for widget, alarm in inhibited.items()}
+            self._locks = {widget: self._lock(alarm) for widget, alarm in inhibited.items()}
         return self._locks
+
+    def _lock(self, alarm: AlarmInstance) -> Verdict:
+        """The lock with the alarm's text and what to do; of another robot's alarm with its robot."""
+        name, action, robot = alarm.text, alarm.action, alarm.definition.robot
+        if robot != self.robot_id:
+            name = say("alarm_of_robot", name=name, robot=self._engine.robots[robot].title)
+        _, is_unknown, _ = alarm.lock
+        if is_unknown:
+            return locked("alarm_inhibits_unknown", name=name)
+        if not action:
+            return locked("alarm_inhibits", name=name)
+        reason = say("alarm_inhibits_action", name=name, action=action)
+        return Verdict(False, "alarm_inhibits", reason)
 
 
 def panel_id(alarm_id: str) -> str:
@@ -88,15 +101,3 @@ def panel_id(alarm_id: str) -> str:
 def _stands(row: AlarmRow) -> bool:
     """Whether something is to be done about an alarm now."""
     return row["state"] in ("active", "latched")
-
-
-def _lock(alarm: AlarmInstance) -> Verdict:
-    """The lock with the alarm's text and what to do."""
-    name, action = alarm.text, alarm.action
-    _, is_unknown, _ = alarm.lock
-    if is_unknown:
-        return locked("alarm_inhibits_unknown", name=name)
-    if not action:
-        return locked("alarm_inhibits", name=name)
-    reason = say("alarm_inhibits_action", name=name, action=action)
-    return Verdict(False, "alarm_inhibits", reason)

@@ -32,6 +32,14 @@ PAGE: Final = '[[page]]\nid = "example"\ntitle = "Example"\n'
 INTERLOCKS: Final = {
     "operation": '[[interlock]]\nid = "operation"\ntopic = "/operation_enabled"\n',
 }
+START: Final = """[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Bool"
+message = { data = true }
+"""
 BATTERY: Final = """[[page.widget]]
 id = "battery"
 kind = "readout"
@@ -89,9 +97,15 @@ def completed(example: str) -> str:
     widgets = {widget.get("id") for each in tables["page"] for widget in each.get("widget", [])}
     named = set(re.findall(r'"\{(\w+)\}"', text)) - widgets
     text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))
+    if "start" in _inhibited(tables) - widgets:
+        text += START
     locks = set(re.findall(r'^interlock = "(\w+)"', text, re.MULTILINE))
     there = {interlock["id"] for interlock in tables.get("interlock", [])}
     return text + "".join(INTERLOCKS[name] for name in sorted(locks - there))
+
+
+def _inhibited(tables: dict[str, Any]) -> set[str]:
+    return {name for alarm in tables.get("alarm", ()) for name in alarm.get("inhibits", ())}
 
 
 @pytest.mark.parametrize("example", blocks("toml"))

@@ -9,6 +9,7 @@ from app.interfaces import Interfaces, has_key
 from app.interfaces.validation import format_value
 from app.panel.alarm import DIAGNOSTIC_ARRAY, LIMIT_KEYS, Alarm, AlarmList, SourceKind
 from app.panel.checks.conditions import condition_faults
+from app.panel.checks.inhibits import inhibit_faults
 from app.panel.checks.types import field_faults, type_fault
 from app.panel.constants import NUMBERS
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
@@ -50,8 +51,7 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
         if alarm.id.startswith(RESERVED):
             message = f'ids that begin with "{RESERVED}" are those of the panel\'s own alarms'
             yield Fault(f"{place}.id", f"{message}: choose another id")
-        yield from _reference_faults(f"{place}.inhibits", "control", alarm.inhibits, commands)
-        yield from _stop_faults(place, alarm, panel)
+        yield from inhibit_faults(place, alarm, panel, commands)
         yield from _state_faults(place, alarm, panel)
         yield from _command_faults(place, alarm, panel, faulty)
         for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
@@ -60,16 +60,6 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
         yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
         yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.shown_pictures)
         yield from _source_faults(place, alarm, interfaces, panel.language)
-
-
-def _stop_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
-    """A stop button is never locked by an alarm."""
-    stops = {widget.id for widget in panel.stops}
-    for i, widget in enumerate(alarm.inhibits):
-        if widget in stops:
-            yield Fault(
-                f"{place}.inhibits[{i}]", f'"{widget}" stops the machine: an alarm may not lock it'
-            )
 
 
 def _state_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
