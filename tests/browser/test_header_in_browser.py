@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browser.browsers import sized
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
 
@@ -86,7 +86,7 @@ def test_parts_of_the_header_have_room(
         expect(page.locator("html[data-floor]")).to_be_attached()
         for width, height in SIZES:
             sized(page, width, height).evaluate(DRAWN)
-            assert page.evaluate(CROWDED) == [], (server is branded, width)
+            assert settled(page, CROWDED) == [], (server is branded, width)
             expect(page.locator("#clock")).to_be_visible()
             expect(page.locator("#day")).to_be_visible(visible=width >= 900)
 
@@ -114,7 +114,7 @@ def test_who_has_control_is_beside_the_state_and_not_cut(
             expect(page.locator(f".control[data-role={role}]")).to_be_visible()
             for width, height in SIZES:
                 sized(page, width, height).evaluate(DRAWN)
-                assert page.evaluate(CROWDED) == [], (role, width)
+                assert settled(page, CROWDED) == [], (role, width)
                 expect(page.locator(".menu-key")).to_be_in_viewport(ratio=1)
             page.locator("#banner").evaluate("(banner) => (banner.hidden = true)")
             who = page.locator(".who")
