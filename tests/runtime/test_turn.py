@@ -46,6 +46,16 @@ CONTROLLED = panel_of(SPEED, JOG, ARM, control={"required": True})
 ANN = Principal(Clients().identify(f"{1:032x}", "192.0.2.1"))
 
 
+class Stamp:
+    """Of the bridge, which stamps all that comes through it."""
+
+    def get_id(self) -> str:
+        return BRIDGE
+
+    def get_time(self) -> Any:
+        raise AssertionError("the time of a sample that is not recorded is not read")
+
+
 class Cell:
     """A session without Zenoh: what arrives is put into its inbox, what it sends is kept."""
 
@@ -69,7 +79,7 @@ class Cell:
         self.take()
 
     def permit(self, permitted: bool) -> None:
-        self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), None)
+        self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), Stamp())
 
     def take(self) -> None:
         self.session.turn.run()
@@ -185,7 +195,7 @@ def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pyte
             while not cell.session.commands.confirmations.is_awaited("heard"):
                 await asyncio.sleep(0.001)
         cell.note_the_order()
-        cell.inbox.put("heard", INTERFACES.encode(TEXT, {"data": "on"}), None)
+        cell.inbox.put("heard", INTERFACES.encode(TEXT, {"data": "on"}), Stamp())
         cell.permit(False)
         cell.take()
         assert cell.order == ["holds", "confirmations", "view"]
