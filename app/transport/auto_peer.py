@@ -53,7 +53,7 @@ class AutoPeer:
             "bridge": BridgePeer(context),
             "rmw_zenoh": RmwZenohPeer(context),
         }
-        self._robot.nodes_are_read = False
+        self._robot.nodes_are_read = True  # of a bridge's, if it is one: until then no server is asked
         self._started: set[Kind] = set()
         self._chosen: Peer | None = None
         self._reopening = False  # by a choice, which stays
@@ -106,7 +106,7 @@ class AutoPeer:
         if self._chosen is not None:
             self._chosen.on_graph_change(False)  # it leaves
         self._chosen, self._dialect.choice = None, None
-        self._robot.traits, self._robot.nodes_are_read = AUTO_TRAITS, False
+        self._robot.traits, self._robot.nodes_are_read = AUTO_TRAITS, True
         self._robot.mark_link_lost()  # a graph without what was only of that kind
 
     async def _look(self) -> None:
