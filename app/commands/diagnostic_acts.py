@@ -1,4 +1,5 @@
-"""Acts of the page of diagnostics: the rows of a check by the doctor, and of the support bundle."""
+"""Acts of the page of diagnostics: the rows of a check by the doctor, of the support bundle, and of a
+recording that is shared with Foxglove."""
 
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
@@ -39,6 +40,11 @@ def _bundle(doctor: Doctor, _: ActRequest) -> Applied:
     return Applied(say("diagnostics_busy") if doctor.is_busy else None)
 
 
+def _share(_: Doctor, __: ActRequest) -> Applied:
+    """The caller shares the recording once the act is logged."""
+    return Applied()
+
+
 def _entry(code: str) -> Callable[[Applied], Text]:
     return lambda _: say(code)
 
@@ -46,4 +52,5 @@ def _entry(code: str) -> Callable[[Applied], Text]:
 DIAGNOSTIC_ACTS: Final[Mapping[str, Act[Doctor, Applied]]] = {
     "check": Act(server_permits, _check, _entry("log_done_check"), MAINTENANCE),
     "bundle": Act(server_permits, _bundle, _entry("log_done_bundle"), MAINTENANCE),
+    "foxglove": Act(server_permits, _share, _entry("log_done_foxglove"), MAINTENANCE),
 }

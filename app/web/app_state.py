@@ -24,6 +24,7 @@ from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
 from app.web.metrics import Metrics
 from app.web.rendering.page_templates import PageTemplates
+from app.web.shared_recordings import SharedRecordings
 
 
 @dataclass(slots=True)
@@ -40,6 +41,7 @@ class AppState:
     access: Access
     clients: Clients = field(default_factory=Clients)
     in_flight: InFlight = field(default_factory=InFlight)
+    shared: SharedRecordings = field(default_factory=SharedRecordings)
     user_acts: ActRunner[Access] = field(init=False)
     confirmer: Confirmer = field(init=False)
 

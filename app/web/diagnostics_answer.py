@@ -44,11 +44,13 @@ class LookQuery(BaseModel):
 
 
 class DiagnosticActBody(BaseModel):
-    """The same `id` again is the same act. `at` is when it was touched, in the server's own time."""
+    """The same `id` again is the same act. `at` is when it was touched, in the server's own time.
+    `robot` is the id of one of several robots, whose recording is shared."""
 
     model_config = ConfigDict(extra="forbid")
 
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
+    robot: Annotated[str, Field(max_length=64)] = ""
     at: AwareDatetime | None = None
 
 
@@ -238,7 +240,8 @@ class LookAnswer(BaseModel):
 
 
 class DiagnosticReceipt(BaseModel):
-    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name."""
+    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name. `recording`
+    is the address of the recording that was shared, "" of other acts."""
 
     id: str
     act: str
@@ -247,3 +250,4 @@ class DiagnosticReceipt(BaseModel):
     reason: str
     at: AwareDatetime
     done: bool
+    recording: str

@@ -33,6 +33,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/widgets/{widget}/trend": ANYBODY,
     "/alarms": ANYBODY,
     "/help": ANYBODY,
+    "/recordings/shared/{token}.mcap": ANYBODY,  # the token permits it, see POST /diagnostics/foxglove
     "/display": ANYBODY,
     "/static/{revision}/{name:path}": ANYBODY,
     "/healthz": ANYBODY,

@@ -22,6 +22,8 @@ from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
 GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines|lock))/?")
+# Asked by a browser before Foxglove reads a recording that was shared with it.
+PREFLIGHTED: Final = re.compile(r"/recordings/shared/[^/]+")
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
@@ -86,6 +88,8 @@ class RequestGuard:
             and scope["method"] in READING
             and not GUARDED.fullmatch(path_of(scope))
         ):
+            return None
+        if scope.get("method") == "OPTIONS" and PREFLIGHTED.fullmatch(path_of(scope)):
             return None
         for site in headers.getlist("sec-fetch-site"):
             if site not in OWN_SITE:

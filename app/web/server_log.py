@@ -3,6 +3,7 @@ is the client's, and the number of those that follow."""
 
 import asyncio
 import logging
+import re
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Final
@@ -11,6 +12,7 @@ from app.repeated_records import RepeatedRecords
 
 # asyncio logs what fails below a connection, such as a TLS handshake.
 LOGGERS: Final = ("uvicorn.error", "asyncio", "kiosk.connections", "kiosk.web")
+TOKEN_PATH: Final = re.compile(r"(/recordings/shared/)[^/?\s]+")
 COUNT_EVERY_S: Final = 5.0
 # uvicorn's and websockets' words → ours, for faults of a client.
 CLIENT_FAULTS: Final[Mapping[str, str]] = {
@@ -32,6 +34,18 @@ class ClientFaults(logging.Filter):
         return record.levelno >= logging.WARNING or not about_client
 
 
+class MaskedTokens(logging.Filter):
+    """Masks the tokens of shared recordings in the lines of requests."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if isinstance(record.args, tuple):
+            record.args = tuple(
+                TOKEN_PATH.sub(r"\1***", value) if isinstance(value, str) else value
+                for value in record.args
+            )
+        return True
+
+
 def limit_server_log(debug: bool) -> RepeatedRecords:
     """Puts the filters on the server's loggers; with `debug` each WebSocket is logged."""
     repeated = RepeatedRecords()
@@ -46,6 +60,9 @@ def limit_server_log(debug: bool) -> RepeatedRecords:
         if not debug:
             logger.addFilter(ClientFaults())
         logger.addFilter(repeated)
+    requests = logging.getLogger("uvicorn.access")
+    if not any(isinstance(log_filter, MaskedTokens) for log_filter in requests.filters):
+        requests.addFilter(MaskedTokens())
     return repeated
 
 

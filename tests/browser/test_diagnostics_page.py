@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
@@ -16,7 +17,8 @@ from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import DRAWN
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, SHIPPED, Server, until
-from tests.support.servers import ready
+from tests.support.servers import demo_server, ready
+from tests.web.test_recordings import PANEL, RECORD
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 VIEWS: Final = ("links", "topics", "servers", "graph", "nodes")
@@ -128,3 +130,20 @@ def test_axe_finds_nothing(cell: Server, axe_page: Page) -> None:
             axe_page.goto(f"{cell.url}/diagnostics?view={view}&look=cell/state")
             axe_page.evaluate(DRAWN)
             assert violations(axe_page) == []
+
+
+def test_open_in_foxglove_shows_links_to_a_file_that_can_be_read(tmp_path: Path, page: Page) -> None:
+    with demo_server(tmp_path, PANEL + RECORD) as server:
+        page.goto(f"{server.url}/diagnostics")
+        page.get_by_role("button", name="Open in Foxglove").click()
+        links = page.locator(".shared a")
+        expect(links).to_have_count(2)
+        in_browser, in_app = (links.nth(at).get_attribute("href") or "" for at in range(2))
+        address = parse_qs(urlsplit(in_browser).query)["ds.url"][0]
+        assert in_browser.startswith("https://app.foxglove.dev/~/view?ds=remote-file&ds.url=http%3A")
+        assert in_app == f"foxglove://open?{urlsplit(in_browser).query}"
+        assert server.http.get(address).content[:5] == b"\x89MCAP"
+        assert address.rpartition("/")[2] not in page.url
+        text = page.locator(".shared").inner_text()
+        page.wait_for_timeout(2500)  # the page is fetched again
+        assert page.locator(".shared").inner_text() == text

@@ -54,5 +54,5 @@ def test_without_a_log_neither_is_done() -> None:
     guard = Guard()
     guard.verdict = locked("press_clock_ahead")
     page = Page(doctor, guard)
-    assert [page.act(act, act).outcome for act in DIAGNOSTIC_ACTS] == ["refused"] * 2
+    assert [page.act(act, act).outcome for act in DIAGNOSTIC_ACTS] == ["refused"] * 3
     assert doctor.begun == 0

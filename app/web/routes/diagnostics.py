@@ -4,7 +4,7 @@ import asyncio
 import secrets
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Path, Query, Request
@@ -41,6 +41,10 @@ from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
 from app.web.request_body import act_body_of, as_model
 from app.web.routes.presses import STATUS
+from app.web.shared_recordings import SharedLinks, links_of
+
+if TYPE_CHECKING:
+    from app.recording import Recorder
 
 router = APIRouter()
 
@@ -88,7 +92,7 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
 
 @router.post(
     "/diagnostics/{act}",
-    summary="Begin a check by the doctor, or get the support bundle",
+    summary="Begin a check by the doctor, get the support bundle, or share a recording with Foxglove",
     responses=errors(404, 408, 413, 422)
     | refusals(DiagnosticReceipt)
     | {
@@ -97,13 +101,13 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
                 JSON: {"schema": DiagnosticReceipt.model_json_schema()},
                 ZIP: {"schema": {"type": "string", "format": "binary"}},
             },
-            "description": "of `check` the receipt, of `bundle` the zip",
+            "description": "of `check` and `foxglove` the receipt, of `bundle` the zip",
         },
         303: {"description": "of a form: back to the page, with the receipt's id"},
         503: {"description": "the operator's log can't be written, or the bundle not be made"},
     },
     openapi_extra=described_body(
-        DiagnosticActBody, fields(id={"pattern": PRESS_ID}, page={}), required=False
+        DiagnosticActBody, fields(id={"pattern": PRESS_ID}, page={}, robot={}), required=False
     ),
 )
 async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Response:
@@ -114,7 +118,9 @@ async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Resp
     act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
     at = body.at.timestamp() if body.at and not is_form else None
     requested = ActRequest(act, who, at=at, scripted=not is_form)
-    runner = session.diagnostic_acts
+    runner, recorder = session.diagnostic_acts, state.fleet.of_robot(body.robot).commands.recorder
+    if act == "foxglove" and recorder is None:
+        raise NotFound(say("recording_off"))
     if not state.limits.admit(who):
         receipt = runner.limited(requested, act_id, TOO_OFTEN)
     else:
@@ -123,7 +129,10 @@ async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Resp
     if receipt.done and act == "bundle":
         answer = await _bundle(state)
     else:
-        answer = _back(state, content, receipt) if is_form else _receipt(request, receipt)
+        address = ""
+        if receipt.done and act == "foxglove" and recorder is not None:
+            address = await _share(request, state, recorder, body.robot, act_id)
+        answer = _back(state, content, receipt) if is_form else _receipt(request, receipt, address)
     return set_client_cookie(answer, request, token)
 
 
@@ -149,8 +158,18 @@ async def _page(
     again = urlencode({"robot": query.robot}) if query.robot else ""
     name = "_diagnostics.html" if query.part else "diagnostics.html"
     page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
-    more = {"act_refused": _refusal(session, query.act), "mqtt": state.fleet.alarms.mqtt}
+    more = {
+        "act_refused": _refusal(state.fleet.of_robot(""), query.act),
+        "mqtt": state.fleet.alarms.mqtt,
+        "shared": _shared(request, state, query.robot),
+    }
     return framed_page(request, state, page, {**context, **TEXTS, **more})
+
+
+def _shared(request: Request, state: AppState, robot: str) -> SharedLinks | None:
+    """The links to the recording that was shared last, None without one."""
+    recording = state.shared.latest(robot)
+    return links_of(recording, str(request.base_url)) if recording else None
 
 
 async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
@@ -202,8 +221,19 @@ async def _bundle(state: AppState) -> Response:
     return Response(data, media_type=ZIP, headers=headers | {"content-encoding": "identity"})
 
 
-def _receipt(request: Request, receipt: ActReceipt) -> Response:
-    content = localized({**receipt.as_json(), "done": receipt.done}, language_of(request))
+async def _share(
+    request: Request, state: AppState, recorder: "Recorder", robot: str, act_id: str
+) -> str:
+    """The address of the last minute of a robot, which is shared once for each act."""
+    recording = state.shared.by_act(act_id)
+    if recording is None:
+        recording = state.shared.share(await recorder.last_minute(), robot, act_id)
+    return links_of(recording, str(request.base_url)).address
+
+
+def _receipt(request: Request, receipt: ActReceipt, address: str) -> Response:
+    about = {"done": receipt.done, "recording": address}
+    content = localized({**receipt.as_json(), **about}, language_of(request))
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
 

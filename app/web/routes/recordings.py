@@ -1,19 +1,37 @@
-"""The last minute as an MCAP file, for Foxglove and rosbag2."""
+"""The last minute as an MCAP file, for Foxglove and rosbag2: downloaded, or shared with Foxglove."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 
 from app.errors import NotFound
 from app.i18n import say
 from app.web.app_state import CurrentState
+from app.web.byte_ranges import ranged
 from app.web.openapi_parts import errors
 
 router = APIRouter()
 
 MCAP: Final = "application/octet-stream"  # it has no media type of its own
+FOXGLOVE: Final = "https://app.foxglove.dev"
+CORS: Final = {
+    "access-control-allow-origin": FOXGLOVE,
+    "access-control-expose-headers": "Accept-Ranges, Content-Length, Content-Range, ETag",
+    "cache-control": "no-store",
+    "content-encoding": "identity",  # ranges are those of the file
+    "referrer-policy": "no-referrer",
+}
+PREFLIGHT: Final = {
+    "access-control-allow-methods": "GET, HEAD",
+    "access-control-allow-headers": "Range, If-Range, Cache-Control",
+    # A page of the internet asks for a file in the plant's network (Private Network Access).
+    "access-control-allow-private-network": "true",
+    "access-control-max-age": "600",
+}
+FILE: Final = {"schema": {"type": "string", "format": "binary"}}
+Token = Annotated[str, Path(min_length=20, max_length=64, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 @router.get(
@@ -40,3 +58,28 @@ async def last_minute(
         "content-encoding": "identity",  # it is packed already
     }
     return Response(content, media_type=MCAP, headers=headers)
+
+
+@router.get(
+    "/recordings/shared/{token}.mcap",
+    response_class=Response,
+    summary="A recording that was shared with Foxglove, until it ends",
+    responses=errors(404)
+    | {
+        200: {"content": {MCAP: FILE}, "description": "the whole file"},
+        206: {"content": {MCAP: FILE}, "description": "the range of `Range`"},
+        416: {"description": "the file has nothing of the range"},
+    },
+)
+async def shared_recording(request: Request, state: CurrentState, token: Token) -> Response:
+    """The token in the path permits it: Foxglove has no cookie of this panel."""
+    recording = state.shared.by_token(token)
+    if recording is None:
+        raise NotFound(say("shared_recording_ended"))
+    return ranged(request, recording.content, recording.etag, {**CORS, "content-type": MCAP})
+
+
+@router.options("/recordings/shared/{token}.mcap", include_in_schema=False)
+async def shared_recording_preflight(token: Token) -> Response:
+    """What a browser asks before Foxglove reads; it tells nothing of the token."""
+    return Response(status_code=204, headers=CORS | PREFLIGHT)
