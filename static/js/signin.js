@@ -1,5 +1,5 @@
 // The page of sign-in: the pad types into the field of the PIN, and the sign-in is sent without a new page.
-import { find } from "./show.js";
+import { closest, find } from "./show.js";
 
 const main = find(document, "main.sign-in");
 
@@ -10,7 +10,8 @@ async function submitted(event) {
   event.preventDefault();
   const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "";
   if (form.dataset.way === "pin" && digit !== "enter" && digit !== "") return typed(form, digit);
-  const fields = [...form.querySelectorAll("input")].map((input) => [input.name, input.value]);
+  const inputs = [...form.elements].filter((input) => input instanceof HTMLInputElement);
+  const fields = inputs.map((input) => [input.name, input.value]);
   for (const input of form.querySelectorAll("input")) if (input.type === "password") input.value = "";
   const said = find(document, "p.said");
   try {
@@ -33,4 +34,13 @@ function typed(form, digit) {
   input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, 12);
 }
 
+// The name that is typed goes with its user to the other way to sign in.
+main.addEventListener("click", ({ target }) => {
+  const link = closest(target, ".secret > a");
+  const name = document.querySelector("input#user");
+  if (!(link instanceof HTMLAnchorElement) || !(name instanceof HTMLInputElement)) return;
+  const address = new URL(link.href);
+  address.searchParams.set("user", name.value);
+  link.href = address.href;
+});
 main.addEventListener("submit", (event) => void submitted(event));

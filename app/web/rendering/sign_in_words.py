@@ -15,8 +15,8 @@ ROLE_WORDS: Final = {
     "engineer": say("role_engineer"),
 }
 WORDS: Final = (
-    "who", "sign_in", "sign_out", "other", "password", "view_only", "stop_works", "badge", "name",
-    "by_pin", "by_password", "clear", "delete", "choose",
+    "who", "sign_in", "sign_out", "other", "pin", "password", "view_only", "stop_works", "badge",
+    "name", "by_pin", "by_password", "clear", "delete", "choose", "typed", "back", "more",
 )  # fmt: skip
 
 

@@ -121,20 +121,26 @@ async def who_is_signed_in(request: Request, state: CurrentState) -> Response:
         "requestBody": {"required": True, "content": {JSON: {"schema": BODY}, FORM: {"schema": BODY}}}
     },
 )
-async def sign_in(request: Request, state: CurrentState) -> Response:
+async def sign_in(request: Request, state: CurrentState, other: bool = False) -> Response:
+    """`other`: the page on which the name is typed is shown again, with the reason of a refusal."""
     form, content = await act_body_of(request, FIELDS_MOST)
     attempt = attempt_of(as_model(SignIn, content))
-    return await signed_in(request, state, attempt, form)
+    return await signed_in(request, state, attempt, form, other)
 
 
-async def signed_in(request: Request, state: AppState, attempt: Attempt, form: bool) -> Response:
+async def signed_in(
+    request: Request, state: AppState, attempt: Attempt, form: bool, other: bool
+) -> Response:
     """The response to a sign-in; a new browser gets its cookies with it."""
     who = caller(request)
     token = "" if who.token else secrets.token_hex(16)
     asking = Caller(who.token or token, who.address)
     checked, session = await state.access.sign_in(asking.client(state), attempt)
     if session is None:
-        return _refused(request, state, checked, attempt, form)
+        if form:
+            query = sign_in_query(attempt.name, other, checked.code, attempt.way)
+            return RedirectResponse(f"{state.root}/signin?{query}", status_code=303)
+        return refused_answer(request, checked)
     answer = (
         RedirectResponse(f"{state.root}/", status_code=303)
         if form
@@ -211,13 +217,12 @@ def _about(state: AppState, who: Caller) -> JSONResponse:
     return JSONResponse(content, headers={"cache-control": "no-store"})
 
 
-def _refused(
-    request: Request, state: AppState, checked: Checked, attempt: Attempt, form: bool
-) -> Response:
-    if form:
-        query = urlencode({"user": attempt.name, "refused": checked.code})
-        return RedirectResponse(f"{state.root}/signin?{query}", status_code=303)
-    return refused_answer(request, checked)
+def sign_in_query(user: str, other: bool, refused: str = "", way: str = "") -> str:
+    """The query of the page of sign-in: the user, whether the name is typed there, and why the last
+    sign-in, in this way, was refused."""
+    password = "1" if way == "password" else "0" if other else ""
+    query = {"user": user, "other": "1" if other else "", "refused": refused, "password": password}
+    return urlencode({name: value for name, value in query.items() if value})
 
 
 def refused_answer(request: Request, checked: Checked) -> JSONResponse:
