@@ -34,6 +34,7 @@ from app.runtime.frames import Frames
 from app.runtime.graph_survey import GraphSurvey
 from app.runtime.ingest import Ingest, SampleListener
 from app.runtime.live_look import LiveLooks
+from app.runtime.node_round_trips import NodeRoundTrips
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
@@ -77,6 +78,7 @@ class RobotSession:
     turn: Turn
     frames: Frames
     survey: GraphSurvey
+    node_trips: NodeRoundTrips
     looks: LiveLooks
     renewal: Renewal
     rosout: Rosout
@@ -146,6 +148,7 @@ class RobotSession:
         self.press_guard.close()
         await self.looks.stop()
         await self.survey.stop()
+        await self.node_trips.stop()
         await self.renewal.stop()
         await self.peer.stop()
         await self.commands.stop()

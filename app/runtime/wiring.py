@@ -33,6 +33,7 @@ from app.runtime.frames import Frames
 from app.runtime.graph_survey import GraphSurvey
 from app.runtime.ingest import Ingest
 from app.runtime.live_look import LiveLooks
+from app.runtime.node_round_trips import NodeRoundTrips
 from app.runtime.recipes import Recipes
 from app.runtime.renewal import Renewal
 from app.runtime.robot_alarms import RobotAlarms
@@ -169,6 +170,7 @@ def wire_session(
         turn=Turn(context, peer, control, ingest, commands, refresher, robot_alarms),
         frames=Frames(context, partial(peer.on_graph_change, False)),
         survey=GraphSurvey(context, access.observe),
+        node_trips=NodeRoundTrips(context),
         looks=LiveLooks(context),
         renewal=Renewal(link, robot),
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),

@@ -23,6 +23,7 @@ from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
 from app.web.metrics import Metrics
+from app.web.page_trips import PageTrips
 from app.web.rendering.page_templates import PageTemplates
 from app.web.shared_recordings import SharedRecordings
 
@@ -40,6 +41,7 @@ class AppState:
     doctor: DoctorProcess
     access: Access
     clients: Clients = field(default_factory=Clients)
+    page_trips: PageTrips = field(default_factory=PageTrips)
     in_flight: InFlight = field(default_factory=InFlight)
     shared: SharedRecordings = field(default_factory=SharedRecordings)
     user_acts: ActRunner[Access] = field(init=False)

@@ -65,13 +65,15 @@ class RoundTripsAnswer(BaseModel):
 
 
 class LinkAnswer(BaseModel):
-    """A link: `state` is "ok", "wait" or "bad", `reason` why, "" for none."""
+    """A link: `state` is "ok", "wait" or "bad", `reason` why, "" for none. `trip_note` says by what its
+    round trips are measured, or why there are none."""
 
     name: str
     state: Literal["ok", "wait", "bad"]
     text: str
     reason: str
     round_trips: RoundTripsAnswer | None = None
+    trip_note: str = ""
 
 
 class UndecodableAnswer(BaseModel):

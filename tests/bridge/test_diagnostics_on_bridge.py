@@ -144,6 +144,12 @@ def test_the_graph_has_the_node_and_topics_that_the_panel_does_not_use(cell: Ser
     assert diagnostics(cell)["links"][1]["round_trips"]["median"] > 0
 
 
+def test_a_node_on_another_dds_than_the_bridges_is_not_asked(cell: Server) -> None:
+    why = render(say("diagnostics_trip_no_node", node=""))
+    until(lambda: diagnostics(cell)["links"][2]["trip_note"] == why, "the reason is said")
+    assert diagnostics(cell)["links"][2]["round_trips"] is None
+
+
 def per_second(server: Server, key: str) -> float:
     """How many messages of a topic arrive while it is looked into."""
     began, first = time.monotonic(), look(server, key)["received"]

@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.i18n import render, say
 from app.runtime.live_look import LINGER_S, MOST_AT_ONCE
 from app.web.diagnostics_answer import DiagnosticsAnswer, LookAnswer
 from tests.support.parts import Server, until
@@ -133,6 +134,36 @@ def test_links_have_round_trips_and_the_sentences_of_the_lamps(cell: Server) -> 
         assert (link["text"], link["reason"]) == (shown[name]["text"], shown[name]["reason"])
     trips = links["bridge"]["round_trips"]
     assert 0 < trips["least"] <= trips["median"] <= trips["most"]
+    assert (links["server"]["round_trips"], links["bridge"]["trip_note"]) == (None, "")
+
+
+def test_the_round_trip_to_a_node_is_measured_while_someone_asks(cell: Server) -> None:
+    def node() -> Any:
+        return diagnostics(cell)["links"][2]
+
+    trips = until(lambda: node()["round_trips"], "a node has answered")
+    assert 0 < trips["least"] <= trips["median"] <= trips["most"]
+    assert "/drive" in node()["trip_note"]
+    until(lambda: len(node()["round_trips"]["medians"]) > 1, "it is asked again", within_s=60)
+
+
+def test_a_robot_without_a_node_that_can_be_asked_has_the_reason(tmp_path: Path) -> None:
+    without = PANEL.partition('[[page.widget]]\nid = "speed"')[0]
+    why = render(say("diagnostics_trip_no_node", node=""), "en")
+    with demo_server(tmp_path, without) as server:
+        until(lambda: diagnostics(server)["links"][2]["trip_note"] == why, "the reason is said")
+        assert diagnostics(server)["links"][2]["round_trips"] is None
+        assert why in page(server)
+
+
+def test_a_browser_has_its_own_round_trips(cell: Server) -> None:
+    with httpx.Client(base_url=cell.url, headers=HTML) as browser, httpx.Client() as other:
+        browser.get("/diagnostics")
+        for ms in ("12", "30", "18"):
+            text = browser.get("/diagnostics", params={"part": "content", "rtt": ms}).text
+        assert "12 ms to 30 ms" in text
+        assert "18 ms" in text
+        assert "12 ms to" not in other.get(f"{cell.url}/diagnostics", headers=HTML).text
 
 
 def test_graph_has_the_robots_topics_and_what_the_panel_uses(cell: Server) -> None:

@@ -15,6 +15,7 @@ from app.runtime.robot_session import RobotSession
 from app.view.diagnostic_graph import graph_topic_rows, node_rows, robots_in
 from app.view.diagnostic_rows import TopicRow, parameter_rows, server_rows, topic_rows
 from app.view.link_status import LinkStatus
+from app.web.rendering.diagnostics_texts import trip_note
 
 
 def diagnostics_json(
@@ -25,10 +26,14 @@ def diagnostics_json(
     topics = topic_rows(panel, robot, now)
     behind = robots_in(survey.graph, robot.graph.every_peer)
     used = {row.key for row in topics}
-    trips = {"bridge": robot.round_trips.summary(now)}
+    trips = {"bridge": robot.round_trips.summary(now), "node": session.node_trips.summary(now)}
     return {
         "versions": dict(versions),
-        "links": [_link(n, link, trips.get(n)) for n, link in session.publisher.view["link"].items()],
+        "links": [
+            _link(name, link, trips.get(name))
+            | {"trip_note": trip_note(name, trips.get(name), session.node_trips)}
+            for name, link in session.publisher.view["link"].items()
+        ],
         "topics": [_topic(row) for row in topics],
         "servers": [fields_of(row) for row in server_rows(panel, robot, now)],
         "parameters": [

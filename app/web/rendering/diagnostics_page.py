@@ -33,7 +33,7 @@ from app.view.diagnostic_rows import (
 )
 from app.view.link_status import LinkStatus
 from app.web.diagnostics_answer import DiagnosticsQuery, View
-from app.web.rendering.diagnostics_texts import NOTHING, milliseconds, word
+from app.web.rendering.diagnostics_texts import NOTHING, milliseconds, trip_note, word
 
 MOST_ROWS: Final = 200  # of a list; the rest is counted
 PLOT_WIDTH, PLOT_HEIGHT = 96, 32
@@ -44,7 +44,7 @@ Row = TypeVar("Row", TopicRow, ServerRow, ParameterRow, NodeRow, GraphTopicRow)
 @dataclass(frozen=True, slots=True)
 class LinkRow:
     """A link with its lamp, what is known of its programs, and its round trips; `points` is their
-    plot."""
+    plot. `trip_note` says what was measured, or why nothing was."""
 
     id: str
     link: LinkStatus
@@ -52,6 +52,7 @@ class LinkRow:
     median: TextLike
     span: TextLike
     points: str
+    trip_note: TextLike
 
 
 class DiagnosticsContext(TypedDict):
@@ -90,8 +91,10 @@ def diagnostics_context(
     looked: Look | None,
     look_refused: TextLike,
     language: str,
+    page_trips: RoundTripSummary | None,
 ) -> DiagnosticsContext:
-    """The page as it is now. Only the list that is shown has rows."""
+    """The page as it is now. Only the list that is shown has rows. `page_trips` are the round trips of
+    the browser."""
     panel, robot, now = session.panel, session.robot, time.monotonic()
     behind = robots_in(survey.graph, robot.graph.every_peer)
     topics = topic_rows(panel, robot, now)
@@ -106,7 +109,7 @@ def diagnostics_context(
     lists = Lists(query, language)
     return DiagnosticsContext(
         query=query,
-        links=link_rows(session, survey, behind, query.rtt, now),
+        links=link_rows(session, survey, behind, page_trips, now),
         findings=_findings(doctor),
         doctor=doctor,
         doctor_at=format_time(doctor.wall) if doctor.wall else "",
@@ -190,28 +193,43 @@ def _graph_note(survey: Survey) -> TextLike:
 
 
 def link_rows(
-    session: RobotSession, survey: Survey, behind: Sequence[RobotGraph], rtt: float | None, now: float
+    session: RobotSession,
+    survey: Survey,
+    behind: Sequence[RobotGraph],
+    page_trips: RoundTripSummary | None,
+    now: float,
 ) -> list[LinkRow]:
-    """The three links; the first is measured by the browser, which sends it as `rtt` (ms)."""
-    trips = session.robot.round_trips.summary(now)
+    """The three links; the first is measured by the browser."""
+    trips = {
+        "server": page_trips,
+        "bridge": session.robot.round_trips.summary(now),
+        "node": session.node_trips.summary(now),
+    }
     about = {
         "server": f"operator-panel {installed_version()}",
         "bridge": _peer_about(survey, behind),
         "node": _nodes_about(behind),
     }
-    rows = []
-    median: TextLike
-    span: TextLike
-    for name, link in session.publisher.view["link"].items():
-        median, span, points = NOTHING, "", ""
-        if name == "server" and rtt is not None:
-            median = milliseconds(rtt)
-        if name == "bridge" and trips is not None:
-            median = milliseconds(1000 * trips.median)
-            least, most = milliseconds(1000 * trips.least), milliseconds(1000 * trips.most)
-            span, points = word("from_to", least=least, most=most), plot(trips)
-        rows.append(LinkRow(name, link, about.get(name, ""), median, span, points))
-    return rows
+    return [
+        _link_row(
+            name,
+            link,
+            about.get(name, ""),
+            trips.get(name),
+            trip_note(name, trips.get(name), session.node_trips),
+        )
+        for name, link in session.publisher.view["link"].items()
+    ]
+
+
+def _link_row(
+    name: str, link: LinkStatus, about: TextLike, trips: RoundTripSummary | None, note: TextLike
+) -> LinkRow:
+    if trips is None:
+        return LinkRow(name, link, about, NOTHING, "", "", note)
+    least, median, most = (milliseconds(1000 * s) for s in (trips.least, trips.median, trips.most))
+    span = word("from_to", least=least, most=most)
+    return LinkRow(name, link, about, median, span, plot(trips), note)
 
 
 def _peer_about(survey: Survey, behind: Sequence[RobotGraph]) -> TextLike:

@@ -6,7 +6,9 @@ from typing import Any, Final
 from app.clock import format_age, format_time
 from app.dialect.peer_traits import EVERY_SENTENCES
 from app.i18n import Param, Text, TextLike, number, render, say, text_in
+from app.robot.round_trips import RoundTripSummary
 from app.runtime.doctor_process import FoundFault
+from app.runtime.node_round_trips import NodeRoundTrips
 from app.view.diagnostic_rows import TopicRow
 
 NOTHING: Final = "–"
@@ -27,6 +29,16 @@ def look_word(name: str, **about: Param) -> Text:
 
 def milliseconds(ms: float) -> TextLike:
     return number(f"{ms:.1f}" if ms < 10 else f"{ms:.0f}", "ms")
+
+
+def trip_note(link: str, trips: RoundTripSummary | None, to_node: NodeRoundTrips) -> TextLike:
+    """By what the round trips of a link were measured, or why there are none; "" where that is
+    clear."""
+    if link == "node":
+        return word(to_node.state, node=to_node.node)
+    if trips is not None:
+        return ""
+    return word("trip_of_page") if link == "server" else word("trip_no_answer")
 
 
 def rate_text(rate_hz: float | None) -> TextLike:

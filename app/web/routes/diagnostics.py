@@ -2,6 +2,7 @@
 
 import asyncio
 import secrets
+import time
 from collections.abc import Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Final
@@ -18,13 +19,20 @@ from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import KioskError, NotFound
 from app.i18n import TextLike, localized, say
 from app.interfaces.names import Qos
+from app.robot.round_trips import RoundTripSummary
+from app.runtime.graph_survey import Survey
 from app.runtime.live_look import Look, LookedTopic
 from app.runtime.robot_session import RobotSession
 from app.survey.forwarding import topic_forwarding
 from app.survey.model import SurveyedTopic
 from app.view.diagnostic_graph import robots_in
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import principal_with_new_token, set_client_cookie
+from app.web.client_cookie import (
+    client_of,
+    principal_of,
+    principal_with_new_token,
+    set_client_cookie,
+)
 from app.web.diagnostics_answer import (
     DiagnosticActBody,
     DiagnosticReceipt,
@@ -66,7 +74,7 @@ async def diagnostics(
 ) -> Response:
     session = _session(state, query.robot)
     if not _for_browser(request):
-        survey = await session.survey.read()
+        survey = await _survey(session)
         content = diagnostics_json(session, survey, state.doctor, versions())
         content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
         answer = await asyncio.to_thread(localized, content, language_of(request))
@@ -153,8 +161,11 @@ async def _page(
     """The whole page, or its content alone."""
     language = language_of(request)
     looked, refused = await _looked(session, "" if query.paused else query.look)
-    survey = await session.survey.read()
-    context = diagnostics_context(session, survey, state.doctor, query, looked, refused, language)
+    survey = await _survey(session)
+    trips = _page_trips(request, state, query.rtt)
+    context = diagnostics_context(
+        session, survey, state.doctor, query, looked, refused, language, trips
+    )
     again = urlencode({"robot": query.robot}) if query.robot else ""
     name = "_diagnostics.html" if query.part else "diagnostics.html"
     page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
@@ -170,6 +181,23 @@ def _shared(request: Request, state: AppState, robot: str) -> SharedLinks | None
     """The links to the recording that was shared last, None without one."""
     recording = state.shared.latest(robot)
     return links_of(recording, str(request.base_url)) if recording else None
+
+
+async def _survey(session: RobotSession) -> Survey:
+    """The robot's graph. Begins to measure the round trip to one of its nodes."""
+    survey = await session.survey.read()
+    if survey.wall:
+        session.node_trips.measure(robots_in(survey.graph, session.robot.graph.every_peer))
+    return survey
+
+
+def _page_trips(request: Request, state: AppState, rtt_ms: float | None) -> RoundTripSummary | None:
+    """The round trips of this browser, with the one that it sends."""
+    client, now = principal_of(request, state).client, time.monotonic()
+    browser = client.id or client_of(request)
+    if rtt_ms is not None:
+        state.page_trips.record(browser, rtt_ms / 1000, now)
+    return state.page_trips.summary(browser, now)
 
 
 async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
