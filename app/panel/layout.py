@@ -111,9 +111,10 @@ def _places(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]
 
 
 class Page(Description):
-    """A page of the panel; with `fit` it never scrolls. An `overview` has a tile for each robot. With a
-    `template` (Jinja) that one places the widgets; `styles` is appended to the panel's stylesheet.
-    Clients without the role or group `needs` do not see it."""
+    """A page of the panel; with `fit` it never scrolls. An `overview` has a tile for each robot,
+    and the sum of their figures after the text `total`. With a `template` (Jinja) that one places the
+    widgets; `styles` is appended to the panel's stylesheet. Clients without the role or group `needs`
+    do not see it."""
 
     id: Id
     title: Label
@@ -121,6 +122,7 @@ class Page(Description):
     robot: Id | None = None
     needs: Id | None = None
     overview: bool = False
+    total: Label | None = None
     fit: bool = False
     template: File | None = None
     styles: File | None = None

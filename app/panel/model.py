@@ -13,6 +13,7 @@ from app.panel.interlock import Interlock
 from app.panel.layout import FRAME_ONLY, Page
 from app.panel.needs import PanelNeeds, needs_of
 from app.panel.panel_keys import PanelKeys
+from app.panel.robot_entry import SUMS
 from app.panel.robot_entry import RobotEntry as RobotEntry
 from app.panel.texts import panel_texts
 from app.panel.uniform_buttons import UniformButtons, uniform_buttons
@@ -113,7 +114,7 @@ class Panel(PanelKeys):
     def widgets_by_page(self) -> dict[str, frozenset[str]]:
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
         frame = {widget.id for widget in self.frame_widgets}
-        tiles = {robot.tile_id for robot in self.robots}
+        tiles = {SUMS, *(robot.tile_id for robot in self.robots)}
         pages = {
             page.id: frozenset(
                 frame | {w.id for w in page.widgets} | (tiles if page.overview else set())

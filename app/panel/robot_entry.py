@@ -24,6 +24,7 @@ from app.panel.widgets.numbers import Unit
 
 Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST)]
 TILE: Final = "-tile-"  # no widget has an id that begins like this
+SUMS: Final = "-sums"  # the line of sums of an overview
 
 
 class RobotOverview(Description):

@@ -5,7 +5,8 @@ shows the link status of the other robots.
 """
 
 import asyncio
-from collections.abc import Callable, Collection, Iterator, Mapping
+import time
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
+from app.panel.robot_entry import SUMS
 from app.panel.robot_panels import widget_robots
 from app.permission.confirmations import ConfirmLocks
 from app.robot.slices import Slices
@@ -29,7 +31,7 @@ from app.runtime.wiring import ServerParts, wire_session
 from app.transport.zenoh_config import Config
 from app.view.kinds import Attributes
 from app.view.link_status import Lamp
-from app.view.overview import most_urgent, tile
+from app.view.overview import Figure, figure_now, most_urgent, sums, tile
 from app.view.publisher import ViewPublisher
 from app.view.shared_widgets import NO_SHARED, SharedWidgets
 
@@ -58,6 +60,7 @@ class Fleet:
         self.panel = panel
         self._widget_robots = widget_robots(panel)
         self._has_overview = any(page.overview for page in panel.pages)
+        self._has_total = any(page.total for page in panel.pages)
         self._alarm_rows: Mapping[str, AlarmRow] = {}
         self._most_urgent: Mapping[str, AlarmRow] = {}
         self.root_path = root_path
@@ -169,7 +172,7 @@ class Fleet:
     def shared_with(self, robot: RobotState) -> SharedWidgets:
         others = [name for name in dict.fromkeys(self._widget_robots.values()) if name != robot.id]
         sessions = {name: self._sessions[name] for name in others if name in self._sessions}
-        widgets = dict(self._tiles()) if self._has_overview else {}
+        widgets = {**self._tiles()} if self._has_overview else {}
         if not (sessions or widgets):
             return NO_SHARED
         without: dict[str, Mapping[str, Attributes]] = {}
@@ -189,19 +192,26 @@ class Fleet:
             if session.robot is not robot:
                 session.refresher.show_shared()
 
-    def _tiles(self) -> Iterator[tuple[str, Attributes]]:
-        """(id, attributes) of the tile of each robot."""
+    def _tiles(self) -> Mapping[str, Attributes]:
+        """The attributes of the tile of each robot and of the line of sums, by their ids."""
+        figures: list[Figure] = []
+        tiles: dict[str, Attributes] = {}
         for entry in self.panel.robots:
             session = self._sessions.get(entry.id)
             if session is None:  # not wired yet
                 continue
+            if entry.figure and self._has_total:
+                figures.append(figure_now(entry.figure, session.robot, time.monotonic()))
             view = session.refresher.own.view
             if view["alarms"]["rows"] is not self._alarm_rows:
                 self._alarm_rows = view["alarms"]["rows"]
                 self._most_urgent = most_urgent(self._alarm_rows)
             figure = str(entry.figure.id) if entry.figure else ""
             alarm = self._most_urgent.get(entry.id)
-            yield entry.tile_id, tile(view, session.refresher.lamp, figure, alarm)
+            tiles[entry.tile_id] = tile(view, session.refresher.lamp, figure, alarm)
+        words = [state.text for state in self.panel.state.states] if self.panel.state else []
+        readout = next((entry.figure for entry in self.panel.robots if entry.figure), None)
+        return tiles | {SUMS: sums(tiles.values(), words, figures, readout)}
 
     def show_but(self, robot: RobotState) -> None:
         for session in self.sessions:

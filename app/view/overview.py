@@ -1,10 +1,14 @@
-"""The tiles of an overview, one for each robot: pure, from the views of the robots."""
+"""An overview: a tile for each robot, and above them the line of sums. Pure, from the views of the
+robots."""
 
-from collections.abc import Mapping
-from typing import Final, TypedDict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final, TypedDict
 
 from app.alarms.rows import AlarmRow
 from app.i18n import TextLike, say
+from app.panel.widgets.displays import Readout
+from app.robot.state import RobotState
+from app.view.display_values import NOTHING, field_state, is_number, scaled, written_number
 from app.view.kinds import Attributes
 from app.view.link_status import Lamp
 from app.view.view import View
@@ -57,6 +61,48 @@ def tile(view: View, lamp: Lamp, figure: str, alarm: AlarmRow | None) -> Attribu
         link_state=lamp["state"],
     )
     return dict(made)
+
+
+class Figure(TypedDict):
+    """The number on a robot's tile, None if there is none; `live` says whether it is known now."""
+
+    number: float | None
+    live: bool
+
+
+def figure_now(readout: Readout, robot: RobotState, now: float) -> Figure:
+    """The figure of a robot at `now` (monotonic seconds)."""
+    field = field_state(readout, robot, now)
+    number = scaled(readout, field.value) if is_number(field.value) else None
+    return Figure(number=number, live=field.state == "live")
+
+
+def sums(
+    tiles: Iterable[Attributes],
+    words: Sequence[TextLike],
+    figures: Sequence[Figure],
+    readout: Readout | None,
+) -> Attributes:
+    """The attributes of the line of sums: `count0`, `text0`, … say how many robots do what, in the
+    order of `words`, then as the tiles come; those that are left over are "". `total` is the sum of the
+    figures, written as `readout`, and `total_state` "live" if each of them is known now."""
+    texts = [shown["text"] for shown in tiles]
+    known = [*words, *(text for text in texts if text not in words)]
+    distinct = [text for place, text in enumerate(known) if text in texts and text not in known[:place]]
+    shown: dict[str, Any] = {"state": "live"}
+    for place in range(len(texts)):
+        text = distinct[place] if place < len(distinct) else ""
+        shown |= {f"count{place}": str(texts.count(text)) if text else "", f"text{place}": text}
+    return shown | _total(figures, readout)
+
+
+def _total(figures: Sequence[Figure], readout: Readout | None) -> dict[str, Any]:
+    numbers = [figure["number"] for figure in figures if figure["number"] is not None]
+    if readout is None or not numbers or len(numbers) < len(figures):
+        return {"total": NOTHING, "total_state": "waiting"}
+    live = all(figure["live"] for figure in figures)
+    total = written_number(sum(numbers), readout.format, readout.unit)
+    return {"total": total, "total_state": "live" if live else "old"}
 
 
 def most_urgent(rows: Mapping[str, AlarmRow]) -> dict[str, AlarmRow]:

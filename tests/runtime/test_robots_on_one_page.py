@@ -348,7 +348,11 @@ def test_the_overview_shows_each_robot_and_leads_to_its_pages(
         expect(tile.locator(".figure")).to_contain_text(f"{name} is here")
         expect(tile).to_have_attribute("data-link_state", "ok")
         expect(tile).to_have_attribute("data-priority", "")
+    sums = page.locator(".robot-sums li:visible")
+    expect(sums).to_have_text(["2 ONLINE"])
+    expect(page.locator(".robot-sums .total")).to_have_text("2 robots")
     bridges[1].kill()
+    expect(sums).to_have_text(["1 ONLINE", "1 NO LINK"])
     expect(right).to_have_attribute("data-link_state", "bad")
     expect(right).to_have_attribute("data-state", "old")
     nodes[0].publish("/said", {"data": "left still works"})
@@ -373,6 +377,7 @@ def test_without_its_server_an_overview_says_that_nothing_is_known(
     expect(tile).to_have_attribute("data-link_state", "wait")
     expect(tile).to_have_attribute("data-state", "old")
     expect(tile.locator("[data-text=alarm]")).to_have_text("unknown")
+    expect(page.locator(".robot-sums")).to_have_attribute("data-state", "old")
 
 
 def test_only_the_overview_gets_the_tiles(simulated: Server) -> None:
@@ -383,3 +388,21 @@ def test_only_the_overview_gets_the_tiles(simulated: Server) -> None:
     assert "-tile-right" not in sent("cell")
     html = simulated.http.get("/robots/left/pages/robots").text
     assert "<h1><span>Welding cell</span></h1>" in html  # of no robot: the panel's title
+
+
+def test_an_overview_adds_the_figures_of_its_robots(
+    tmp_path: Path, servers: Callable[[Server], Server], page: Page
+) -> None:
+    text = panel_file(tmp_path, 'mode = "demo"\n').read_text()
+    figure = 'type = "std_msgs/msg/Float32"\nunit = "boxes"\nformat = ".0f"\n'
+    text = text.replace(
+        f'topic = "/said"\ntype = "{TEXT}"\nlabel = "says"', f'topic = "/made"\n{figure}'
+    )
+    text = text.replace("overview = true", 'overview = true\ntotal = "Both arms"')
+    path = tmp_path / "hall.toml"
+    path.write_text(f'{text}\n[demo."/made"]\nmessage = {{ data = 21.0 }}\n')
+    kiosk = servers(Server(ROOT, KIOSK_PANEL=str(path)))
+    until(kiosk.ready, "ready")
+    page.goto(f"{kiosk.url}/robots/left/pages/robots")
+    expect(page.locator(".robot-sums .total")).to_have_text("Both arms 42 boxes")
+    expect(page.locator(".robot-sums")).to_have_attribute("data-total_state", "live")

@@ -7,10 +7,14 @@ from typing import Final
 from app.dialect.dialect import WITH_OWN_DOMAIN
 from app.errors import Fault
 from app.i18n.values import alike
+from app.interfaces import Interfaces
+from app.interfaces.validation import format_value
+from app.panel.constants import NUMBERS
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
+from app.panel.times import TIME_FORMATS
 from app.panel.widgets.families import CheckContext, Command
 from app.panel.widgets.inputs import SelectInput
 
@@ -52,6 +56,12 @@ def overview_faults(panel: Panel) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
         place = f"page[{p}]"
         if not page.overview:
+            if page.total:
+                yield Fault(
+                    f"{place}.total",
+                    "is of an overview: write overview = true in this table too",
+                    cause="page",
+                )
             continue
         if not panel.robots:
             yield Fault(f"{place}.overview", "is for several robots: this panel has no [[robot]] table")
@@ -89,10 +99,34 @@ def choice_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def figure_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:
-    """Faults of the robots' figures."""
+    """Faults of the robots' figures, and of the totals of overviews."""
+    faults: list[Fault] = []
     for r, robot in enumerate(panel.robots):
         if robot.figure is not None:
-            yield from robot.figure.faults(f"robot[{r}].overview", checking)
+            faults += robot.figure.faults(f"robot[{r}].overview", checking)
+    yield from faults
+    for p, page in enumerate(panel.pages if not faults else ()):
+        if page.overview and page.total and panel.robots:
+            yield from islice(_total_faults(f"page[{p}].total", panel, checking.interfaces), 1)
+
+
+def _total_faults(place: str, panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
+    """Faults of a sum of the robots' figures."""
+    figures = [(f"robot[{r}].overview", robot.figure) for r, robot in enumerate(panel.robots)]
+    known = [(at, figure) for at, figure in figures if figure is not None]
+    if not known:
+        yield Fault(
+            place, "adds the robots' figures, and none has one: write [robot.overview]", cause="figure"
+        )
+    for at, figure in known:
+        kind = interfaces.field_type(figure.type, figure.field)
+        if kind not in NUMBERS or figure.format in TIME_FORMATS:
+            yield Fault(place, f"adds the robots' figures: that of {at} is no number", cause="figure")
+        if figure.unit != known[0][1].unit:
+            first, unit = known[0][0], format_value(figure.unit)
+            why = f"adds the robots' figures, which needs the same unit: that of {at} is {unit},"
+            why += f" and that of {first} {format_value(known[0][1].unit)}"
+            yield Fault(place, why, cause="figure")
 
 
 def _named_robots(panel: Panel) -> Iterator[tuple[str, str | None]]:

@@ -21,8 +21,8 @@ TABLES: Final = ("interlock", "condition", "page", "frame", "robot", "alarm")
 class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
     are kinds of causes that can't be checked: the existing "interlock"s, "input"s, "control"s or
-    "alarm"s, the topics that the panel "listens" to, the "action"s of conditions and alarms, or the
-    "group"s of alarms."""
+    "alarm"s, the topics that the panel "listens" to, the "action"s of conditions and alarms, the
+    "group"s of alarms, or the "figure"s of robots."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -71,7 +71,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 if key == "overview":  # the header of the next robot may be missing below it
                     rest.undecidable.add("robot")
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
-                rest.undecidable.update(_unnamed("robot", tables["robot"][r]))
+                rest.undecidable.update(("figure", *_unnamed("robot", tables["robot"][r])))
                 rest.tables["robot"][r] = {"id": _stand_in(tables["robot"][r], str(r))["id"], **names}
             case (str(key),) if closest_name(key, ("interfaces", "distro")):
                 return None

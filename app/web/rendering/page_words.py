@@ -49,6 +49,7 @@ WORDS: Final = (
     "help",
     "recipes_title",
     "users_page_title",
+    "overview_sums",
 )
 TREND_WORDS: Final = (
     "trend_earlier",
@@ -104,6 +105,7 @@ def page_words(
     own |= {"plot": partial(_plot_now, fleet, session)}
     own |= {"lines": partial(_lines_now, fleet, session, language)}
     own |= {"minutes": lambda minutes: say("alarms_minutes", count=number(str(minutes)))}
+    own |= {"overview_robots": say("overview_robots", count=number(str(len(panel.robots))))}
     named = (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS, *ALARM_WORDS)
     plain = {word: say(word) for word in named}
     return own | plain | UNREADABLE | {act: say(f"control_{act}") for act in CONTROL_ACTS}
