@@ -4,7 +4,7 @@ A change is checked at once against the version that its author saw. It counts w
 until then the recipe is being written, and a second change of it is refused.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,7 @@ from app.i18n import Text, TextLike, say
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.recipes.csv_text import BadRow, ReadRow
 from app.recipes.field_text import checked_values
-from app.recipes.folder import RecipeFolder
+from app.recipes.folder import RecipeDiskError, RecipeFolder
 from app.recipes.recipe import (
     MAX_RECIPES,
     Act,
@@ -192,7 +192,8 @@ class RecipeBook:
     def begin(self, author: Author, change: Change) -> "Writing":
         """Marks the recipes of a change as being written."""
         self._writing |= dict.fromkeys(change.ids, author)
-        return Writing(self.folder, change)
+        numbers = {recipe_id: number_of(self._entries.get(recipe_id)) for recipe_id in change.ids}
+        return Writing(self.folder, change, numbers)
 
     def end(self, writing: "Writing") -> None:
         """What is on the disk counts from now on."""
@@ -231,21 +232,40 @@ class RecipeBook:
 
 
 class Writing:
-    """A change on its way to the disk; `done` has the ids of the recipes that are there."""
+    """A change on its way to the disk; `done` has the ids of the recipes that are there. `numbers` are
+    the versions that it was made from, 0 for none."""
 
-    def __init__(self, folder: RecipeFolder, change: Change) -> None:
+    def __init__(self, folder: RecipeFolder, change: Change, numbers: Mapping[str, int]) -> None:
         self.change = change
         self.done: set[str] = set()
         self._folder = folder
+        self._numbers = numbers
 
     def run(self) -> None:
-        """Writes it, on a thread; RecipeDiskError where the disk refuses one."""
-        for recipe in self.change.puts:
-            self._folder.write(recipe)
-            self.done.add(recipe.id)
-        for recipe_id in self.change.drops:
-            self._folder.delete(recipe_id)
-            self.done.add(recipe_id)
+        """Writes it, on a thread; RecipeDiskError where the disk refuses one, or another process has
+        changed it."""
+        with self._folder.locked():
+            for recipe in self.change.puts:
+                self._check(recipe.id)
+                self._folder.write(recipe)
+                self.done.add(recipe.id)
+            for recipe_id in self.change.drops:
+                self._check(recipe_id)
+                self._folder.delete(recipe_id)
+                self.done.add(recipe_id)
+
+    def _check(self, recipe_id: str) -> None:
+        current = self._folder.current(recipe_id)
+        if number_of(current) == self._numbers[recipe_id] or not isinstance(current, Recipe):
+            return
+        now = current.now
+        reason = say("recipe_changed_since", name=current.name, by=now.by, time=format_time(now.at))
+        raise RecipeDiskError(reason)
+
+
+def number_of(entry: Entry | None) -> int:
+    """The number of a recipe's version; 0 for none."""
+    return entry.now.number if isinstance(entry, Recipe) else 0
 
 
 def _text(error: InputError) -> Text:

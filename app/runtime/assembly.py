@@ -112,7 +112,7 @@ async def open_fleet(
                 await trends.start()
             folder = settings.data_folder(mode_of(settings, panel))
             await fleet.alarms.start(folder, oplog, certificates)
-            await fleet.recipes.start(settings.data_folder(mode_of(settings, panel)))
+            await fleet.recipes.start(folder, oplog)
             await fleet.start()
             if states is not None:
                 states.start()

@@ -6,9 +6,12 @@ import pytest
 
 from app.audit.data_dir import DataDir
 from app.cli.recipes import main
+from app.recipes.command_line import LineChanges, account
 from app.recipes.folder import FOLDER, RecipeFolder
 from app.recipes.recipe import new_recipe
 from tests.recipes.panels import CARTON, PANEL
+
+HEAD = "name,length,speed,gripper,fast,note"
 
 
 @pytest.fixture
@@ -50,15 +53,27 @@ def test_what_is_exported_is_imported(
     assert "version 2" in capsys.readouterr().out
 
 
-def test_a_set_that_is_not_there_and_a_folder_in_use(
-    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_set_that_is_not_there(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "trays", *options]) == 2
     assert 'no set of recipes "trays"; there is boxes' in capsys.readouterr().err
+
+
+def test_an_import_beside_a_server_is_listed_for_the_log(
+    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "boxes.csv"
-    file.write_text("name\n")
+    file.write_text(f"{HEAD}\nCarton,450,80,vacuum,false,-\nTray,600,80,fork,true,x\n")
     server = DataDir(tmp_path / "data")
     server.claim()
-    assert main(["import", "boxes", str(file), *options]) == 2
-    server.release()
-    assert "in use" in capsys.readouterr().err
+    try:
+        assert main(["import", "boxes", str(file), *options]) == 0
+        assert main(["import", "boxes", str(file), *options]) == 0
+    finally:
+        server.release()
+    assert "1 new, 1 changed, 0 the same" in capsys.readouterr().out
+    changes = LineChanges(tmp_path / "data" / FOLDER).read()
+    assert [(c.number, c.by, c.recipe, c.version) for c in changes] == [
+        (1, account(), "carton", 2),
+        (2, account(), "tray", 1),
+    ]
+    assert (changes[0].old, changes[0].new) == ({"length": 400}, {"length": 450})

@@ -8,7 +8,7 @@ import pytest
 from app.i18n import Text, render
 from app.recipes.book import Author, Change, RecipeBook
 from app.recipes.csv_text import csv_text, read_rows
-from app.recipes.folder import RecipeFolder
+from app.recipes.folder import RecipeDiskError, RecipeFolder
 from app.recipes.recipe import MAX_RECIPES, MAX_VERSIONS, Recipe, id_for
 from tests.recipes.panels import CARTON, TRAY, load_of
 
@@ -224,3 +224,17 @@ def test_a_file_that_is_no_such_csv_is_refused_as_a_whole(
     change = book.take_rows(ANN, read_rows(text, book.load.fields))
     assert change.puts == ()
     assert [row.reason.code for row in change.bad if isinstance(row.reason, Text)] == [code]
+
+
+def test_what_another_process_has_written_in_between_is_not_overwritten(book: RecipeBook) -> None:
+    carton = made(book)
+    change = book.save(ANN, carton.id, 1, TRAY)
+    assert isinstance(change, Change)
+    writing = book.begin(ANN, change)
+    other = again(book)
+    write(other, other.save(BOB, carton.id, 1, {**CARTON, "note": "Bob"}), BOB)
+    with pytest.raises(RecipeDiskError) as refusal:
+        writing.run()
+    assert refusal.value.reason.code == "recipe_changed_since"
+    book.end(writing)
+    assert again(book).recipes[0].values["note"] == "Bob"
