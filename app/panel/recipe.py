@@ -18,6 +18,7 @@ from app.panel.base import (
     non_empty,
 )
 from app.panel.field_paths import FieldPath, MessageField
+from app.panel.widgets.confirmed import ConfirmPress
 
 MAX_FIELDS: Final = 60
 
@@ -50,7 +51,7 @@ class RecipeSet(Description):
         tuple[Id, ...], Field(strict=False, max_length=MAX_FIELDS), AfterValidator(non_empty)
     ]
     interlocks: Interlocks = Field(default=(), alias="interlock")
-    confirm_press: Literal["pin", "two_persons"] | None = None
+    confirm_press: ConfirmPress = False
     topic: TopicName | None = None
     service: TopicName | None = None
     node: NodeName | None = None

@@ -21,7 +21,9 @@ export async function confirmByPerson(root, inputs, onYes, pressed) {
   const address = `${base}/widgets/${root.dataset.widget}/confirm${embed}`;
   const form = find(dialog, "form");
   if (dialog.matches(":popover-open")) return;
-  const part = await sheetOf(address);
+  // The sheet of a recipe says what it changes in the robot.
+  const value = root.dataset.kind === "recipe" ? String(inputs[root.dataset.widget ?? ""] ?? "") : "";
+  const part = await sheetOf(value ? `${address}${embed ? "&" : "?"}value=${encodeURIComponent(value)}` : address);
   if (dialog.matches(":popover-open")) return;
   form.replaceChildren(part);
   fillValues(dialog);

@@ -77,11 +77,11 @@ async function refresh() {
 // The button itself stays: its lock comes with the events.
 /** @param {HTMLElement} root @param {HTMLElement} wanted */
 function showLoad(root, wanted) {
-  for (const selector of ["button", ".loads", "a small"]) {
+  for (const selector of ["button", ".loads", "a small", ".ask h2", ".ask .changes"]) {
     const [old, fresh] = [root.querySelector(selector), wanted.querySelector(selector)];
     if (!old || !fresh) continue;
     if (old instanceof HTMLButtonElement) old.value = fresh.getAttribute("value") ?? "";
-    else old.textContent = fresh.textContent;
+    else updateInPlace(old, fresh);
   }
 }
 

@@ -7,11 +7,13 @@ from app.i18n import Text, TextLike, say
 from app.panel.widgets.confirmed import Confirmed, confirmation_of
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.permission.confirmations import SIGN_IN
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
-from app.web.rendering.page_words import Ask, ask_of
+from app.web.rendering.page_words import Ask
+from app.web.rendering.recipe_ask import question_before
 
 TITLES: Final = {
     "pin": "confirm_title_pin",
@@ -42,10 +44,16 @@ class ConfirmSheet(TypedDict):
 
 
 def confirm_sheet(
-    state: AppState, session: RobotSession, command: Command, who: Principal, chosen: str = ""
+    state: AppState,
+    session: RobotSession,
+    command: Command,
+    who: Principal,
+    value: str = "",
+    chosen: str = "",
 ) -> ConfirmSheet:
-    """The sheet for a press of a command by a client. Names of users are shown at the kiosk's own
-    machine only: elsewhere they are typed. `chosen` is the second person so far."""
+    """The sheet for a press of a command by a client; `value` is that of its button, such as the recipe
+    that it loads. Names of users are shown at the kiosk's own machine only: elsewhere they are typed.
+    `chosen` is the second person so far."""
     two, book = confirmation_of(command) == "two_persons", state.access.book
     needs = state.fleet.panel.needs.commands.get(command.id, frozenset())
     others = [
@@ -60,7 +68,7 @@ def confirm_sheet(
     title = say("confirm_title_two") if two else say(_title(ways), name=who.user)
     return ConfirmSheet(
         title=title,
-        question=ask_of(session, command),
+        question=question_before(state.fleet, session, command, value),
         consequence=command.consequence or "" if isinstance(command, Confirmed) else "",
         lock="" if who.user and not who.program else say(SIGN_IN),
         people=names if two else [],
@@ -68,7 +76,7 @@ def confirm_sheet(
         by_pin="pin" in ways,
         by_password="password" in ways and (two or "pin" not in ways),
         by_badge="badge" in ways,
-        yes=say("confirm_done") if isinstance(command, HoldCommand) else command.label,
+        yes=_yes(command),
         chosen=chosen,
         typed_digits=len(state.access.typed_digits(who.client.id, digits_key(command))),
         words_of={name: say(f"signin_{name}") for name in WORDS} | {"second": say("confirm_second")},
@@ -82,3 +90,9 @@ def digits_key(command: Command) -> str:
 
 def _title(ways: set[Any]) -> str:
     return next(title for way, title in TITLES.items() if way in ways)
+
+
+def _yes(command: Command) -> TextLike:
+    if isinstance(command, HoldCommand):
+        return say("confirm_done")
+    return say("recipes_load") if isinstance(command, RecipeLoad) else command.label

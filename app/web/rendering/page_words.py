@@ -2,9 +2,9 @@
 
 import time
 from functools import partial
-from typing import Any, Final, TypedDict
+from typing import Any, Final, NamedTuple, TypedDict
 
-from app.i18n import Text, joined, number, say
+from app.i18n import Text, TextLike, joined, number, say
 from app.panel.layout import Page
 from app.panel.robot_panels import opened_page, page_for
 from app.panel.template import input_ids
@@ -81,11 +81,22 @@ LINK_WORDS: Final = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS: Final = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
+class AskedChange(NamedTuple):
+    """A value that a press changes in the robot."""
+
+    label: TextLike
+    old: TextLike
+    new: TextLike
+
+
 class Ask(TypedDict):
-    """The question before a press: what it will do, and the inputs that it takes."""
+    """The question before a press: what it will do, and the inputs that it takes. Of a recipe `changes`
+    are the values that it changes, and `note` says how many."""
 
     sentence: Text
     inputs: list[EntryWidget]
+    changes: list[AskedChange]
+    note: TextLike
 
 
 def page_words(
@@ -136,4 +147,5 @@ def ask_of(session: RobotSession, widget: Command) -> Ask:
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
     own = widget.id if isinstance(widget, PartedCommand) else ""  # its button says it
     names = (name for name in input_ids(widget) if name in inputs and name != own)
-    return Ask(sentence=sentence, inputs=[inputs[name] for name in names])
+    shown = [inputs[name] for name in names]
+    return Ask(sentence=sentence, inputs=shown, changes=[], note="")

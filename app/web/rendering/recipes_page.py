@@ -137,7 +137,7 @@ def recipes_context(
         detailed=bool(recipe_id) and chosen is not None,
         fields=fields,
         summary=_summary(load, values, reported) if chosen else "",
-        loads=_loads(load, values, reported) if chosen else "",
+        loads=loads_text(load, values, reported) if chosen else "",
         unloadable=_unloadable(load, values) if chosen else "",
         history=list(_history(load, chosen)) if chosen else [],
         entered=_entered(load, values if mode == "edit" else NO_VALUES)
@@ -189,7 +189,7 @@ def _summary(load: RecipeLoad, values: Values, reported: ReportedFields) -> Text
     return word("differ", **counts)
 
 
-def _loads(load: RecipeLoad, values: Values, reported: ReportedFields) -> Text:
+def loads_text(load: RecipeLoad, values: Values, reported: ReportedFields) -> Text:
     """What Load would change in the robot."""
     if unknown_reason(reported):
         return word("loads_unknown")

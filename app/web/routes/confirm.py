@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
@@ -62,11 +62,15 @@ class ConfirmAnswer(BaseModel):
     responses=errors(403, 404, 422) | {200: {"content": PAGE}},
 )
 async def sheet(
-    widget: str, request: Request, state: CurrentState, session: CurrentSession
+    widget: str,
+    request: Request,
+    state: CurrentState,
+    session: CurrentSession,
+    value: Annotated[str, Query(max_length=200, description="of its button, such as a recipe")] = "",
 ) -> Response:
     command = confirmed_command(session, widget)
     who = caller(request).principal(state)
-    context = confirm_sheet(state, session, command, who)
+    context = confirm_sheet(state, session, command, who, value)
     html = state.templates.render("_confirm.html", language_of(request), scripted=True, **context)
     return HTMLResponse(html, headers=UNCACHED)
 

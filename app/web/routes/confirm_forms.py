@@ -57,7 +57,8 @@ async def confirmed_by_form(
         confirmed, failed = await _checked(state, form, entered)
         if confirmed is not None:
             return confirmed, {}
-    sheet = confirm_sheet(state, session, widget, who, entered["_user"])
+    value = form.fields.get(widget.id, "")
+    sheet = confirm_sheet(state, session, widget, who, value, entered["_user"])
     return None, {**sheet, "failed": failed, "scripted": False}
 
 

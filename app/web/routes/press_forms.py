@@ -22,7 +22,7 @@ from app.panel.widgets.switch import Switch
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
-from app.web.rendering.page_words import ask_of
+from app.web.rendering.recipe_ask import question_before
 from app.web.routes.confirm_forms import PressForm, confirmed_by_form
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
@@ -80,6 +80,7 @@ def _ask(
     """The page that asks before a press; its answer is the press. `sheet` is that of a person who
     confirms it."""
     widget = form.widget
+    question = question_before(state.fleet, session, widget, form.fields.get(widget.id, ""))
     html = state.templates.render(
         "ask.html",
         form.reader.language,
@@ -87,7 +88,7 @@ def _ask(
         display=form.reader.display,
         panel=state.fleet.panel,
         banner=session.publisher.view["notice"]["banner"],
-        **({} if sheet else {"question": ask_of(session, widget)}),
+        **({} if sheet else {"question": question}),
         action=f"{page.base}/widgets/{widget.id}",
         back=page_after(state, page, widget.id, "", shown_on),
         fields={
@@ -112,6 +113,8 @@ def _label(form: PressForm) -> TextLike:
     widget = form.widget
     if isinstance(widget, Switch):
         return widget.on if form.fields.get(widget.id) == "true" else widget.off
+    if isinstance(widget, RecipeLoad):
+        return say("recipes_load")
     return widget.label
 
 

@@ -28,6 +28,7 @@ from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
 from app.web.language import language_of
 from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fields, refusals
+from app.web.rendering.recipe_ask import recipe_ask
 from app.web.rendering.recipes_page import Mode, entries_of, recipes_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import is_second_tap
@@ -149,12 +150,14 @@ async def page(
     loads = session.panel.recipe_loads
     said = _said(session, query.act)
     context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
-    shown = context["chosen"].id if context["chosen"] else ""
+    chosen = context["chosen"]
+    shown = chosen.id if chosen else ""
     path = f"recipes/{set}?{urlencode({'recipe': shown, 'mode': context['mode']})}"
     robot = session.entry.id if session.entry else ""
     entries = entries_of(book.load, context["mode"])
     framed = FramedPage("recipes.html", word("title"), robot, recipes_page=path, entries=entries)
-    return framed_page(request, state, framed, {**context, "word": word})
+    question = recipe_ask(session, book.load, chosen) if chosen and book.load.asks else None
+    return framed_page(request, state, framed, {**context, "word": word, "question": question})
 
 
 @router.post(
