@@ -67,7 +67,10 @@ def _shown(name: str, tables: Mapping[str, str]) -> str:
     text = tables.get(name)
     if text is None:
         return ABSENT
-    text = without_secret(name.rpartition(".")[2], text)
+    return _cut(without_secret(name.rpartition(".")[2], text))
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
@@ -82,10 +85,11 @@ def parse_panel(data: bytes) -> dict[str, str] | None:
 def changes(
     old: Manifest, new: Manifest, old_panel: bytes | None, new_panel: bytes | None
 ) -> dict[str, str]:
-    """What → `old → new`: version, settings, keys of the panel file, other files. `old_panel` is None
-    if it is not kept."""
+    """What → `old → new`: version, settings, users with their roles, keys of the panel file, other
+    files. `old_panel` is None if it is not kept."""
     own = {"version": old.version} | dict(old.settings)
     result = changed_keys(own, {"version": new.version} | dict(new.settings))
+    result |= _user_changes(old.users, new.users)
     before, after = (dict(manifest.files) for manifest in (old, new))
     if _hashes(before, PANEL) != _hashes(after, PANEL):
         result |= _panel_changes(old_panel, new_panel)
@@ -96,6 +100,19 @@ def changes(
         if before.get(group) != after.get(group):
             result[group] = f"{_hash(before, group)} {ARROW} {_hash(after, group)}"
     return result
+
+
+def _user_changes(old: Mapping[str, str] | None, new: Mapping[str, str] | None) -> dict[str, str]:
+    """Users and tokens that are new, gone, or have other rights. None: not known."""
+    if old is None or new is None:
+        return {}
+    names = [*new, *(name for name in old if name not in new)]
+    texts = {name: (old.get(name, ABSENT), new.get(name, ABSENT)) for name in names}
+    return {
+        name: f"{_cut(before)} {ARROW} {_cut(after)}"
+        for name, (before, after) in texts.items()
+        if before != after
+    }
 
 
 def _panel_changes(old_panel: bytes | None, new_panel: bytes | None) -> dict[str, str]:

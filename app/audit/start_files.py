@@ -3,10 +3,10 @@
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from app.audit.kept_files import list_digest, list_text, sha256
 from app.i18n.catalogue import files as catalogues
@@ -33,34 +33,49 @@ GROUPS: Final = (*KEPT, "fonts", "zenoh", "program")
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """The version, the settings as text, and group → name of a file → SHA-256."""
+    """The version, the settings as text, group → name of a file → SHA-256, and `user <name>` or
+    `token <name>` → role and groups; None for a start of a version that did not keep them."""
 
     version: str
     settings: Mapping[str, str]
     files: Mapping[str, Mapping[str, str]]
+    users: Mapping[str, str] | None = None
 
     def as_json(self) -> bytes:
-        about = {"version": self.version, "settings": self.settings, "files": self.files}
+        about: dict[str, Any] = {
+            "version": self.version,
+            "settings": self.settings,
+            "files": self.files,
+        }
+        if self.users is not None:
+            about["users"] = self.users
         return json.dumps(about, ensure_ascii=False, sort_keys=True, indent=1).encode()
 
     def digests(self) -> dict[str, str]:
-        """One hash for the settings and for each group with files: that of the file itself for the
-        panel file and the Zenoh file, else that of their list; of the program, that list is a file."""
+        """One hash for the settings, for the users with their roles, and for each group with files:
+        that of the file itself for the panel file and the Zenoh file, else that of their list; of the
+        program, that list is a file."""
         own: dict[str, str] = {}
         for group, files in self.files.items():
             alone = group in (PANEL, "zenoh", "program") and len(files) == 1
             own[group] = next(iter(files.values())) if alone else list_digest(files.items())
-        text = "".join(f"{name}={value}\n" for name, value in sorted(self.settings.items()))
-        return {name: digest for name, digest in own.items() if digest} | {
-            "settings": sha256(text.encode())
-        }
+        if self.users:
+            own["users"] = _text_digest(self.users)
+        own["settings"] = _text_digest(self.settings)
+        return {name: digest for name, digest in own.items() if digest}
+
+
+def _text_digest(values: Mapping[str, str]) -> str:
+    text = "".join(f"{name}={value}\n" for name, value in sorted(values.items()))
+    return sha256(text.encode())
 
 
 def parse_manifest(data: bytes) -> Manifest:
     """ValueError if that is not a manifest."""
     about = json.loads(data)
     try:
-        return Manifest(str(about["version"]), dict(about["settings"]), dict(about["files"]))
+        users = dict(about["users"]) if "users" in about else None
+        return Manifest(str(about["version"]), dict(about["settings"]), dict(about["files"]), users)
     except (KeyError, TypeError) as error:
         raise ValueError(f"not a list of files: {error}") from error
 
@@ -73,8 +88,11 @@ class StartFiles:
     contents: Mapping[str, bytes]
 
 
-def read_start_files(settings: Settings, panel: "Panel", mode: str) -> StartFiles:
-    """Reads all files. One that can't be read has the error in place of its hash. Blocks."""
+def read_start_files(
+    settings: Settings, panel: "Panel", mode: str, users: Callable[[], Mapping[str, str]] = dict
+) -> StartFiles:
+    """Reads all files. One that can't be read has the error in place of its hash. `users` returns the
+    users of the manifest. Blocks."""
     contents: dict[str, bytes] = {}
     files: dict[str, dict[str, str]] = {}
     for group, name, path in _paths(settings, panel):
@@ -90,7 +108,8 @@ def read_start_files(settings: Settings, panel: "Panel", mode: str) -> StartFile
     program = list_text(_program())
     files["program"] = {"sha256sum": sha256(program)}
     contents[sha256(program)] = program
-    return StartFiles(Manifest(installed_version(), settings_text(settings, mode), files), contents)
+    texts = settings_text(settings, mode)
+    return StartFiles(Manifest(installed_version(), texts, files, users()), contents)
 
 
 def settings_text(settings: Settings, mode: str) -> dict[str, str]:

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.access.rights import read_rights
 from app.alarms.state_times import NAME as STATES
 from app.audit import Limits, NullLog, OperatorLog
 from app.audit.kept_files import KeptFiles
@@ -58,7 +59,8 @@ async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLo
     oplog: OperatorLog | NullLog = NullLog(folder)
     if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
-        read = partial(read_start_files, settings, panel, mode)
+        users = partial(read_rights, folder)
+        read = partial(read_start_files, settings, panel, mode, users)
         record = StartRecord(KeptFiles(folder), read, panel.revision)
         oplog = OperatorLog(folder, limits, mode, record, signs=True)
     await oplog.start()

@@ -15,13 +15,16 @@ from typing import Any
 
 import pytest
 
+from app.access.rights import read_rights
+from app.access.users import ApiToken, User
+from app.access.users_file import UsersFile
 from app.audit import Entry, new_entry
 from app.audit.kept_files import FOLDER, FileChanged, FileNotKept, KeptFiles, sha256
 from app.audit.opening import start_entries
 from app.audit.queries import Filter, rows
 from app.audit.shown_panel import Run, read_panel, runs, shown_at
-from app.audit.start_changes import MORE, MOST_ENTRIES, changed_keys, flat, in_entries
-from app.audit.start_files import read_start_files, settings_text
+from app.audit.start_changes import MORE, MOST_ENTRIES, changed_keys, changes, flat, in_entries
+from app.audit.start_files import Manifest, parse_manifest, read_start_files, settings_text
 from app.audit.start_record import StartRecord
 from app.audit.store import Store
 from app.audit.verify import verify
@@ -71,9 +74,8 @@ def start(settings: Settings) -> list[Entry]:
     data = settings.data_folder("demo")
     data.mkdir(mode=0o700, exist_ok=True)
     panel = load_panel(settings.panel)
-    record = StartRecord(
-        KeptFiles(data), partial(read_start_files, settings, panel, "demo"), panel.revision
-    )
+    read = partial(read_start_files, settings, panel, "demo", partial(read_rights, data))
+    record = StartRecord(KeptFiles(data), read, panel.revision)
     boot = os.urandom(4).hex()
     store = Store(data, boot)
     for entry in (written := store.append(start_entries(store, "demo", record))):
@@ -148,6 +150,48 @@ def test_no_secret_is_logged_or_kept(settings: Settings) -> None:
     assert "canary" not in texts
     kept = (settings.data_folder("demo") / FOLDER).iterdir()
     assert not any(b"canary2" in path.read_bytes() for path in kept)
+
+
+def test_users_that_changed_are_named_with_their_rights(settings: Settings) -> None:
+    data = settings.data_folder("demo")
+    start(settings)
+    file = UsersFile(data)
+    ada = User("Ada", "operator", ("shift_a",), pin="canary-pin")
+    file.edit(lambda book: replace(book, users=(ada, User("Pin Lee", "viewer", badge="canary-badge"))))
+    _, added = start(settings)
+    assert values(added) == {
+        "user Ada": "– → operator, shift_a, by pin",
+        "user Pin Lee": "– → viewer, by badge",
+    }
+    mes = ApiToken("mes", "viewer", "canary-token")
+    file.edit(lambda book: replace(book, users=(replace(ada, role="engineer"),), tokens=(mes,)))
+    began, changed = start(settings)
+    assert values(changed) == {
+        "user Ada": "operator, shift_a, by pin → engineer, shift_a, by pin",
+        "user Pin Lee": "viewer, by badge → –",
+        "token mes": "– → viewer",
+    }
+    assert values(began)["users"] != values(added).get("users")
+    file.edit(lambda book: replace(book, users=(replace(ada, role="engineer", pin="another"),)))
+    (same,) = start(settings)
+    assert (values(same)["changes"], values(same)["users"]) == (0, values(began)["users"])
+    kept = [path.read_bytes() for path in (data / FOLDER).iterdir()]
+    assert not any(b"canary" in content for content in kept)
+
+
+def test_a_start_of_a_version_without_users_in_its_files_names_none_as_new(settings: Settings) -> None:
+    manifest = Manifest("1", {}, {})
+    assert parse_manifest(manifest.as_json()).users is None
+    assert changes(manifest, replace(manifest, users={"user Ada": "operator"}), None, None) == {}
+
+
+def test_users_that_can_not_be_read_are_said_to_be_so(settings: Settings) -> None:
+    start(settings)
+    path = settings.data_folder("demo") / "users.json"
+    path.write_text("{")
+    path.chmod(0o600)
+    _, changed = start(settings)
+    assert values(changed)["users.json"].startswith("– → unreadable: ")
 
 
 def test_a_key_that_is_named_like_a_secret_shows_no_value() -> None:
