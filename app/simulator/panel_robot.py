@@ -24,6 +24,7 @@ from app.simulator.palletizing.cell import SPEED_MM_S
 from app.simulator.palletizing.played import PlayedPalletizing
 from app.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters
 from app.simulator.presses import effects
+from app.simulator.recipes import LoadedRecipes
 from app.simulator.robot import (
     COUNT,
     COUNT_TYPE,
@@ -69,6 +70,7 @@ class PanelRobot:
         self._topics = simulated_topics(panel, shown, self._interfaces, skipped, APART * number)
         self._published = _by_topic(_needs_of(needs, Published))
         self._nodes = self._declared(_needs_of(needs, Declared))
+        self._recipes = LoadedRecipes(panel, self._interfaces, self._topics, self._nodes)
         self._responses = self._served(_needs_of(needs, Served))
         self._simulated = self._acted(_needs_of(needs, Acted))
         self._effects: list[tuple[str, Mapping[str, Any]]] = []  # on topics of `DemoRobot`
@@ -145,6 +147,7 @@ class PanelRobot:
             self._demo.hear(topic, message.data)
         if topic in self._topics:
             self._topics[topic].copy(payload, self._moment.t)
+        self._recipes.receive(topic, message, self._moment.t)
         for effect in effects(message, self._published.get(topic, ())):
             if effect.topic in self._topics:
                 self._topics[effect.topic].show(effect.field, effect.value, self._moment.t)
@@ -159,6 +162,7 @@ class PanelRobot:
             request = self._interfaces.decode(request_type, payload)
         except DecodeError:
             return None
+        self._recipes.receive(service, request, self._moment.t)
         return self._interfaces.encode(response_type, self._answer(service, request))
 
     def _answer(self, service: str, request: Any) -> Mapping[str, Any]:

@@ -90,13 +90,18 @@ class NodeParameters:
         news, self._news = self._news, []
         return news
 
+    def show(self, name: str, value: Any) -> None:
+        """A declared parameter has this value from now on."""
+        if (declared := self._declared.get(name)) is not None:
+            declared.value = value
+            changed = {"name": name, "value": _value(declared.type, value)}
+            self._news.append(_event(self._node, [changed]))
+
     def _set(self, parameter: Any) -> Fields:
         reason = self._refusal(parameter)
         if not reason:
             declared = self._declared[parameter.name]
-            declared.value = _plain(getattr(parameter.value, FIELDS[declared.type]))
-            changed = {"name": parameter.name, "value": _value(declared.type, declared.value)}
-            self._news.append(_event(self._node, [changed]))
+            self.show(parameter.name, _plain(getattr(parameter.value, FIELDS[declared.type])))
         return {"successful": not reason, "reason": reason}
 
     def _refusal(self, parameter: Any) -> str:

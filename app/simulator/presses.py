@@ -41,6 +41,13 @@ def effects(message: Any, publications: Iterable[Published]) -> list[Effect]:
     return made
 
 
+def learned(template: Any, message: Any) -> dict[str, Any] | None:
+    """The values of the inputs of a template from a decoded message; None if it was not made from
+    it."""
+    inputs: dict[str, Any] = {}
+    return inputs if _fits(template, message, inputs) else None
+
+
 def _fits(template: Any, value: Any, inputs: dict[str, Any]) -> bool:
     """Whether a value may have been made from a template; adds the values of its inputs."""
     if isinstance(template, Mapping):

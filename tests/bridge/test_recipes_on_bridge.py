@@ -134,6 +134,41 @@ service = "/set_enabled"
 type = "std_srvs/srv/SetBool"
 request = { data = "{enabled}" }
 """
+READ_BACK: Final = """
+[recipe.readback]
+topic = "/enabled_now"
+type = "std_msgs/msg/Bool"
+fields = { enabled = "data" }
+"""
+OF_NODES_SERVICE: Final = """
+title = "Cell"
+mode = "live"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "program"
+kind = "text"
+label = "Program"
+[[page.widget]]
+id = "layers"
+kind = "number"
+label = "Layers"
+min = 1
+max = 10
+[[recipe]]
+id = "programs"
+label = "Programs"
+fields = ["program", "layers"]
+service = "/load_program"
+type = "rcl_interfaces/srv/ListParameters"
+request = { prefixes = ["{program}"], depth = "{layers}" }
+confirm_s = 10.0
+[recipe.readback]
+topic = "/program_now"
+type = "rcl_interfaces/msg/Log"
+fields = { program = "name", layers = "line" }
+"""
 BOX: Final = {"length": 400, "speed": 80.0}
 
 
@@ -171,9 +206,57 @@ def test_a_recipe_is_sent_in_one_message_and_read_back_on_a_topic(boxes: Server,
 
 def test_a_value_that_the_node_reports_otherwise_is_named(boxes: Server, node: RosNode) -> None:
     receipt = loaded(boxes, node, {"x": 0.4, "y": 60.0, "z": 0.0})
-    assert receipt["outcome"] != "confirmed", receipt
+    assert (receipt["outcome"], receipt["code"]) == ("rejected", "recipe_not_taken"), receipt
     assert "Speed" in receipt["reason"]
     assert "Length" not in receipt["reason"]
+
+
+def called(cell: Server, robot: CycloneRobot, reported: bool) -> dict[str, Any]:
+    """The receipt of a load by a service of the node, which reports this value then."""
+    make(cell, "Slow", {"enabled": True})
+    before = len(robot.requests("/set_enabled"))
+    with ThreadPoolExecutor() as pool:
+        pressed = pool.submit(load, cell, "slow@1")
+        until(lambda: len(robot.requests("/set_enabled")) > before, "the node was called")
+        robot.publish(topic="/enabled_now", fields={"data": reported})
+        receipt = pressed.result()
+    assert robot.requests("/set_enabled")[-1] == {"data": True}
+    return receipt
+
+
+@pytest.fixture
+def enabling(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
+    robot.answer_set_enabled(success=True)
+    robot.advertise(topic="/enabled_now", type="std_msgs/msg/Bool")
+    panel = PANEL.partition("[[recipe]]")[0] + OF_SERVICE + READ_BACK
+    with live_server(cyclone_bridge, tmp_path, panel) as mine:
+        until(lambda: mine.widget("tunes")["enabled"], "the service can be called")
+        until(lambda: robot.subscribers(topic="/enabled_now"), "the panel listens")
+        yield mine
+
+
+def test_a_recipe_is_loaded_by_a_service_and_read_back(enabling: Server, robot: CycloneRobot) -> None:
+    receipt = called(enabling, robot, reported=True)
+    assert (receipt["outcome"], receipt["code"]) == ("confirmed", "recipe_loaded"), receipt
+
+
+def test_a_value_that_is_reported_otherwise_after_the_call_is_named(
+    enabling: Server, robot: CycloneRobot
+) -> None:
+    receipt = called(enabling, robot, reported=False)
+    assert (receipt["outcome"], receipt["code"]) == ("rejected", "recipe_not_taken"), receipt
+    assert "Enabled" in receipt["reason"]
+
+
+def test_a_service_on_fast_dds_locks_the_load(bridge: Bridge, node: RosNode, tmp_path: Path) -> None:
+    node.serve("/load_program", "rcl_interfaces/srv/ListParameters", {"result": {"names": ["ok"]}})
+    with live_server(bridge, tmp_path, OF_NODES_SERVICE) as mine:
+        until(lambda: "runs on Fast DDS" in mine.widget("programs")["reason"], "the reason is known")
+        program = {"name": "Wrap", "values": {"program": "wrap", "layers": 6}}
+        assert mine.http.post("/recipes/programs/create", json=program).json()["done"]
+        receipt = mine.http.post("/widgets/programs", json={"inputs": {"programs": "wrap@1"}}).json()
+        assert receipt["outcome"] == "refused", receipt
+    assert node.requested("/load_program") == []
 
 
 def test_a_recipe_is_loaded_by_a_call(

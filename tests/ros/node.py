@@ -77,6 +77,7 @@ class Commands:
         self.came_at: dict[str, list[float]] = {}
         self.publishers: dict[str, Any] = {}
         self.timers: dict[str, Any] = {}
+        self.requests: dict[str, list[dict[str, Any]]] = {}
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
         """Once, however many files of tests ask for it: each subscription would hear each message."""
@@ -135,6 +136,21 @@ class Commands:
     def publish_long(self, topic: str, length: int) -> None:
         """A text of so many characters."""
         self.publish(topic, {"data": "x" * length})
+
+    def serve(self, service: str, type: str, response: dict[str, Any]) -> None:
+        """Offers a service that answers each request with these fields; once for each name."""
+        if service in self.requests:
+            return
+        requests = self.requests[service] = []
+
+        def answer(request: Any, made: Any) -> Any:
+            requests.append(fields_of(request))
+            return filled(made, response)
+
+        self.node.create_service(type_named(type), service, answer)
+
+    def requested(self, service: str) -> list[dict[str, Any]]:
+        return self.requests[service]
 
     def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
         self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))

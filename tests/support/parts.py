@@ -330,6 +330,8 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
     "subscribe": ("topic", "type"),
     "heard": ("topic",),
     "heard_at": ("topic",),
+    "serve": ("service", "type", "response"),
+    "requested": ("service",),
     "arrivals": ("topic",),
     "toggle": ("topic", "per_s", "for_s"),
     "flood": ("topic", "fields", "per_s", "for_s"),
