@@ -47,7 +47,10 @@ def test_gallery_has_all_roles_states_shapes_and_colours() -> None:
 def test_gallery_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     plain = server.http.get("/gallery")
     assert plain.status_code == 200
-    assert len(re.findall("data-widget=", plain.text)) == len(EXAMPLES)
+    assert len(re.findall('data-widget="[^-]', plain.text)) == len(EXAMPLES)
+    assert re.findall('data-widget="-tile-([^"]*)"', plain.text) == [
+        f"example_cell_{place}" for place in range(1, 5)
+    ]
     assert "data-failed" not in plain.text
     assert 'data-theme="light" data-text-size="normal"' in plain.text
     large = server.http.get("/gallery?theme=dark&text_size=large&hand=none").text

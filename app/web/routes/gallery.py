@@ -9,11 +9,12 @@ from fastapi.responses import HTMLResponse, Response
 from jinja2 import Template
 from markupsafe import Markup
 
-from app.i18n import say
+from app.i18n import number, say
 from app.web.app_state import CurrentState
 from app.web.gallery import PARTS, PICTURE
 from app.web.gallery.displays import LINES
 from app.web.gallery.examples import Example
+from app.web.gallery.overview import overview
 from app.web.gallery.trends import sample_plot
 from app.web.language import language_of
 from app.web.rendering.alarm_sheet import WORDS as SHEET_WORDS
@@ -36,7 +37,11 @@ async def gallery(request: Request, state: CurrentState) -> Response:
     display = display_of(request, state.fleet.panel)._replace(**chosen)
     language = language_of(request)
     cell = state.templates.environment(language).get_template("_cell.html")
-    numbers, words = count(), _words()
+    numbers, words, robots = count(), _words(), overview()
+    words |= {
+        "tile_pages": robots.tile_pages,
+        "overview_robots": say("overview_robots", count=number(str(len(robots.robots)))),
+    }
     html = state.templates.render(
         "gallery.html",
         language,
@@ -44,6 +49,7 @@ async def gallery(request: Request, state: CurrentState) -> Response:
         panel=state.fleet.panel,
         display=display,
         switches=[(choice, _urls(choice, display)) for choice in choices(display)],
+        overview=robots,
         parts=[
             (
                 part.title,
