@@ -2,16 +2,18 @@
 any language."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.browser.test_widths_in_browser import opened
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
+from tests.support.users import add_user
 
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280))
 PANELS: Final = {
@@ -82,3 +84,43 @@ def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -
                 if tabs.count():
                     tabs.nth(number).click()
                 assert settled(page, CUT) == [], (path, width, height, number)
+
+
+CUT_REASONS: Final = """() => [...document.querySelectorAll("[data-widget] .why")]
+  .filter((why) => why.checkVisibility({ visibilityProperty: true }))
+  .map((why) => {
+    const range = document.createRange();
+    range.selectNodeContents(why);
+    const { right, bottom } = why.getBoundingClientRect();
+    const rects = [...range.getClientRects()].filter(({ width }) => width);
+    const isCut = rects.some((rect) => rect.right > right + 1 || rect.top > bottom - 4);
+    return [why.closest("[data-widget]").dataset.widget, why.textContent.trim(), isCut];
+  })"""
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_the_lock_of_a_role_is_whole_on_every_button(tmp_path: Path, page: Page, language: str) -> None:
+    data = tmp_path / "data"
+    data.mkdir(mode=0o700)
+    add_user(data, "M. Sato", "engineer", pin="2580")
+    page.context.clear_cookies()
+    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_DATA=str(data))) as server:
+        page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": server.url}])
+        cut, seen = [], 0
+        for path in ("/pages/cell", "/pages/recipe", "/pages/operation"):
+            opened(page, server, language, path)
+            expect(page.locator('[data-widget] [data-text="reason"]').first).not_to_be_empty()
+            for width, height in SIZES:
+                sized(page, width, height).evaluate(DRAWN)
+                tabs = page.locator(".group-tab:visible")
+                for number in range(max(1, tabs.count())):
+                    if tabs.count():
+                        tabs.nth(number).click()
+                        page.evaluate(DRAWN)
+                    shown = page.evaluate(CUT_REASONS)
+                    seen += len(shown)
+                    cut += [
+                        f"{path} {width}x{height} {w}: {text}" for w, text, is_cut in shown if is_cut
+                    ]
+        assert not cut, "\n".join(cut)
+        assert seen > 20
