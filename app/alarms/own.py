@@ -1,5 +1,5 @@
-"""The panel's own alarms, of the operator's log, the disk, the clock and certificates. Pure: from what
-the server sees to entries."""
+"""The panel's own alarms, of the operator's log, the disk, the clock, certificates and the broker of
+MQTT. Pure: from what the server sees to entries."""
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -14,16 +14,18 @@ from app.clock import format_age, format_time
 from app.i18n import TextLike, number, say
 from app.panel.alarm import Alarm
 
-OwnAlarm = Literal["panel_log", "panel_disk", "panel_clock", "panel_certificate"]
+OwnAlarm = Literal["panel_log", "panel_disk", "panel_clock", "panel_certificate", "panel_mqtt"]
 PRIORITIES: Final[dict[OwnAlarm, int]] = {
     "panel_log": 2,
     "panel_disk": 3,
     "panel_clock": 3,
     "panel_certificate": 2,
+    "panel_mqtt": 3,
 }
 UNKEPT: Final = frozenset({"panel_log", "panel_disk"})
 JUMP_S: Final = 5.0  # a smaller step of the clock is not raised
 CERTIFICATE_DAYS: Final = 30  # before its end, a certificate raises the alarm
+BROKER_WITHIN_S: Final = 30.0  # without a connection to the broker, the alarm is raised
 ENOUGH: Final = 1.1  # of the free space below which the alarm is raised, until it returns
 
 
@@ -85,6 +87,15 @@ def unused_certificate_entry(file: str) -> AlarmEntry:
         say("own_certificate_repair"),
     )
     return _entry("panel_certificate", True, texts)
+
+
+def broker_entry(address: str, why: str, lost_s: float) -> AlarmEntry:
+    """Of the broker that alarms are published at, without a connection for `lost_s` seconds, 0 with
+    one."""
+    within = number(f"{BROKER_WITHIN_S:g}", "s")
+    cause = say("own_mqtt_lost", address=address, within=within, why=why)
+    texts = OwnTexts(say("own_mqtt"), cause, say("own_mqtt_unpublished"), say("own_mqtt_action"))
+    return _entry("panel_mqtt", lost_s >= BROKER_WITHIN_S, texts)
 
 
 class OwnTexts(NamedTuple):

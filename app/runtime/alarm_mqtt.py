@@ -8,6 +8,8 @@ import importlib
 import json
 import logging
 import os
+import ssl
+import sys
 import threading
 import time
 from collections import deque
@@ -182,7 +184,7 @@ class AlarmMqtt:
         client.reconnect_delay_set(*RECONNECT_S)
         client.on_connect = self._connected
         client.on_disconnect = self._disconnected
-        client.on_connect_fail = lambda *_: self._lost("no connection")
+        client.on_connect_fail = lambda *_: self._lost(_why(sys.exc_info()[1]))
         client.connect_async(rules.host, rules.used_port, KEEPALIVE_S)
         client.loop_start()
         return client
@@ -217,6 +219,15 @@ class AlarmMqtt:
                 log.info("the panel's end could not be sent to the broker of alarms")
         client.disconnect()
         client.loop_stop()
+
+
+def _why(error: BaseException | None) -> str:
+    """Why a connection was not made, by the error that paho-mqtt handles then."""
+    if isinstance(error, ssl.SSLCertVerificationError):
+        return f"the broker's certificate is not trusted: {error.verify_message}"
+    if isinstance(error, OSError):
+        return error.strerror or str(error) or "no connection"
+    return "no connection"
 
 
 def _password(rules: MqttRules) -> str | None:

@@ -95,7 +95,7 @@ class Alarms:
             return
         if (rules := self._panel.alarm_rules).panel:
             self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate, used)
-            self._own.start()
+            self._own.start(self.mqtt)
         self.mqtt.start()
         events = DiskEvents(self._restore, self._on_disk, self._set_fault, self._write_standing)
         self._disk = AlarmDisk(folder, self._panel.alarm_rules, events)

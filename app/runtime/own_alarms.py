@@ -1,5 +1,5 @@
-"""What the server sees of itself, for the panel's own alarms: its log, its disk, its clock and the
-certificates that it uses."""
+"""What the server sees of itself, for the panel's own alarms: its log, its disk, its clock, the
+certificates that it uses and its connection to the broker of MQTT."""
 
 import asyncio
 import logging
@@ -15,6 +15,7 @@ from app.alarms.engine import AlarmEngine
 from app.alarms.entries import AlarmEntry
 from app.alarms.own import (
     OwnAlarm,
+    broker_entry,
     certificate_entry,
     clock_entry,
     disk_entry,
@@ -44,6 +45,16 @@ class Usage(Protocol):
     def free(self) -> int: ...
 
 
+class Broker(Protocol):
+    """Where alarms are published: `address` is "" for nowhere, `state` why there is no connection."""
+
+    is_connected: bool
+    state: str
+
+    @property
+    def address(self) -> str: ...
+
+
 class OwnAlarms:
     """The panel's own alarms, from `start` to `stop`. Used on the event loop only."""
 
@@ -69,12 +80,15 @@ class OwnAlarms:
         self._ahead_s = time.time() - time.monotonic()  # of the wall clock
         self._disk_is_low = False
         self._checks = 0
+        self._broker: Broker | None = None
+        self._connected_at = 0.0  # the last time, in monotonic seconds
         self._timer: asyncio.TimerHandle | None = None
         self._measuring: asyncio.Task[None] | None = None
         self._reading: asyncio.Task[None] | None = None
 
-    def start(self) -> None:
+    def start(self, broker: Broker) -> None:
         """Adds the alarms, and looks at what they are about from now on."""
+        self._broker, self._connected_at = broker, time.monotonic()
         self._set("panel_disk", disk_entry(self._rules.disk_free_mb, self._rules.disk_free_mb, False))
         self._set("panel_clock", clock_entry(0.0, 0.0))
         self._check_log()
@@ -103,6 +117,7 @@ class OwnAlarms:
     def _check(self) -> None:
         self._timer = asyncio.get_running_loop().call_later(CHECK_S, self._check)
         self._check_clock()
+        self._check_broker()
         if self._checks % DISK_EVERY == 0 and self._measuring is None:
             self._measuring = asyncio.create_task(self._check_disk())
         fault = self._certificates.fault
@@ -120,6 +135,14 @@ class OwnAlarms:
         by_s, shown = ahead_s - self._ahead_s, before + self._ahead_s
         self._ahead_s = ahead_s
         self._set("panel_clock", clock_entry(by_s, shown))
+
+    def _check_broker(self) -> None:
+        broker, now = self._broker, time.monotonic()
+        if broker is None or not broker.address:
+            return
+        if broker.is_connected:
+            self._connected_at = now
+        self._set("panel_mqtt", broker_entry(broker.address, broker.state, now - self._connected_at))
 
     async def _check_disk(self) -> None:
         """Measures on a thread: a disk may not answer."""

@@ -4,7 +4,14 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from app.alarms.own import certificate_entry, clock_entry, disk_entry, log_entry, own_definitions
+from app.alarms.own import (
+    broker_entry,
+    certificate_entry,
+    clock_entry,
+    disk_entry,
+    log_entry,
+    own_definitions,
+)
 from app.i18n import render, say
 
 
@@ -41,9 +48,22 @@ def test_a_log_that_locks_says_so() -> None:
 
 def test_the_panels_own_alarms_are_of_no_robot_and_never_of_high_priority() -> None:
     definitions = dict(own_definitions())
-    assert set(definitions) == {"panel_log", "panel_disk", "panel_clock", "panel_certificate"}
+    assert set(definitions) == {
+        "panel_log",
+        "panel_disk",
+        "panel_clock",
+        "panel_certificate",
+        "panel_mqtt",
+    }
     assert not any(definition.is_of_robot for definition in definitions.values())
     assert all(definition.rules.priority(1) > 1 for definition in definitions.values())
+
+
+@pytest.mark.parametrize(("lost_s", "level"), [(0.0, 0), (29.0, 0), (30.0, 1)])
+def test_a_broker_is_raised_after_half_a_minute_without_a_connection(lost_s: float, level: int) -> None:
+    entry = broker_entry("broker.plant:8883", "not trusted", lost_s)
+    assert (entry.level, entry.priorities) == (level, (3,))
+    assert "broker.plant:8883 has had no connection for 30 s: not trusted." in render(entry.cause)
 
 
 @pytest.mark.parametrize(("days", "level"), [(31, 0), (29, 1), (-1, 1)])

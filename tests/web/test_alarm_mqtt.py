@@ -14,6 +14,7 @@ from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
 
+HASTY: Final = "tests.support.apps.hasty:app"
 TOPIC: Final = "plant1/cell"
 BROWSER: Final = {"accept": "text/html"}
 MQTT: Final = '\n[alarms.mqtt]\nhost = "127.0.0.1"\nport = %d\nprefix = "plant1/cell"\n'
@@ -140,9 +141,18 @@ def test_a_broker_with_tls_is_trusted_by_its_authority_only(tmp_path: Path) -> N
         ):
             stands(listener, "air_low", "air_latched")
             assert mqtt_state(cell)["connected"]
-        with cell_at(tmp_path, broker.tls_port, "tls = true\n") as cell:
-            until(lambda: mqtt_state(cell)["last_error"], "the certificate is refused")
-            assert not mqtt_state(cell)["connected"]
+        other = tmp_path / "other"
+        other.mkdir()
+        strange = make_certificates(other).ca
+        for ca in ("", f'ca = "{strange.relative_to(tmp_path)}"\n'):
+            with cell_at(tmp_path, broker.tls_port, f"tls = true\n{ca}", app=HASTY) as cell:
+                until(lambda: mqtt_state(cell)["last_error"], "the certificate is refused")
+                assert not mqtt_state(cell)["connected"]
+                assert "certificate is not trusted" in mqtt_state(cell)["last_error"]
+                page = cell.http.get("/diagnostics?part=content", headers=BROWSER).text
+                assert "certificate is not trusted" in page
+                alarm = until(lambda: listed(cell).get("panel_mqtt"), "the alarm is raised")
+                assert "certificate is not trusted" in alarm["cause"]
         plain = tmp_path / "plain"
         plain.mkdir()
         with cell_at(plain, broker.tls_port) as cell:
