@@ -93,6 +93,9 @@ CUTS: Final = """(samples) => {
     const button = root.querySelector?.(".key > button:not(.more), :scope > button:not(.more)");
     const isLocked = button?.disabled;
     if (button) button.disabled = locked;
+    const reason = locked ? root.querySelector?.('.why [data-text="reason"]') : null;
+    const said = reason?.textContent;
+    if (reason && !said) reason.textContent = "…"; // a label has one line beside a reason
     if (widget) root.dataset.enabled = String(!locked);
     if (widget && "level" in root.dataset) root.dataset.level = "low"; // with its mark
     const element = root.querySelector(selector);
@@ -108,6 +111,7 @@ CUTS: Final = """(samples) => {
     const isShown = element.checkVisibility() && place.checkVisibility();
     const result = isShown ? isCut(element, keepsWords) : null;
     kept[0].replaceWith(kept[1]);
+    if (reason?.isConnected) reason.textContent = said;
     if (button) button.disabled = isLocked;
     return result;
   });
@@ -224,7 +228,8 @@ def places(panel: Panel, number: int, screen: Screen) -> Iterator[tuple[dict[str
             name = f"{widget.kind} {part}"
             spot = None if name in NOT_HERE else SPOTS.get(name) or SPOTS.get(part)
             if spot is not None:
-                where = {"widget": widget.id, "selector": spot[0], "inner": spot[1]}
+                locked = part == "interlock" or box.locked
+                where = {"widget": widget.id, "selector": spot[0], "inner": spot[1], "locked": locked}
                 yield {**where, "group": at[1] if "page" in place else 0, "part": part}, box
 
 
@@ -241,7 +246,7 @@ def samples(panel: Panel, number: int, screen: Screen, language: str) -> Iterato
                 **where,
                 "text": text,
                 "after": render(box.after, language) if not box.wraps else "",
-                "locked": where.get("part") == "interlock",
+                "locked": where.get("locked", False),
                 "keepsWords": box.wraps,
                 "cut": cut,
             }

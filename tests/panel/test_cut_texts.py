@@ -47,6 +47,12 @@ def test_a_reason_has_the_lines_that_its_button_is_high() -> None:
     assert "(en) needs 4 lines, the button has 3 of 159 px" in note
 
 
+def test_a_label_has_one_line_while_its_button_is_locked() -> None:
+    (note,) = noted({**KEY, "label": "Close both guard doors"})
+    assert '"Close both guard doors" (en, de) needs 2 lines' in note
+    assert "the locked button has 1 of 159 px at 800x480" in note
+
+
 def test_texts_of_all_screens_are_in_one_note() -> None:
     key = {**KEY, "label": "Verpackungsmaschinensteuerung"}
     (note,) = noted(key, screens=["800x480", "1024x600"])

@@ -46,7 +46,8 @@ class Cut(NamedTuple):
 class Box:
     """The place of a text: `lines` of `width` px, of which the first is shorter by `indent`. With
     `wraps` a text has several lines, and none is broken inside a word. `after` stands behind the text
-    on the same line, `beside` takes some of the width, `least_beside` at least."""
+    on the same line, `beside` takes some of the width, `least_beside` at least. `locked`: it has these
+    lines while its button is locked, else more."""
 
     part: str  # the key of the text in the panel file, or what it is
     text: TextLike
@@ -64,6 +65,7 @@ class Box:
     beside_bold: bool = False
     least_beside: float = 0.0
     name: str = "place"
+    locked: bool = False
 
     def cut(self, language: str, fonts: Fonts = SHIPPED) -> Cut | None:
         """What is cut of the text in a language; None for nothing."""

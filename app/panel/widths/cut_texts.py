@@ -49,8 +49,9 @@ def cut_notes(panel: Panel) -> Iterator[Note]:
     yield from font_notes(panel)
     needs: dict[tuple[str, str, str], dict[tuple[str, str], list[str]]] = {}
     for finding in findings(panel):
-        cut, key = finding.cut, (finding.place, finding.cut.text, finding.language)
-        widths = cut.needs, f"the {finding.box.name} has {cut.has}"
+        cut, box, key = finding.cut, finding.box, (finding.place, finding.cut.text, finding.language)
+        name = f"locked {box.name}" if box.locked and cut.needs.endswith("lines") else box.name
+        widths = cut.needs, f"the {name} has {cut.has}"
         needs.setdefault(key, {}).setdefault(widths, []).append(finding.size)
     notes: dict[tuple[str, str, str], list[str]] = {}
     for (place, text, language), widths_by_size in needs.items():

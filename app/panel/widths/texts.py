@@ -60,12 +60,12 @@ def texts(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
 
 
 def face_texts(widget: KeyCommand, inside: float, cell: Cell, size: float = 0.0) -> Iterator[Box]:
-    """Label and note of a button with this width inside, and this size of the label."""
+    """Label and note of a button with this width inside, and this size of the label. The label has one
+    line while the button is locked, as any may be."""
     size = size or (NARROW_LABEL if inside <= NARROW_FACE else cell.sizes.label)
-    box = Box("label", widget.label, inside, size, bold=True, lines=2, wraps=True, name="button")
-    yield box
+    yield Box("label", widget.label, inside, size, bold=True, wraps=True, name="button", locked=True)
     if widget.note:
-        yield replace(box, part="note", text=widget.note, size=cell.sizes.small, bold=False)
+        yield Box("note", widget.note, inside, cell.sizes.small, lines=2, wraps=True, name="button")
 
 
 def _label(widget: BaseWidget, cell: Cell) -> Iterator[Box]:
