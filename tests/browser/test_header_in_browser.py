@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
-from tests.support.parts import ROOT, SHIPPED, Server
+from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import ready
 
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
@@ -89,6 +89,20 @@ def test_parts_of_the_header_have_room(
             assert settled(page, CROWDED) == [], (server is branded, width)
             expect(page.locator("#clock")).to_be_visible()
             expect(page.locator("#day")).to_be_visible(visible=width >= 900)
+
+
+def test_a_header_without_a_robot_has_room_for_the_menu(chromium: Browser) -> None:
+    with Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="live") as server:
+        until(server.answers, "it serves")
+        for language in ("en", "ja", "de"):
+            with closing(chromium.new_context(locale=language)) as context:
+                page = context.new_page()
+                page.goto(server.url)
+                expect(page.locator(".robot-state[data-state=lost]")).to_be_visible()
+                for width, height in SIZES:
+                    sized(page, width, height).evaluate(DRAWN)
+                    assert settled(page, CROWDED) == [], (language, width)
+                    expect(page.locator(".menu-key")).to_be_in_viewport(ratio=1)
 
 
 def test_who_has_control_is_said_in_words_of_their_own_width(controlled: Server, page: Page) -> None:

@@ -31,7 +31,7 @@ def diagnostics_json(
         "versions": dict(versions),
         "links": [
             _link(name, link, trips.get(name))
-            | {"trip_note": trip_note(name, trips.get(name), session.node_trips)}
+            | {"trip_note": trip_note(name, link, trips.get(name), session.node_trips)}
             for name, link in session.publisher.view["link"].items()
         ],
         "topics": [_topic(row) for row in topics],

@@ -216,7 +216,7 @@ def link_rows(
             link,
             about.get(name, ""),
             trips.get(name),
-            trip_note(name, trips.get(name), session.node_trips),
+            trip_note(name, link, trips.get(name), session.node_trips),
         )
         for name, link in session.publisher.view["link"].items()
     ]

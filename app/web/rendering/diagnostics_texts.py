@@ -10,6 +10,7 @@ from app.robot.round_trips import RoundTripSummary
 from app.runtime.doctor_process import FoundFault
 from app.runtime.node_round_trips import NodeRoundTrips
 from app.view.diagnostic_rows import TopicRow
+from app.view.link_status import LinkStatus
 
 NOTHING: Final = "–"
 LINK_FINDINGS: Final = frozenset(
@@ -31,14 +32,18 @@ def milliseconds(ms: float) -> TextLike:
     return number(f"{ms:.1f}" if ms < 10 else f"{ms:.0f}", "ms")
 
 
-def trip_note(link: str, trips: RoundTripSummary | None, to_node: NodeRoundTrips) -> TextLike:
+def trip_note(
+    name: str, link: LinkStatus, trips: RoundTripSummary | None, to_node: NodeRoundTrips
+) -> TextLike:
     """By what the round trips of a link were measured, or why there are none; "" where that is
     clear."""
-    if link == "node":
+    if trips is None and link["state"] != "ok":
+        return ""  # the link says why
+    if name == "node":
         return word(to_node.state, node=to_node.node)
     if trips is not None:
         return ""
-    return word("trip_of_page") if link == "server" else word("trip_no_answer")
+    return word("trip_of_page") if name == "server" else word("trip_no_answer")
 
 
 def rate_text(rate_hz: float | None) -> TextLike:
