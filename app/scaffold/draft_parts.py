@@ -58,7 +58,8 @@ class DiagnosticAlarms:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
-    """A panel file that is not written yet. `remarks` are lines about what has no widget."""
+    """A panel file that is not written yet. `remarks` are lines about what has no widget; `alike` are
+    namespaces that look like robots."""
 
     title: str
     namespace: str = ""
@@ -70,3 +71,4 @@ class Draft:
     alarms: Sequence[DiagnosticAlarms] = ()
     pages: Mapping[str, Sequence[DraftWidget]] = field(default_factory=dict)
     remarks: Sequence[str] = ()
+    alike: Sequence[str] = ()

@@ -7,10 +7,12 @@ from typing import Any, Final
 from app.printable import printable
 from app.scaffold.draft_parts import Draft, DraftWidget
 from app.scaffold.naming import id_of, label_of
+from app.scaffold.robots import proposal
 from app.toml_values import value_text
 
 WIDTH: Final = 100
 CHECK: Final = "operator-panel check"
+OVERVIEW: Final = "overview"
 
 
 def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
@@ -19,6 +21,9 @@ def toml_text(draft: Draft, controls: bool = False, trial: bool = False) -> str:
     lines = [*_head(draft), *_interlocks(draft), *_alarms(draft)]
     taken: set[str] = set()
     pages: set[str] = set()
+    if len(draft.robots) > 1:
+        pages.add(OVERVIEW)
+        lines += [*_page(OVERVIEW, OVERVIEW), "overview = true  # a tile for each robot"]
     for page, entries in zip(draft.pages, written(draft, controls, trial), strict=True):
         own_id = id_of(page, pages)
         pages.add(own_id)
@@ -46,6 +51,8 @@ def _head(draft: Draft) -> Iterator[str]:
         "A first panel, made from what is on the robot now. Delete what you do not need, and give"
         f" labels, units and limits of your own. `{CHECK} FILE` names every mistake with its line."
     )
+    if draft.alike:
+        yield from _comment(proposal(draft.alike))
     yield ""
     yield f"title = {value_text(draft.title)}"
     yield 'mode = "live"'

@@ -18,12 +18,13 @@ from app.cli.robot.link import (
     add_options,
     check_namespace,
     ended,
+    namespace,
     nothing_there,
     opened,
     place_of,
     report_lost,
 )
-from app.cli.robot.scaffold_input import read_scaffold_input, robot_at, usable
+from app.cli.robot.scaffold_input import fullest_of, read_scaffold_input, usable
 from app.cli.robot.settled_graph import settled_graph
 from app.diagnose.findings import few
 from app.errors import KioskError
@@ -34,12 +35,15 @@ from app.scaffold.draft import lost_names, make_draft
 from app.scaffold.draft_parts import Draft
 from app.scaffold.labels import own_labels
 from app.scaffold.naming import label_of
+from app.scaffold.robots import alike_namespaces, proposal
 from app.scaffold.toml_text import toml_text
 from app.settings import APP
 from app.survey.model import GraphSnapshot
 
 PROG = "python -m app.cli scaffold"
 LISTEN_S: Final = 3.0
+MIN_ROBOTS: Final = 2
+SEVERAL: Final = "Robots"
 STDOUT: Final = "-"
 
 
@@ -48,7 +52,10 @@ class ScaffoldError(KioskError):
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    options = make_parser(prog).parse_args(arguments)
+    parser = make_parser(prog)
+    options = parser.parse_args(arguments)
+    if options.robot and (options.namespace or len({*options.robot}) < MIN_ROBOTS):
+        parser.error("--robot is given for each of several robots, and without --namespace")
     return ended(lambda: _scaffold(options))
 
 
@@ -60,15 +67,16 @@ async def _scaffold(options: Any) -> int:
     interfaces = load_interfaces(place.distro, place.interfaces)
     async with opened(place) as (observer, graph):
         graph = await settled_graph(observer, graph, place)
-        check_namespace(graph, place.namespace)
+        for chosen in options.robot or (place.namespace,):
+            check_namespace(graph, chosen)
         graph = usable(graph)
         if not graph.robots:
             raise ScaffoldError("no bridge has a namespace of ROS 2: correct `namespace` in its file")
-        robot, below = robot_at(graph, place.namespace)
+        robot, below = fullest_of(graph, options.robot or (place.namespace,))
         known = await read_scaffold_input(observer, robot, below, interfaces, options.listen)
     if not any((known.topics, known.services, known.actions, known.parameters)):
         raise ScaffoldError(nothing_there([robot], f"{robot.namespace}{below}"))
-    base = _base(place, graph, f"{robot.namespace}{below}", target)
+    base = _base(place, graph, f"{robot.namespace}{below}", target, options.robot or ())
     draft = _checked(partial(make_draft, known, interfaces, base, options.controls), target)
     if options.controls and not draft.interlocks:
         raise ScaffoldError(
@@ -96,10 +104,15 @@ def _folder(target: Path | None) -> Path:
     return Path() if target is None else target.resolve().parent
 
 
-def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | None) -> Draft:
-    """All but the pages. Several robots, and a place that is not that of zenoh.json5, are entries."""
+def _base(
+    place: Place, graph: GraphSnapshot, below: str, target: Path | None, chosen: Sequence[str] = ()
+) -> Draft:
+    """All but the pages. Several robots, and a place that is not that of zenoh.json5, are entries.
+    `below` is the namespace of the pages; `chosen` are those of the robots, where the command line has
+    them."""
     others = [robot.namespace for robot in graph.robots if robot.topics] if not place.namespace else []
-    names = others if len(others) > 1 else [namespace]
+    others = [*chosen] or others
+    names = others if len(others) > 1 else [below]
     robots = []
     ids = [f"robot{number}" for number in range(1, len(names) + 1)] if len(names) > 1 else ["robot"]
     labels = own_labels(
@@ -112,12 +125,13 @@ def _base(place: Place, graph: GraphSnapshot, namespace: str, target: Path | Non
         robots.append(entry | ({"connect": list(place.connect)} if place.connect else {}))
     folder = _folder(target)
     return Draft(
-        title=label_of(namespace or "Robot"),
-        namespace=namespace,
+        title=SEVERAL if len(names) > 1 else label_of(below or "Robot"),
+        namespace=below,
         reached=place.reached,
         robots=robots if len(names) > 1 or place.connect else (),
         distro=place.distro,
         interfaces=[os.path.relpath(interface, folder) for interface in place.interfaces],
+        alike=() if len(names) > 1 or place.namespace else alike_namespaces(graph.robots[0]),
     )
 
 
@@ -138,6 +152,8 @@ def _summary(target: Path, draft: Draft, live: bool) -> Iterator[str]:
         yield f"{alone} of the controls are commented out: no candidate is of their namespace."
     if acting and not live:
         yield "The controls are commented out: uncomment those that you want, each with its interlock."
+    if draft.alike:
+        yield proposal(draft.alike)
     yield f"Start it: {APP} run {target}"
 
 
@@ -169,6 +185,13 @@ def make_parser(prog: str) -> Parser:
         default=LISTEN_S,
         metavar="S",
         help="seconds to wait for messages, for names of joints and for ranges; default: %(default)g",
+    )
+    add(
+        "--robot",
+        action="append",
+        type=namespace,
+        metavar="NAMESPACE",
+        help="the namespace of one of several robots, such as /left; given for each of them",
     )
     add_options(parser)
     return parser

@@ -34,6 +34,13 @@ def robot_at(graph: GraphSnapshot, namespace: str) -> tuple[RobotGraph, str]:
     return max(graph.robots, key=lambda candidate: len(candidate.topics)), ""
 
 
+def fullest_of(graph: GraphSnapshot, namespaces: Sequence[str]) -> tuple[RobotGraph, str]:
+    """As `robot_at`, of the namespace with the most topics."""
+    candidates = [robot_at(graph, namespace) for namespace in namespaces]
+    sizes = [sum(_is_of(topic, below) for topic in robot.topics) for robot, below in candidates]
+    return candidates[sizes.index(max(sizes))]
+
+
 def usable(graph: GraphSnapshot) -> GraphSnapshot:
     """The graph without the robots that a panel can't have: those with a namespace that is none of
     ROS 2, and those beyond the `MOST_ROBOTS` with the most topics."""
