@@ -53,6 +53,24 @@ def test_a_label_has_one_line_while_its_button_is_locked() -> None:
     assert "the locked button has 1 of 159 px at 800x480" in note
 
 
+def test_rows_of_conditions_and_tabs_of_robots_are_measured() -> None:
+    name = (
+        "Guard door at the north side of the palletizing cell, beside the conveyor of the empty pallets"
+    )
+    guard = {"id": "guard", "label": name, "topic": "/guard"}
+    rows = {"kind": "conditions", "label": "All", "conditions": ["guard"], "span": 2}
+    note = noted(rows, interlock=[guard])[0]
+    assert note.startswith("page[0].group[0].widget[0].conditions[0]: ")
+    assert "the row has 1 of" in note
+    robots = [
+        {"id": f"r{number}", "name": f"Depalletizing robot {number}", "namespace": f"/r{number}"}
+        for number in range(6)
+    ]
+    notes = noted({**KEY, "label": "Start"}, robot=robots)
+    assert [note.partition(":")[0] for note in notes] == [f"robot[{n}].name" for n in range(6)]
+    assert "the tab has" in notes[0]
+
+
 def test_texts_of_all_screens_are_in_one_note() -> None:
     key = {**KEY, "label": "Verpackungsmaschinensteuerung"}
     (note,) = noted(key, screens=["800x480", "1024x600"])

@@ -19,6 +19,7 @@ from app.panel.widgets.tiles import (
     Screen,
 )
 from app.panel.widths.boxes import SIZES, Box, Cell, Cut
+from app.panel.widths.condition_rows import condition_texts
 from app.panel.widths.panel_fonts import font_notes, fonts_of
 from app.panel.widths.reasons import reason_texts
 from app.panel.widths.texts import MANY, face_texts, texts
@@ -28,6 +29,9 @@ MAX_KEY_MM: Final = 28.0  # on a page that fits
 TAB_PAD: Final = 9.0  # of a page's tab, with the border of the rail
 HEAD_GAP: Final = 12.0
 GROUP_TAB_PAD: Final = 8.0
+ROBOT_MM: Final = 20.0  # of a robot's tab, at least
+ROBOT_GAP: Final = 8.0
+ROBOT_PAD: Final = 14.0  # with the borders
 FRAME_KEY_PAD: Final = 15.0  # of the rail and of a button's face
 FRAME_FACE_PADS: Final = 2.0  # less above and below than on other buttons
 Placed = Iterator[tuple[str, Box]]
@@ -85,10 +89,20 @@ def boxes(panel: Panel, screen: Screen) -> Placed:
     """(place in the panel file, place of a text) of every text on a screen; a phone's pages scroll."""
     if screen.width < NARROW:
         return
+    yield from _robot_tabs(panel, screen)
     yield from _rail(panel, screen)
     for p, page in enumerate(panel.pages):
         if not page.template:
             yield from ((f"page[{p}]{place}", box) for place, box in _page(panel, page, screen))
+
+
+def _robot_tabs(panel: Panel, screen: Screen) -> Placed:
+    """The name of each robot on its tab; the word of its link is below."""
+    room, least = screen.width - 2 * screen.pad + ROBOT_GAP, ROBOT_MM * screen.mm + ROBOT_GAP
+    columns = max(1, min(len(panel.robots), int(room / least)))
+    width, size = room / columns - ROBOT_GAP - ROBOT_PAD, SIZES[panel.text_size].small
+    for number, robot in enumerate(panel.robots):
+        yield f"robot[{number}]", Box("name", robot.name, width, size, bold=True, name="tab")
 
 
 def _rail(panel: Panel, screen: Screen) -> Placed:
@@ -116,6 +130,7 @@ def _rail(panel: Panel, screen: Screen) -> Placed:
 
 def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
     interlocks = {interlock.id: interlock for interlock in panel.interlocks}
+    conditions = {entry.id: entry for entry in panel.named_conditions}
     own = 1 if page.own else 0
     for number, group in enumerate(page.parts):
         at = "" if number < own else f".group[{number - own}]"
@@ -124,7 +139,8 @@ def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
             yield at, box
         for w, cell in enumerate(_cells(panel, page, group, screen, width)):
             widget = group.widgets[w]
-            for box in (*texts(widget, cell), *reason_texts(widget, interlocks, cell)):
+            reasons = reason_texts(widget, interlocks, cell)
+            for box in (*texts(widget, cell), *reasons, *condition_texts(widget, conditions, cell)):
                 yield f"{at}.widget[{w}]", box
 
 

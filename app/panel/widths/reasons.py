@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from app.i18n import TextLike, number, say
+from app.panel.condition import Condition
 from app.panel.interlock import Interlock
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, KeyCommand
@@ -29,17 +30,18 @@ def sentence(interlock: Interlock) -> TextLike:
         return with_some_value(interlock.locked)
     if not interlock.comparisons:
         return say("interlock_not_permitted", name=interlock.name)
-    wanted = _some_value(interlock)
+    wanted = some_value(interlock)
     return say("interlock_condition_unmet", name=interlock.name, value=wanted, wanted=wanted)
 
 
-def _some_value(interlock: Interlock) -> TextLike:
-    value = next(iter(interlock.comparisons.values()))
+def some_value(condition: Condition) -> TextLike:
+    """A value that a condition with comparisons has, as a sentence names it."""
+    value = next(iter(condition.comparisons.values()))
     if isinstance(value, tuple):
         value = value[0]
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f'"{value}"'
-    return number(number_text(float(value)), interlock.unit)
+    return number(number_text(float(value)), condition.unit)
 
 
 def reason_texts(
