@@ -1,6 +1,7 @@
 """What `app.check` computes of pages that fit, held against a browser."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -70,9 +71,10 @@ def test_sizes_are_those_of_the_browser(
         assert measured["main"]["width"] == pytest.approx(width, abs=1)
         for group in measured["groups"]:
             described = cell.parts[group["number"]]
-            assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
+            inside = group_width(described, cell, screen, width)
+            assert group["width"] == pytest.approx(inside, abs=1)
             rows = page.evaluate(ROWS, group["number"])
-            assert rows == pytest.approx(row_heights(described, screen), abs=1)
+            assert rows == pytest.approx(row_heights(described, screen, inside), abs=1)
 
 
 def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
@@ -107,3 +109,54 @@ def test_stop_is_on_every_page_and_tab(demo: Server, page: Page) -> None:
         for tab in page.locator(".pages .group-tab:visible").all():
             tab.click()
             expect(stop).to_be_in_viewport()
+
+
+STEPS: Final = """
+title = "Steps"
+mode = "demo"
+screens = ["1920x1080", "1280x800", "1024x600", "800x480"]
+[[page]]
+id = "main"
+title = "Main"
+fit = true
+[[page.group]]
+title = "Jog"
+columns = 4
+span = 6
+"""
+QUARTER: Final = """
+[[page.group.widget]]
+id = "{name}"
+kind = "step"
+label = "{name}"
+topic = "/set_{name}"
+type = "std_msgs/msg/Float32"
+message = {{ data = "{{value}}" }}
+value = {{ topic = "/now_{name}", type = "std_msgs/msg/Float32" }}
+min = 0
+max = 100
+step = 5
+"""
+
+
+def test_a_step_may_be_a_quarter_of_its_group(tmp_path: Path, page: Page) -> None:
+    """Its value is above its buttons where it is too narrow for them side by side."""
+    path = tmp_path / "steps.toml"
+    path.write_text(STEPS + "".join(QUARTER.format(name=name) for name in ("x", "y", "z", "w")))
+    panel = load_panel(path)
+    cell, group = panel.pages[0], panel.pages[0].parts[0]
+    with ready(Server(ROOT, KIOSK_PANEL=str(path))) as mine:
+        page.goto(mine.url)
+        for size in SCREENS[:-1]:
+            screen = sized(page, panel, size)
+            assert reason(panel, cell, screen) == ""
+            width = group_width(group, cell, screen, page_width(panel, screen))
+            (height,) = row_heights(group, screen, width)
+            assert page.evaluate(ROWS, 0) == pytest.approx([height], abs=1)
+            value, less, more = (
+                place(page.locator(f"[data-widget=x] {part}"))
+                for part in (".value", "[data-way=down]", "[data-way=up]")
+            )
+            assert value["y"] + value["height"] <= less["y"] + 0.5, size
+            assert less["y"] == more["y"]
+            assert min(less["width"], less["height"], more["width"]) >= 43.5, size

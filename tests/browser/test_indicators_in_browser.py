@@ -281,8 +281,9 @@ def test_sizes_are_those_of_the_browser(cell: Server, panel: Panel, page: Page, 
         shown = page.locator(f'.group[data-group="{number}"]')
         if not shown.is_visible():
             continue
-        assert page.evaluate(ROWS, number) == pytest.approx(row_heights(group, screen), abs=1)
-        assert group_width(group, described, screen, width) > 0
+        inside = group_width(group, described, screen, width)
+        assert page.evaluate(ROWS, number) == pytest.approx(row_heights(group, screen, inside), abs=1)
+        assert inside > 0
         cut = shown.evaluate(
             "(g) => g.scrollHeight > g.clientHeight + 1 || g.scrollWidth > g.clientWidth + 1"
         )

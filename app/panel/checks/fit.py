@@ -10,6 +10,7 @@ from typing import Final
 from app.errors import Note
 from app.panel.layout import COLUMNS, Group, Page
 from app.panel.model import Panel
+from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, NARROW, TOUCH, Screen
 
@@ -47,7 +48,11 @@ def reason(panel: Panel, page: Page, screen: Screen) -> str:
     for rows in arranged(page, screen):
         needed = 0.0
         for row in rows:
-            needed += max(group_height(group, screen, page) for group in row) + (GAP if needed else 0)
+            heights = [
+                group_height(group, screen, page, group_width(group, page, screen, width))
+                for group in row
+            ]
+            needed += max(heights) + (GAP if needed else 0)
         if needed > space:
             named = ", ".join(f'"{group.title or page.title}"' for row in rows for group in row)
             return f"{named} needs {needed:.0f} px of height and has {space:.0f}"
@@ -121,9 +126,9 @@ def group_width(group: Group, page: Page, screen: Screen, width: float) -> float
     return (width + GAP) * span / COLUMNS - GAP - 2 * screen.pad
 
 
-def group_height(group: Group, screen: Screen, page: Page) -> float:
-    """The height that a group needs, with its padding and heading."""
-    heights = row_heights(group, screen)
+def group_height(group: Group, screen: Screen, page: Page, width: float) -> float:
+    """The height that a group of this inner width needs, with its padding and heading."""
+    heights = row_heights(group, screen, width)
     inside = sum(heights) + GAP * (len(heights) - 1)
     alone = not screen.is_wide and len(page.parts) > 1
     if not alone:
@@ -137,24 +142,32 @@ def group_height(group: Group, screen: Screen, page: Page) -> float:
     return head + inside + screen.pad
 
 
-def row_heights(group: Group, screen: Screen) -> list[float]:
-    """The heights of a group's rows, as the browser places its widgets."""
+def row_heights(group: Group, screen: Screen, width: float) -> list[float]:
+    """The heights of the rows of a group of this inner width, as the browser places its widgets."""
     heights: list[float] = []
     for widget, row, rows in group.cells():
         heights += [0.0] * (row + rows - len(heights))
-        needed = (KINDS[widget.kind].tile.height(widget, screen) - GAP * (rows - 1)) / rows
+        height = KINDS[widget.kind].tile.height_at(
+            widget, screen, cell_width(group, widget, screen, width)
+        )
+        needed = (height - GAP * (rows - 1)) / rows
         for at in range(row, row + rows):
             heights[at] = max(heights[at], needed)
     return heights
 
 
-def too_narrow(group: Group, width: float, screen: Screen) -> str:
-    """What is too narrow in a group of this inner width; "" where nothing is."""
+def cell_width(group: Group, widget: BaseWidget, screen: Screen, width: float) -> float:
+    """The width of a widget in a group of this inner width."""
     gap = GAP_MM * screen.mm
     column = (width - gap * (group.grid - 1)) / group.grid
+    span = group.span_of(widget)
+    return column * span + gap * (span - 1)
+
+
+def too_narrow(group: Group, width: float, screen: Screen) -> str:
+    """What is too narrow in a group of this inner width; "" where nothing is."""
     for widget in group.widgets:
-        span = group.span_of(widget)
-        has = column * span + gap * (span - 1)
+        has = cell_width(group, widget, screen, width)
         needs = KINDS[widget.kind].tile.width(widget, screen)
         if has < needs - 0.5:
             return f'"{widget.label}" would be {has:.0f} px wide and needs {needs:.0f}'

@@ -52,7 +52,7 @@ JOINTS_WIDTH: Final = 220.0
 TABLE_FRAME: Final = 69.0  # name, heads of the columns and note
 ROW, LOW_ROW = 36.0, 30.0
 TABLE_WIDTH: Final = 280.0
-STEP_VALUE: Final = 116.0  # the value between the keys
+STEP_SIDES: Final = 300.0  # from this width on its value is between its keys, below it above them
 PAD_MM: Final = 60.0
 ALARM_LIST_FRAME, ALARM_ROW, ALARMS_WIDTH = 33.0, 62.0, 300.0
 ALARM_ROWS: Final = 2  # that are seen at least
@@ -113,11 +113,17 @@ class Screen:
 class Tile(NamedTuple):
     """What the tile of a kind needs, from (widget, screen): the height, with what stands above and
     below it, and the least width in which the widget can be used. `grows`: it takes the height that is
-    left, where no widget of the group has `grow`."""
+    left, where no widget of the group has `grow`. Narrower than `folds`, it is higher by an entry."""
 
     height: Callable[[Any, Screen], float]
     width: Callable[[Any, Screen], float]
     grows: bool = False
+    folds: float = 0.0
+
+    def height_at(self, widget: BaseWidget, screen: Screen, width: float) -> float:
+        """The height at a width."""
+        more = screen.touch(ENTRY_MM) if width < self.folds else 0.0
+        return self.height(widget, screen) + more
 
 
 def _key_height(_: BaseWidget, screen: Screen) -> float:
@@ -206,7 +212,7 @@ def _key_width(_: BaseWidget, screen: Screen) -> float:
 DISPLAY: Final = Tile(_display_height, lambda widget, screen: DISPLAY_WIDTH)
 KEY: Final = Tile(_key_height, _key_width)
 ACTION: Final = Tile(_action_height, lambda widget, screen: (2 * KEY_MM + GAP_MM) * screen.mm)
-STEP: Final = Tile(_key_height, lambda widget, screen: 2 * KEY_MM * screen.mm + STEP_VALUE)
+STEP: Final = Tile(_key_height, lambda widget, screen: 2 * TOUCH + 8, folds=STEP_SIDES)
 ENTRY: Final = Tile(_entry_height, _key_width)
 NUMBER: Final = Tile(_entry_height, lambda widget, screen: NUMBER_WIDTH)
 SLIDER: Final = Tile(_entry_height, lambda widget, screen: SLIDER_WIDTH)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from app.errors import Note
-from app.panel.checks.fit import GAP, group_width, page_width, row_heights
+from app.panel.checks.fit import GAP, cell_width, group_width, page_width, row_heights
 from app.panel.layout import COLUMNS, Group, Page, is_button
 from app.panel.model import Panel
 from app.panel.widgets.families import KeyCommand
@@ -155,16 +155,14 @@ def _group_width(group: Group, page: Page, screen: Screen, width: float) -> floa
 def _cells(panel: Panel, page: Page, group: Group, screen: Screen, width: float) -> Iterator[Cell]:
     """The cells of a group's widgets, in their order."""
     gap = GAP_MM * screen.mm
-    column = (width - gap * (group.grid - 1)) / group.grid
-    heights = row_heights(group, screen)
+    heights = row_heights(group, screen, width)
     for widget, row, rows in group.cells():
-        span = group.span_of(widget)
         height = sum(heights[row : row + rows]) + GAP * (rows - 1)
         if is_button(widget):
             height -= gap - GAP
             height = min(height, MAX_KEY_MM * screen.mm) if page.fit else height
-        width_of_widget, sizes = column * span + gap * (span - 1), SIZES[panel.text_size]
-        yield Cell(width_of_widget, height, screen, sizes, page.fit, fonts_of(panel))
+        own_width, sizes = cell_width(group, widget, screen, width), SIZES[panel.text_size]
+        yield Cell(own_width, height, screen, sizes, page.fit, fonts_of(panel))
 
 
 def _headings(panel: Panel, page: Page, number: int, screen: Screen, width: float) -> Iterator[Box]:

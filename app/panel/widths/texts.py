@@ -30,7 +30,7 @@ from app.panel.widgets.static import PageLink, Picture, TextLabel
 from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
-from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE
+from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, STEP_SIDES
 from app.panel.widths.boxes import Box, Cell
 from app.panel.widths.letters import text_width
 from app.panel.widths.values import after_gap, ends, formatted, with_some_value
@@ -218,7 +218,9 @@ def _step(widget: Step, cell: Cell) -> Iterator[Box]:
 
 
 def step_width(cell: Cell) -> float:
-    """The width between the buttons of a step."""
+    """The width between the buttons of a step, or above them."""
+    if cell.width < STEP_SIDES:
+        return cell.width
     return cell.width - 2 * cell.screen.touch(KEY_MM) - 16
 
 
