@@ -127,7 +127,7 @@ class Dispatcher:
         source = widget.options_from
         if source is None:
             return chosen
-        if chosen in options_now(widget, source, self._robot, self._monotonic()).texts:
+        if str(chosen) in options_now(widget, source, self._robot, self._monotonic()).texts:
             return chosen
         raise InputError(say("input_option_gone", label=widget.label, given=format_value(chosen)))
 

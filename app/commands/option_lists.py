@@ -5,6 +5,7 @@ known.
 """
 
 import asyncio
+import json
 import logging
 import time
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.commands.transport import Transport
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.errors import DecodeError, LinkError
 from app.interfaces import Interfaces
 from app.panel.model import Panel
@@ -61,8 +62,8 @@ class OptionLists:
         """Starts to call new servers and stops for lost ones. Call it after every change of the
         graph."""
         for listing in self._listings:
-            name, kind, _ = listing.service
-            offered = server_offered("SS", name, kind, self._robot) is None
+            service = listing.service
+            offered = server_offered("SS", service.name, service.type, self._robot) is None
             if not (offered and self._robot.graph.peers):
                 self._cut(listing)
             elif listing.task is None:
@@ -70,10 +71,7 @@ class OptionLists:
 
     async def stop(self) -> None:
         """Ends the tasks."""
-        tasks = [listing.task for listing in self._listings if listing.task is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks(listing.task for listing in self._listings)
 
     def _cut(self, listing: _Listing) -> None:
         if listing.task is None:
@@ -95,7 +93,7 @@ class OptionLists:
     async def _ask(self, service: ListingService) -> tuple[str, ...] | None:
         """The texts of one answer; None without one in time, or for one that can't be read."""
         request, response = self._interfaces.service_types(service.type)
-        payload = self._interfaces.encode(request, {})
+        payload = self._interfaces.encode(request, json.loads(service.request))
         try:
             reply = await self._transport.query(self._robot.key(service.name), payload, ANSWER_S)
         except LinkError as error:

@@ -3,7 +3,7 @@ Pure, from (select, robot, time)."""
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from app.i18n import number
 from app.panel.widgets.families import TopicSource
@@ -28,7 +28,7 @@ class OptionsNow(NamedTuple):
 class _Listed(NamedTuple):
     """A list as the robot gave it, and when (monotonic seconds); `lock` where there is none."""
 
-    texts: Iterable[str] = ()
+    texts: Iterable[Any] = ()
     at: float = math.inf
     lock: Verdict | None = None
 
@@ -57,7 +57,10 @@ def _listed(select: SelectInput, source: RobotOptions, robot: RobotState) -> _Li
     if (service := source.listing) is not None:
         return _of_service(service, robot, unknown)
     parameter = listed_parameter(select)
-    return _Listed(lock=unknown) if parameter is None else _of_parameter(parameter, robot)
+    if parameter is None:
+        return _Listed(lock=unknown)
+    listed = _of_parameter(parameter, robot)
+    return listed if listed.lock or not source.range else _of_range(select, parameter, robot)
 
 
 def _of_topic(source: TopicSource, robot: RobotState, unknown: Verdict) -> _Listed:
@@ -82,6 +85,18 @@ def _of_parameter(parameter: Parameter, robot: RobotState) -> _Listed:
         lock = unsettable(parameter, known, robot.traits.sentences.timeout_hint)
     texts = known.value if isinstance(known.value, tuple) else ()
     return _Listed(map(str, texts), lock=lock)
+
+
+def _of_range(select: SelectInput, parameter: Parameter, robot: RobotState) -> _Listed:
+    """The whole numbers of the range in a node's description, its highest one even beside a step."""
+    limits = robot.parameters[parameter.id].range
+    if limits.low is None or limits.high is None:
+        return _Listed(lock=locked("options_no_range", label=select.label))
+    low, high, step = int(limits.low), int(limits.high), int(limits.step or 1)
+    if (high - low) // step >= MOST:
+        return _Listed(lock=locked("options_too_many", label=select.label, most=str(MOST)))
+    numbers = [*range(low, high + 1, step)]
+    return _Listed(map(str, numbers if high in numbers else [*numbers, high]))
 
 
 def options_verdict(widget_id: str, robot: RobotState, now: float) -> Verdict | None:

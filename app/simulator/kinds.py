@@ -39,6 +39,8 @@ from app.panel.widgets.table import Table
 from app.panel.widgets.trend import Trend
 from app.simulator.needs import Acted, Declared, Need, Published, Served, Shown
 
+NUMBERS: Final = 3  # of the range of a parameter that is chosen from
+
 
 def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
     """What a widget needs of the robot."""
@@ -199,8 +201,13 @@ def _recipe(load: RecipeLoad, interfaces: Interfaces) -> Iterator[Need]:
     for part in load.parts:
         yield from needs_of(part, interfaces)
     yield from (Declared(widget=parameter) for parameter in load.reads)
-    for source in load.sources():
-        yield from (Shown(topic=source.topic, type=source.type, field=path) for path in source.fields)
+    readback = load.set.readback
+    if readback is None or readback.topic is None or readback.type is None:
+        return
+    for field in load.fields:
+        first = field.examples()[0] if field.default_value is None else field.default_value
+        path, values = readback.fields[field.id], (field.sent_value(first),)
+        yield Shown(topic=readback.topic, type=readback.type, field=path, values=values)
 
 
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
@@ -235,7 +242,8 @@ def _select(select: SelectInput, _: Interfaces) -> Iterator[Need]:
     if source is not None and (service := source.listing) is not None:
         yield Served(service=service.name, type=service.type, listed=service.field)
     if (parameter := listed_parameter(select)) is not None:
-        yield Declared(widget=parameter)
+        limits = {"min": 1, "max": NUMBERS} if parameter.is_whole else {}
+        yield Declared(widget=parameter.model_copy(update=limits))
 
 
 # None: it needs no topic, or its topics need no more than values of their types.

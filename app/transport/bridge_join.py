@@ -13,7 +13,7 @@ import time
 from contextlib import suppress
 from typing import Final
 
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.errors import LinkError
 from app.ros_logging import RobotLog
 from app.transport.bridge_admin import BridgeAdmin
@@ -58,10 +58,7 @@ class GraphMembership:
     async def stop(self) -> None:
         """Ends its tasks. The tokens end with the session."""
         await self._publishers.stop()
-        tasks = [task for task in (self._joining, self._asking) if task is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks((self._joining, self._asking))
 
     def on_graph_change(self, peer_appeared: bool) -> None:
         """Joins, updates its tokens, or leaves. `peer_appeared`: there was no bridge before."""

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.errors import LinkError
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
@@ -116,12 +116,7 @@ class PeerLiveness:
         """Ends its tasks. Waits for the replies that callers of `flushed` wait for."""
         if self._awaited:
             await asyncio.wait(self._awaited, timeout=self._detector.limit)
-        tasks: list[asyncio.Task[Any]] = [*self._queries]
-        if self._querying is not None:
-            tasks.append(self._querying)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks([*self._queries, self._querying])
 
     async def flushed(self) -> bool:
         """Whether everything sent so far has reached the peers: they answer a query that is sent

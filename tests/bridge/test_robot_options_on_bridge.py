@@ -104,3 +104,91 @@ def test_a_parameter_lists_the_options_and_follows_its_changes(
     robot.set_parameter(name="frames", value=[])
     until(lambda: not cell.widget("ask")["enabled"], "the list is empty")
     assert "is empty" in cell.widget("ask")["reason"]
+
+
+RANGES: Final = f"""
+title = "Cyclone cell"
+mode = "live"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "limit"
+kind = "select"
+label = "Limit"
+options_from = {{ node = "{NODE}", parameter = "magazine", range = true }}
+[[page.widget]]
+id = "mode"
+kind = "select"
+label = "Mode"
+options_from = {{ node = "{NODE}", parameter = "mode", range = true }}
+[[page.widget]]
+id = "wide"
+kind = "select"
+label = "Wide"
+options_from = {{ node = "{NODE}", parameter = "wide", range = true }}
+[[page.widget]]
+id = "group"
+kind = "select"
+label = "Group"
+[page.widget.options_from]
+service = "{NODE}/list_parameters"
+type = "rcl_interfaces/srv/ListParameters"
+request = {{ prefixes = ["tool.left"], depth = 2 }}
+field = "result.names"
+every_s = 1
+[[page.widget]]
+id = "list"
+kind = "call"
+label = "List"
+service = "{NODE}/list_parameters"
+type = "rcl_interfaces/srv/ListParameters"
+request = {{ depth = "{{limit}}" }}
+[[page.widget]]
+id = "in_mode"
+kind = "call"
+label = "In mode"
+service = "{NODE}/list_parameters"
+type = "rcl_interfaces/srv/ListParameters"
+request = {{ depth = "{{mode}}" }}
+[[page.widget]]
+id = "in_wide"
+kind = "call"
+label = "In wide"
+service = "{NODE}/list_parameters"
+type = "rcl_interfaces/srv/ListParameters"
+request = {{ depth = "{{wide}}" }}
+"""
+
+
+@pytest.fixture
+def ranges(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
+    robot.declare_parameter(name="magazine", value=25, whole_range=[0, 90, 25])
+    robot.declare_parameter(name="wide", value=0, whole_range=[0, 200, 1])
+    robot.declare_parameter(name="tool.left", value="a")
+    robot.declare_parameter(name="tool.right", value="b")
+    with live_server(cyclone_bridge, tmp_path, RANGES) as mine:
+        until(lambda: mine.widget("list")["enabled"], "the range is known")
+        until(lambda: options(mine, "group"), "the service has listed")
+        yield mine
+
+
+def test_the_numbers_of_a_parameters_range_are_the_options(ranges: Server) -> None:
+    assert options(ranges, "limit") == ["0", "25", "50", "75", "90"]
+    for chosen in ("50", 50):  # as a page and as a program send it
+        receipt = ranges.press("list", inputs={"limit": chosen}).json()
+        assert receipt["outcome"] == "succeeded", receipt
+    gone = ranges.press("list", inputs={"limit": 26}).json()
+    assert (gone["outcome"], gone["code"]) == ("refused", "input_option_gone")
+    odd = ranges.press("list", inputs={"limit": "x"}).json()
+    assert (odd["outcome"], odd["code"]) == ("refused", "input_not_chosen")
+
+
+def test_a_range_that_is_missing_or_too_long_locks_with_the_reason(ranges: Server) -> None:
+    until(lambda: "has no range" in ranges.widget("in_mode")["reason"], "its reason")
+    until(lambda: "more than 200 numbers" in ranges.widget("in_wide")["reason"], "its reason")
+    assert options(ranges, "mode") == options(ranges, "wide") == []
+
+
+def test_a_listing_service_is_called_with_the_fields_of_the_panel_file(ranges: Server) -> None:
+    assert options(ranges, "group") == ["tool.left"]

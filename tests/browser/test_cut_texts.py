@@ -19,6 +19,7 @@ SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280))
 PANELS: Final = {
     "shipped": SHIPPED,
     "example": ROOT / "docs/examples/palletizer.toml",
+    "oven": ROOT / "docs/examples/oven.toml",
     "plan": ROOT / "docs/examples/plan/panel.toml",
     "gripper": ROOT / "docs/examples/lab-gripper/panel.toml",
     "mobile": ROOT / "docs/examples/mobile-robot/panel.toml",

@@ -150,6 +150,8 @@ class Parameters:
     def declare(self, name: str, value: Any, **more: Any) -> None:
         """Declares a parameter, or declares it again, and publishes the change."""
         type_ = kind_of(value)
+        if whole := more.pop("whole_range", None):  # from, to, step
+            more["integer_range"] = [IntegerRange(*whole)]
         self._declared[name] = Declared(ParameterDescriptor(name, type_, **more), value)
         self._tell([], new=[self._declared[name]])
 

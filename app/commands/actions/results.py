@@ -10,7 +10,7 @@ from app.clock import format_time
 from app.commands.actions.client import RESULT, STATUS, ActionClient
 from app.commands.actions.goal import ENDS, UNKNOWN, Goal
 from app.commands.service_calls import LATE_S, with_fields, with_reply
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.errors import LinkError
 from app.i18n import TextLike, number, say
 from app.robot.command_status import Outcome
@@ -57,10 +57,7 @@ class ResultWaiter:
 
     async def stop(self) -> None:
         """Ends the tasks. The goals continue on the robot."""
-        tasks = list(self._goals)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks([*self._goals])
 
     def _ended(self, task: "asyncio.Task[None]") -> None:
         goal = self._goals.pop(task)

@@ -22,7 +22,7 @@ from app.commands.parameters.values import check_value
 from app.commands.press import PressHandle
 from app.commands.service_calls import ServiceCalls
 from app.commands.transport import Transport
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
 from app.i18n import TextLike, say
@@ -106,10 +106,7 @@ class ParameterSync:
 
     async def stop(self) -> None:
         """Ends the tasks."""
-        tasks = [node.task for node in self._nodes.values() if node.task is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks(node.task for node in self._nodes.values())
 
     def _cut(self, node: Node) -> None:
         if node.task is None:

@@ -1,6 +1,7 @@
 """The descriptions of text, select and toggle inputs, and checks of their values."""
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Final, Literal
 
@@ -20,6 +21,7 @@ MISSING: Final = (
     'is missing: write options, like [{ value = 1, label = "One" }], or options_from, like '
     '{ topic = "/stations", type = "cell_msgs/msg/Names", field = "names" }'
 )
+WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 BOOL_TEXTS: Final = {"true": True, "false": False}
 
 
@@ -92,7 +94,8 @@ class Option(Description):
 
 
 class SelectInput(DisplayWidget, Input):
-    """Its options are those of the panel file, or with `options_from` the robot's."""
+    """Its options are those of the panel file, or with `options_from` the robot's: texts, or whole
+    numbers."""
 
     kind: Literal["select"]
     span: Span = 6
@@ -118,13 +121,15 @@ class SelectInput(DisplayWidget, Input):
         """The key of the option that is selected initially; "" where the robot has the options, and
         none is the default."""
         if self.options_from is not None:
-            return self.default or ""
+            return "" if self.default is None else str(self.default)
         first = (option for option in self.own_options if same_value(option.value, self.default))
         return next(first, self.own_options[0]).key
 
     @property
     def value_description(self) -> str:
-        return "text" if self.options_from else "the values of its options"
+        if self.options_from is None:
+            return "the values of its options"
+        return "whole number" if self.options_from.range else "text"
 
     def describe_value(self, value: Any, *, narrow: bool) -> str:
         return self.value_description if self.options_from else format_value(value)
@@ -132,6 +137,8 @@ class SelectInput(DisplayWidget, Input):
     @property
     def comment(self) -> str:
         if self.options_from is not None:
+            if self.options_from.range:
+                return f"one of the numbers in the range of {self.options_from.list_name}"
             return f"one of the texts that {self.options_from.list_name} lists"
         return f"one of {', '.join(format_value(option.value) for option in self.own_options)}"
 
@@ -140,15 +147,15 @@ class SelectInput(DisplayWidget, Input):
         return self.default
 
     def examples(self) -> list[Any]:
-        return ["text"] if self.options_from else [option.value for option in self.own_options]
+        if self.options_from is None:
+            return [option.value for option in self.own_options]
+        return [1] if self.options_from.range else ["text"]
 
     def check_value(self, value: Any) -> Any:
         """The value of the option with the given value or key; forms and browsers send keys. Of the
         robot's options any text, which a press compares with the list."""
-        if self.options_from is not None and isinstance(value, str) and value:
-            return value
         if self.options_from is not None:
-            raise InputError(say("input_not_chosen", label=self.label))
+            return self._robots_value(value, self.options_from)
         for option in self.own_options:
             if same_value(option.value, value) or option.key == value:
                 return option.value
@@ -157,6 +164,16 @@ class SelectInput(DisplayWidget, Input):
             say("input_not_an_option", label=self.label, options=options, given=format_value(value))
         )
 
+    def _robots_value(self, value: Any, source: RobotOptions) -> Any:
+        """A text of the robot's list, or a number of its range, which a page sends as text."""
+        if source.range:
+            is_whole = isinstance(value, int) and not isinstance(value, bool)
+            if is_whole or (isinstance(value, str) and WHOLE.fullmatch(value)):
+                return int(value)
+        elif isinstance(value, str) and value:
+            return value
+        raise InputError(say("input_not_chosen", label=self.label))
+
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if (self.options is None) == (self.options_from is None):
             both = "stands beside options: write the one or the other" if self.options else MISSING
@@ -164,8 +181,9 @@ class SelectInput(DisplayWidget, Input):
             return
         if self.options_from is not None:
             yield from self.options_from.faults(f"{place}.{KEY}", checking.interfaces)
-            if self.default is not None and not isinstance(self.default, str):
-                yield Fault(f"{place}.default", "must be a text, as the robot's options are")
+            kind, name = (int, "whole number") if self.options_from.range else (str, "text")
+            if self.default is not None and type(self.default) is not kind:
+                yield Fault(f"{place}.default", f"must be a {name}, as the robot's options are")
             return
         yield from option_faults(place, self.own_options)
         if self.default is not None and not any(

@@ -17,7 +17,7 @@ def listed_parameter(select: SelectInput) -> Parameter | None:
         label=select.label,
         node=listed.node,
         parameter=listed.name,
-        type="string[]",
+        type="integer" if listed.of_range else "string[]",
     )
 
 

@@ -1,13 +1,14 @@
 """Where the options of a select come from, if the robot has them: a list of texts on a topic, in a
-service's answer, or in a parameter."""
+service's answer, or in a parameter; or the numbers that a parameter may have."""
 
+import json
 from collections.abc import Iterator
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 from pydantic import Field
 
 from app.dialect.endpoint import Role
-from app.errors import Fault, InterfaceError
+from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import STRING_TYPES, Interfaces
 from app.panel.base import (
     Description,
@@ -20,6 +21,7 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults, type_fault
 from app.panel.field_paths import MessageField
+from app.panel.template import placeholders
 from app.panel.widgets.families import TopicSource
 
 MOST: Final = 200  # options that are shown; a press with a later one is refused
@@ -28,6 +30,9 @@ PARAMETER_SERVICES: Final = ("get_parameters", "describe_parameters", "set_param
 SOURCES: Final = ("topic", "service", "parameter")
 LATE_S: Final = 10.0  # a list of a service is known for so long after its next answer was due
 OF_PARAMETERS: Final = "is for topic or service: a node says itself when a parameter changes"
+OF_NODES: Final = "is for node and parameter: their range is a parameter's constraint"
+OF_SERVICES: Final = "is for service: it is what the service is asked with"
+NO_INPUTS: Final = "stands for an input: a list is asked for without the page. Write a value"
 NO_SOURCE: Final = (
     'names no list: write topic or service with their type, as in { topic = "/stations", type = '
     '"cell_msgs/msg/Names" }, or node and parameter'
@@ -35,30 +40,36 @@ NO_SOURCE: Final = (
 
 
 class ListedParameter(NamedTuple):
-    """A parameter whose texts are the options."""
+    """A parameter whose texts are the options; with `of_range` the whole numbers of its range are."""
 
     node: str
     name: str
+    of_range: bool = False
 
 
 class ListingService(NamedTuple):
-    """A service that is called again and again: the `field` of its answer has the texts."""
+    """A service that is called again and again with this request (JSON): the `field` of its answer has
+    the texts."""
 
     name: str
     type: str
     field: str
+    request: str = "{}"
 
 
 class RobotOptions(Description):
-    """A list of texts of the robot: a field of a topic or of a service's answer, or a parameter.
+    """A list of texts of the robot: a field of a topic or of a service's answer, or a parameter; with
+    `range` the whole numbers that the parameter's integer range allows.
 
-    Older than `max_age_s` it is not known. A service is called every `every_s`.
+    Older than `max_age_s` it is not known. A service is called every `every_s`, with `request`.
     """
 
     topic: TopicName | None = None
     service: TopicName | None = None
     node: NodeName | None = None
     parameter: ParameterName | None = None
+    range: bool = False
+    request: dict[str, Any] = Field(default_factory=dict)
     type: MessageOrServiceType | None = None
     field: MessageField = "data"
     every_s: Annotated[Seconds, Field(ge=1.0)] = 10.0
@@ -77,14 +88,15 @@ class RobotOptions(Description):
         """Its service, None without."""
         if self.service is None or self.type is None:
             return None
-        return ListingService(self.service, self.type, self.field)
+        request = json.dumps(self.request, sort_keys=True)
+        return ListingService(self.service, self.type, self.field, request)
 
     @property
     def listed(self) -> ListedParameter | None:
         """Its parameter, None without."""
         if self.node is None or self.parameter is None:
             return None
-        return ListedParameter(self.node, self.parameter)
+        return ListedParameter(self.node, self.parameter, self.range)
 
     @property
     def limit_s(self) -> float | None:
@@ -121,7 +133,7 @@ class RobotOptions(Description):
         for key, other in (("node", "parameter"), ("parameter", "node")):
             if getattr(self, key) is None:
                 yield Fault(f"{place}.{key}", f"is missing beside {other}")
-        for key in ("type", "field", "every_s", "max_age_s", "qos"):
+        for key in ("type", "field", "every_s", "max_age_s", "qos", "request"):
             if key in self.model_fields_set:
                 yield Fault(f"{place}.{key}", OF_PARAMETERS)
 
@@ -135,18 +147,22 @@ class RobotOptions(Description):
             message = f'"{self.type}" is no type of a {kind}: it must be like {right}'
             yield Fault(f"{place}.type", message)
             return
-        for key in ("qos",) if kind == "service" else ("every_s",):
+        for key in ("qos",) if kind == "service" else ("every_s", "request"):
             if key in self.model_fields_set:
-                yield Fault(f"{place}.{key}", f"is for a {'topic' if kind == 'service' else 'service'}")
+                why = OF_SERVICES if key == "request" else f"is for a {_OTHER[kind]}"
+                yield Fault(f"{place}.{key}", why)
+        if "range" in self.model_fields_set:
+            yield Fault(f"{place}.range", OF_NODES)
         yield from self._field_faults(place, self.type, interfaces)
 
     def _field_faults(self, place: str, type_name: str, interfaces: Interfaces) -> Iterator[Fault]:
         if self.service is not None:
             try:
-                type_name = interfaces.service_types(type_name)[1]
+                request, type_name = interfaces.service_types(type_name)
             except InterfaceError as error:
                 yield type_fault(f"{place}.type", error)
                 return
+            yield from self._request_faults(f"{place}.request", request, interfaces)
         faults = list(field_faults(place, type_name, self.field, interfaces))
         yield from faults
         field_type = None if faults else interfaces.type_at(type_name, self.field)
@@ -155,3 +171,15 @@ class RobotOptions(Description):
         ):
             message = f'"{self.field}" is {field_type}: options are a list of texts, like string[]'
             yield Fault(f"{place}.field", message)
+
+    def _request_faults(self, place: str, type_name: str, interfaces: Interfaces) -> Iterator[Fault]:
+        try:
+            for where, name in placeholders(self.request):
+                yield Fault(f"{place}.{where}", f'"{{{name}}}" {NO_INPUTS}')
+                return
+            interfaces.encode(type_name, self.request)
+        except FieldError as error:
+            yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
+
+
+_OTHER: Final = {"service": "topic", "topic": "service"}
