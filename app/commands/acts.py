@@ -17,9 +17,11 @@ from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
 
 from app.audit.entry import Kind
 from app.audit.press_record import PressLog, origin_of
+from app.commands.act_receipt import ActReceipt
 from app.commands.receipts import RECEIPTS_KEPT
 from app.errors import Cause, NotFound
-from app.i18n import Text, TextLike, say
+from app.i18n import Text, TextLike, joined, say
+from app.permission.confirmations import ConfirmedBy
 from app.permission.press_permission import cause_of
 from app.permission.principal import Principal
 from app.permission.role_locks import role_verdict
@@ -40,6 +42,7 @@ class ActRequest(NamedTuple):
     table is about one thing. `values` are further inputs; they are written to the log. `at` is when the
     operator touched the screen (in the server's time), None if unknown. `scripted` is false for a page
     without scripts, which reloads instead of sending keepalives. `secrets` are neither logged nor kept.
+    `confirmed` is who confirmed it with a PIN, None for nobody.
     """
 
     act: str
@@ -49,6 +52,7 @@ class ActRequest(NamedTuple):
     at: float | None = None
     scripted: bool = True
     secrets: Mapping[str, str] = NO_VALUES
+    confirmed: ConfirmedBy | None = None
 
 
 class ActGuard(Protocol):
@@ -113,35 +117,6 @@ def always(guard: ActGuard, request: ActRequest) -> Verdict:
     return PERMITTED
 
 
-@dataclass(frozen=True, slots=True)
-class ActReceipt:
-    """The result of an act: `code` names why it was refused, `reason` is the sentence for the operator,
-    and `cause` decides the HTTP status. All are "" if the act was applied, except that `reason` may
-    then say that the act is not safely in the log. `at` is RFC 3339."""
-
-    id: str
-    act: str
-    outcome: OutcomeCode
-    code: str
-    reason: TextLike
-    at: str
-    cause: Cause
-
-    @property
-    def done(self) -> bool:
-        return self.outcome != "refused"
-
-    def as_json(self) -> dict[str, TextLike]:
-        return {
-            "id": self.id,
-            "act": self.act,
-            "outcome": self.outcome,
-            "code": self.code,
-            "reason": self.reason,
-            "at": self.at,
-        }
-
-
 class ActContext(NamedTuple):
     """What all tables of one robot share. `changed` is called when a subject may have changed."""
 
@@ -161,13 +136,16 @@ class ActRunner(Generic[Subject]):
         subject: Subject,
         context: ActContext,
         further_needs: Callable[[str], Collection[str]] = lambda _: (),
+        further_lock: Callable[[ActRequest], Verdict | None] = lambda _: None,
     ) -> None:
         """`kind` is that of the log entries; with the act's name it is their action, such as
-        "control_take". `further_needs` returns the roles and groups that acts on an object need."""
+        "control_take". `further_needs` returns the roles and groups that acts on an object need,
+        `further_lock` why it refuses an act of a client who has them, None if it does not."""
         self._kind = kind
         self._acts = acts
         self._subject = subject
         self._further_needs = further_needs
+        self._further_lock = further_lock
         self._context = context
         self._press_log = context.press_log
         self._log = RobotLog(logging.getLogger(f"kiosk.{kind}"), context.robot)
@@ -213,7 +191,8 @@ class ActRunner(Generic[Subject]):
         """The receipt, the sentence of the log, and what was applied."""
         act = self._acts[request.act]
         needs = {act.needs, *self._further_needs(request.object)}
-        verdict = role_verdict(needs, request.who) or act.permission(self._context.guard, request)
+        verdict = role_verdict(needs, request.who) or self._further_lock(request)
+        verdict = verdict or act.permission(self._context.guard, request)
         if not verdict.permitted:
             reason = verdict.reason or ""
             return _refused(request, act_id, verdict.code, reason), reason, NOT_APPLIED
@@ -222,8 +201,10 @@ class ActRunner(Generic[Subject]):
         if refusal := applied.refusal:
             return _refused(request, act_id, refusal.code, refusal), refusal, applied
         outcome: OutcomeCode = "accepted" if applied.waits else "succeeded"
-        receipt = ActReceipt(act_id, request.act, outcome, "", applied.note, _now(), "")
-        return receipt, act.entry(applied), applied
+        confirmed = request.confirmed.said if request.confirmed else ""
+        note = joined((applied.note, confirmed))
+        receipt = ActReceipt(act_id, request.act, outcome, "", note, _now(), "")
+        return receipt, joined((act.entry(applied), confirmed)), applied
 
     async def _ended(
         self, request: ActRequest, receipt: ActReceipt, entry: TextLike, applied: Applied

@@ -26,9 +26,13 @@ from app.alarms.status import (
 from app.commands.acts import Act, ActRequest, Applied, server_and_control_permit
 from app.errors import InputError
 from app.i18n import Text, TextLike, say
+from app.permission.confirmations import ConfirmLocks, unconfirmed
+from app.permission.verdict import Verdict
 from app.roles import MAINTENANCE
 
 LONGEST_REASON: Final = 200
+# What a person confirms by `confirm_act`. The other acts bring an alarm back.
+CONFIRMED: Final = frozenset({"acknowledge", "shelve", "out_of_service", "reset"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +104,25 @@ def needs_of_alarm(engine: AlarmEngine, alarm_id: str) -> tuple[str, ...]:
     alarm = engine.alarms.get(alarm_id)
     needs = alarm.definition.alarm.needs if alarm else None
     return (needs,) if needs else ()
+
+
+def lock_of_alarm(
+    engine: AlarmEngine, confirm_locks: ConfirmLocks, request: ActRequest
+) -> Verdict | None:
+    """Why an act is refused because no person has confirmed it, or none can; None if it is not."""
+    alarm = engine.alarms.get(request.object)
+    confirmation = alarm.definition.alarm.confirm_act if alarm and request.act in CONFIRMED else None
+    if alarm is None or confirmation is None:
+        return None
+    if lock := confirm_locks.lock_of(confirm_key(alarm.definition.alarm.id)):
+        return lock
+    return unconfirmed(confirmation, request.who, request.confirmed)
+
+
+def confirm_key(alarm: str) -> str:
+    """Under which `ConfirmLocks` has the acts on the alarms of an entry of the panel file, whose id may
+    be that of a command too."""
+    return f"alarm {alarm}"
 
 
 ALARM_ACTS: Final[Mapping[str, Act[AlarmEngine, AlarmChange]]] = {

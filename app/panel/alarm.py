@@ -116,7 +116,7 @@ class Alarm(Description):
     publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
     the value times `scale`. `state` is the machine's state while it is active. `ack_command` is the
     control that is pressed when it is acknowledged, with its name or code in `ack_input`. `needs`: the
-    role or group that acts on it need."""
+    role or group that acts on it need; `confirm_act`: who confirms them with a PIN."""
 
     id: Id
     robot: Id | None = None
@@ -133,6 +133,7 @@ class Alarm(Description):
     inhibits: InhibitedNames = ()
     state: StateValue | None = None
     needs: Id | None = None
+    confirm_act: Literal["pin", "two_persons"] | None = None
     ack_command: Id | None = None
     ack_input: Id | None = None
     on_delay_s: Delay = 0.0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from app.alarms.published import PublishedAlarms
 from app.audit.press_record import Log, PressLog
 from app.commands.acts import ActContext, ActRunner
-from app.commands.alarm_acts import ALARM_ACTS, needs_of_alarm
+from app.commands.alarm_acts import ALARM_ACTS, lock_of_alarm, needs_of_alarm
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
@@ -156,7 +156,12 @@ def wire_session(
         control=control,
         control_acts=ActRunner("control", CONTROL_ACTS, control, act_context),
         alarm_acts=ActRunner(
-            "alarm", ALARM_ACTS, alarms.engine, act_context, partial(needs_of_alarm, alarms.engine)
+            "alarm",
+            ALARM_ACTS,
+            alarms.engine,
+            act_context,
+            partial(needs_of_alarm, alarms.engine),
+            partial(lock_of_alarm, alarms.engine, server.confirm_locks),
         ),
         recipe_acts=ActRunner("recipe", RECIPE_ACTS, recipes, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),

@@ -9,7 +9,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 from app.alarms.event_names import EVENT_NAMES
 from app.alarms.history import MAX_PAGE, NEWEST, HistoryFilter
 from app.clock import iso_time
-from app.commands.acts import ActReceipt
+from app.commands.act_receipt import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.receipts import Receipt

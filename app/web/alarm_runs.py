@@ -8,9 +8,11 @@ from typing import Final, NamedTuple
 
 from app.alarms.instance import AlarmInstance
 from app.commands.ack_commands import press_id_of, press_of, sentence_of
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.receipts import Receipt
 from app.i18n import Text, TextLike, say
+from app.permission.confirmations import ConfirmedBy
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.alarm_answers import AlarmActBody
@@ -33,13 +35,20 @@ class AlarmRuns:
     input once."""
 
     def __init__(
-        self, state: AppState, who: Principal, refusal: Text | None, *, scripted: bool
+        self,
+        state: AppState,
+        who: Principal,
+        refusal: Text | None,
+        *,
+        scripted: bool,
+        confirmed: ConfirmedBy | None = None,
     ) -> None:
-        """`refusal`: why all are refused."""
+        """`refusal`: why all are refused. `confirmed`: who confirmed the act with a PIN."""
         self._state = state
         self._who = who
         self._refusal = refusal
         self._scripted = scripted
+        self._confirmed = confirmed
         self._pressed: set[str] = set()
 
     async def run(self, act: str, alarm_id: str, body: AlarmActBody) -> AlarmRun:
@@ -54,6 +63,7 @@ class AlarmRuns:
         if body.id and body.for_s is not None and (earlier := runner.request(act_id)):
             values = dict(earlier.values)  # its end was that of the first request
         request = ActRequest(act, self._who, alarm_id, values, at, self._scripted)
+        request = request._replace(confirmed=self._confirmed)
         if self._refusal is not None:
             return AlarmRun(runner.limited(request, act_id, self._refusal))
         acknowledges = alarm is not None and act == "acknowledge" and not alarm.status.is_acknowledged

@@ -22,7 +22,7 @@ def confirmed(state: AppState, who: Caller, press: Press[Widget], token: str) ->
     """The press, with who confirmed it, if the token is a confirmation of just this press."""
     if not token or not confirmation_of(press.widget):
         return press
-    inputs = _inputs_of(press.widget, press.inputs)
+    inputs = inputs_of(press.widget, press.inputs)
     by = state.confirmer.take(token, who.session, press.widget.id, inputs)
     return replace(press, confirmed=by)
 
@@ -38,8 +38,9 @@ def confirmed_command(session: RobotSession, widget: str) -> Command:
 def question_of(state: AppState, command: Command, inputs: dict[str, Any]) -> Question:
     """What a person confirms of a press with these inputs."""
     needs = state.fleet.panel.needs.commands.get(command.id, frozenset())
-    return Question(command.id, _inputs_of(command, inputs), confirmation_of(command), needs)
+    return Question(command.id, inputs_of(command, inputs), confirmation_of(command), needs)
 
 
-def _inputs_of(command: Command, inputs: Any) -> str:
+def inputs_of(command: Command, inputs: Any) -> str:
+    """The fingerprint of the inputs that a press of the command takes."""
     return fingerprint(needed_inputs(command, inputs))

@@ -54,6 +54,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/presses": ANYBODY,
     "/alarms/acknowledge": ANYBODY,
     "/alarms/{alarm:path}/{act}": ANYBODY,
+    "/alarms/{alarm:path}/{act}/confirm": ANYBODY,
     "/control/here": ANYBODY,
     "/control/{act}": ANYBODY,
     "/diagnostics/{act}": ANYBODY,

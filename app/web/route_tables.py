@@ -9,6 +9,7 @@ from fastapi import Depends, FastAPI
 from app.web.app_state import named_robot
 from app.web.openapi_parts import errors
 from app.web.routes import (
+    alarm_confirm,
     alarm_history,
     alarm_report,
     alarms,
@@ -57,7 +58,7 @@ ROBOT_ROUTES: Final = (
     trends,
     recipes,
 )
-ALARM_ROUTES: Final = (alarms, alarm_history, alarm_report)
+ALARM_ROUTES: Final = (alarms, alarm_confirm, alarm_history, alarm_report)
 OTHER_ROUTES: Final = (
     diagnostics,
     recordings,

@@ -6,11 +6,13 @@ from functools import partial
 from app.access.access import EndReason
 from app.access.confirmer import able_users
 from app.access.sessions import Session
+from app.commands.alarm_acts import confirm_key
 from app.panel.widgets.confirmed import confirmation_of
 from app.permission.confirmations import confirm_lock
 from app.permission.principal import Principal
 from app.permission.role_locks import hardest, role_name
 from app.permission.verdict import Verdict
+from app.roles import OPERATOR
 from app.web.app_state import AppState
 
 log = logging.getLogger("kiosk.access")
@@ -35,21 +37,32 @@ def release_control(state: AppState, session: Session, reason: EndReason) -> Non
 def renew_confirm_locks(state: AppState) -> None:
     """Presses that nobody, or too few users, can confirm are locked, and unlocked when they can."""
     panel, users = state.fleet.panel, able_users(state.access)
+    confirmed = [
+        (command.id, confirmation_of(command), panel.needs.commands[command.id])
+        for command in panel.commands
+    ]
+    for alarm in panel.alarms:
+        needs = frozenset({alarm.needs or OPERATOR, OPERATOR})
+        confirmed.append((confirm_key(alarm.id), alarm.confirm_act or "", needs))
     locks: dict[str, Verdict] = {}
-    for command in panel.commands:
-        needs = panel.needs.commands[command.id]
-        if confirmation := confirmation_of(command):
-            role = role_name(hardest(needs))
-            if lock := confirm_lock(confirmation, needs, users, role):
-                locks[command.id] = lock
+    for name, confirmation, needs in confirmed:
+        role = role_name(hardest(needs)) if needs else ""
+        if confirmation and (lock := confirm_lock(confirmation, needs, users, role)):
+            locks[name] = lock
     if locks == state.fleet.confirm_locks.verdicts:
         return
     before, state.fleet.confirm_locks.verdicts = state.fleet.confirm_locks.verdicts, locks
     for name, lock in locks.items():
         if (before or {}).get(name) != lock:
-            log.warning('widget "%s" is locked: %s', name, lock.reason)
+            log.warning("%s is locked: %s", _described(name), lock.reason)
     for robot in state.fleet.sessions:
         robot.show()
+
+
+def _described(name: str) -> str:
+    """What is locked, by its name in `ConfirmLocks`."""
+    alarm = name.removeprefix(confirm_key(""))
+    return f'widget "{name}"' if alarm == name else f'alarm "{alarm}"'
 
 
 def follow_users(state: AppState) -> None:

@@ -3,6 +3,7 @@ import { newId, post, TAP_AGAIN_MS } from "./press.js";
 import { find } from "./show.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
+const TO_CONFIRM = ["confirm_needed_pin", "confirm_needed_two"];
 const IN_CONTROL = ["", "holding", "asked"];
 
 // What locks every act, as the line of the frame has it.
@@ -43,21 +44,31 @@ export function markLock(root) {
 
 // Sends an act and returns what its receipt says, "" for nothing. A second tap is the same act: it must not meet another
 // alarm that comes to the same place.
-/** @param {string} root @param {string} path @param {object} body @returns {Promise<string>} */
+/** @param {string} root @param {string} path @param {Record<string, Data>} body @returns {Promise<string>} */
 export async function sendAct(root, path, body) {
   const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
-  const reason = await send(`${root}/alarms/${path}`, { ...body, id: newId() });
+  const address = `${root}/alarms/${path}`;
+  const answer = await send(address, { ...body, id: newId() });
+  if (TO_CONFIRM.includes(answer.code)) askPerson(`${address}/confirm`, body);
   await pause;
-  return reason;
+  return answer.error ?? answer.reason ?? "";
 }
 
-/** @param {string} address @param {object} body @returns {Promise<string>} */
+// To the page on which a person confirms the act.
+/** @param {string} address @param {Record<string, Data>} body */
+function askPerson(address, body) {
+  const carried = ["occurrence", "reason", "for_s"]
+    .filter((name) => body[name])
+    .map((name) => [name, String(body[name])]);
+  const query = new URLSearchParams([...carried, ["id", newId()], ["page", location.pathname + location.search]]);
+  location.assign(`${address}?${query}`);
+}
+
+/** @param {string} address @param {object} body @returns {Promise<Data>} */
 async function send(address, body) {
   try {
-    /** @type {Data} */
-    const answer = await (await post(address, body, RESPONSE_TIMEOUT_MS)).json();
-    return answer.error ?? answer.reason ?? "";
+    return await (await post(address, body, RESPONSE_TIMEOUT_MS)).json();
   } catch {
-    return pageGuard.page.sentences.unsure;
+    return { reason: pageGuard.page.sentences.unsure };
   }
 }

@@ -9,11 +9,11 @@ import pytest
 
 from app.audit import Entry, NullLog
 from app.audit.press_record import PressLog
+from app.commands.act_receipt import ActReceipt
 from app.commands.acts import (
     Act,
     ActContext,
     ActGuard,
-    ActReceipt,
     ActRequest,
     ActRunner,
     Applied,

@@ -10,7 +10,8 @@ import pytest
 from app.alarms.states import State
 from app.alarms.status import Override
 from app.audit.press_record import PressLog
-from app.commands.acts import ActContext, ActReceipt, ActRequest, ActRunner
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActContext, ActRequest, ActRunner
 from app.commands.alarm_acts import ALARM_ACTS
 from app.errors import InputError
 from tests.alarms.test_engine import AIR, START, Cell

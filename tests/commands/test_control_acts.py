@@ -8,7 +8,8 @@ import pytest
 
 from app.audit import Entry, NullLog
 from app.audit.press_record import PressLog
-from app.commands.acts import ActContext, ActReceipt, ActRequest, ActRunner
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActContext, ActRequest, ActRunner
 from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN, log_hand_over
 from app.commands.press_guard import PressGuard
 from app.errors import NotFound

@@ -3,7 +3,8 @@
 import asyncio
 
 from app.audit.press_record import PressLog
-from app.commands.acts import ActContext, ActReceipt, ActRequest, ActRunner
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActContext, ActRequest, ActRunner
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.permission.verdict import locked
 from tests.commands.test_acts import ANN, Guard, Log

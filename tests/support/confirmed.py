@@ -1,4 +1,4 @@
-"""A panel with presses that a person confirms, and its users."""
+"""A panel with presses and alarms that a person confirms, and its users."""
 
 from pathlib import Path
 from typing import Final
@@ -95,6 +95,33 @@ span = 4
 
 [demo."/operation_enabled"]
 values = [true]
+"""
+ALARMS: Final = """
+[[alarm]]
+id = "hot"
+text = { en = "Oven hot", ja = "炉が高温", de = "Ofen heiß" }
+confirm_act = "pin"
+topic = "/oven"
+type = "std_msgs/msg/Float64"
+high = 50
+
+[[alarm]]
+id = "guard"
+text = { en = "Guard open", ja = "ガード開", de = "Schutz offen" }
+confirm_act = "two_persons"
+topic = "/oven"
+type = "std_msgs/msg/Float64"
+high = 40
+
+[[alarm]]
+id = "plain"
+text = { en = "Warm", ja = "高温", de = "Warm" }
+topic = "/oven"
+type = "std_msgs/msg/Float64"
+high = 30
+
+[demo."/oven"]
+values = [80]
 """
 PINS: Final = {"M. Sato": "2580", "K. Novak": "1470", "J. Brandt": "3691"}
 

@@ -1,5 +1,6 @@
 """What the sheet shows in which a person confirms a press with a PIN, password or badge."""
 
+from dataclasses import dataclass
 from typing import Any, Final, TypedDict
 
 from app.access.confirmer import able_users
@@ -23,6 +24,19 @@ TITLES: Final = {
 WORDS: Final = ("clear", "delete", "password", "badge", "name")
 
 
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What a person confirms, a press or an act on an alarm. `id` is that of the command or of the
+    alarm's entry, `needs` what both persons need, and `yes` the word of the button."""
+
+    id: str
+    confirmation: str
+    needs: frozenset[str]
+    ask: Ask
+    yes: TextLike
+    consequence: TextLike = ""
+
+
 class ConfirmSheet(TypedDict):
     """`lock`: why nobody can confirm it at this browser, "" if somebody can. `people` are those who can
     be chosen as the second person; without names (`typed`) they are typed. `by_pin`, `by_password` and
@@ -43,23 +57,27 @@ class ConfirmSheet(TypedDict):
     words_of: dict[str, Text]
 
 
-def confirm_sheet(
-    state: AppState,
-    session: RobotSession,
-    command: Command,
-    who: Principal,
-    value: str = "",
-    chosen: str = "",
-) -> ConfirmSheet:
-    """The sheet for a press of a command by a client; `value` is that of its button, such as the recipe
-    that it loads. Names of users are shown at the kiosk's own machine only: elsewhere they are typed.
-    `chosen` is the second person so far."""
-    two, book = confirmation_of(command) == "two_persons", state.access.book
-    needs = state.fleet.panel.needs.commands.get(command.id, frozenset())
+def press_subject(state: AppState, session: RobotSession, command: Command, value: str = "") -> Subject:
+    """A press of a command as what a person confirms; `value` is that of its button, such as the recipe
+    that it loads."""
+    return Subject(
+        command.id,
+        confirmation_of(command),
+        state.fleet.panel.needs.commands.get(command.id, frozenset()),
+        question_before(state.fleet, session, command, value),
+        _yes(command),
+        command.consequence or "" if isinstance(command, Confirmed) else "",
+    )
+
+
+def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str = "") -> ConfirmSheet:
+    """The sheet for what a client wants to do. Names of users are shown at the kiosk's own
+    machine only: elsewhere they are typed. `chosen` is the second person so far."""
+    two, book = subject.confirmation == "two_persons", state.access.book
     others = [
         user.user
         for user in able_users(state.access)
-        if user.user != who.user and all(user.meets(need) for need in needs)
+        if user.user != who.user and all(user.meets(need) for need in subject.needs)
     ]
     here = who.client.local
     names = (others if here else []) if two else [who.user]
@@ -68,24 +86,24 @@ def confirm_sheet(
     title = say("confirm_title_two") if two else say(_title(ways), name=who.user)
     return ConfirmSheet(
         title=title,
-        question=question_before(state.fleet, session, command, value),
-        consequence=command.consequence or "" if isinstance(command, Confirmed) else "",
+        question=subject.ask,
+        consequence=subject.consequence,
         lock="" if who.user and not who.program else say(SIGN_IN),
         people=names if two else [],
         typed=two and not here,
         by_pin="pin" in ways,
         by_password="password" in ways and (two or "pin" not in ways),
         by_badge="badge" in ways,
-        yes=_yes(command),
+        yes=subject.yes,
         chosen=chosen,
-        typed_digits=len(state.access.typed_digits(who.client.id, digits_key(command))),
+        typed_digits=len(state.access.typed_digits(who.client.id, digits_key(subject.id))),
         words_of={name: say(f"signin_{name}") for name in WORDS} | {"second": say("confirm_second")},
     )
 
 
-def digits_key(command: Command) -> str:
+def digits_key(subject: str) -> str:
     """Under which the server keeps the digits that a browser without scripts types."""
-    return f"\0{command.id}"
+    return f"\0{subject}"
 
 
 def _title(ways: set[Any]) -> str:

@@ -14,7 +14,8 @@ from app.alarms.report import read_report
 from app.alarms.shifts import Shift
 from app.alarms.state_times import StatePeriod, read_states
 from app.audit import Filter, OperatorLog, Row
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S

@@ -2,7 +2,6 @@
 and scripts, forms without them."""
 
 import asyncio
-import re
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Annotated, Any, Final
@@ -15,11 +14,12 @@ from pydantic import BaseModel
 from app.alarms.history import read_history
 from app.alarms.shown import more_text
 from app.alarms.transition_json import finite, transition
-from app.commands.acts import ActReceipt
+from app.commands.act_receipt import ActReceipt
 from app.commands.alarm_acts import ALARM_ACTS
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.i18n import localized, say
+from app.permission.confirmations import ConfirmedBy
 from app.web.alarm_answers import (
     AcknowledgeBody,
     AlarmActBody,
@@ -39,19 +39,15 @@ from app.web.openapi_parts import PAGE, Described, described_body, errors, field
 from app.web.rendering.alarm_choice import chosen_rows, segment_counts
 from app.web.rendering.alarms_page import alarms_context, word
 from app.web.request_body import act_body_of, as_model
+from app.web.routes.alarm_confirm import OWN_PAGE, AlarmId, confirmed_act
 from app.web.routes.press_forms import is_second_tap
 from app.web.routes.presses import STATUS
 
 router = APIRouter()
 
-AlarmId = Annotated[str, Path(max_length=300, description="the id of an alarm")]
 AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
 FORM_FIELDS_MOST: Final = 600
-OWN_PAGE: Final = re.compile(
-    r"(/robots/[a-z0-9_]+)?/"
-    r"(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics|help|recipes/[a-z0-9_]+)(\?[!-~]*)?"
-)
 OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
 TOO_OFTEN: Final = say("control_too_often")
 TOO_SOON: Final = say("press_too_soon")
@@ -174,9 +170,16 @@ async def acknowledge(request: Request, state: CurrentState) -> Response:
 )
 async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
     is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
+    confirmed: ConfirmedBy | None = None
+    if is_form:
+        confirmed, asked = await confirmed_act(request, state, alarm, act, content)
+        if asked is not None:
+            return asked
     filled = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
     body = as_model(AlarmActBody, filled if is_form else content)
-    return await _answer(request, state, act, {alarm: body}, content if is_form else None)
+    return await _answer(
+        request, state, act, {alarm: body}, content if is_form else None, confirmed=confirmed
+    )
 
 
 async def _answer(
@@ -187,6 +190,7 @@ async def _answer(
     form: Mapping[str, str] | None,
     *,
     several: bool = False,
+    confirmed: ConfirmedBy | None = None,
 ) -> Response:
     """Runs an act on alarms and answers with the receipts."""
     # Without a cookie the client is anonymous; its next request has this one.
@@ -194,7 +198,7 @@ async def _answer(
     refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
         refusal = TOO_OFTEN
-    runs = AlarmRuns(state, who, refusal, scripted=form is None)
+    runs = AlarmRuns(state, who, refusal, scripted=form is None, confirmed=confirmed)
     with state.in_flight.track():
         answers = await asyncio.gather(*(runs.run(act, alarm, body) for alarm, body in bodies.items()))
     pairs = list(zip(bodies, answers, strict=True))

@@ -18,7 +18,7 @@ from app.web.client_cookie import caller
 from app.web.confirmations import confirmed_command, question_of
 from app.web.language import language_of
 from app.web.openapi_parts import PAGE, described_body, errors
-from app.web.rendering.confirm_sheet import confirm_sheet
+from app.web.rendering.confirm_sheet import confirm_sheet, press_subject
 from app.web.request_body import as_model, body_of, json_of
 from app.web.routes.presses import INPUTS
 from app.web.routes.session import REFUSED, SignIn, attempt_of, refused_answer
@@ -70,7 +70,7 @@ async def sheet(
 ) -> Response:
     command = confirmed_command(session, widget)
     who = caller(request).principal(state)
-    context = confirm_sheet(state, session, command, who, value)
+    context = confirm_sheet(state, press_subject(state, session, command, value), who)
     html = state.templates.render("_confirm.html", language_of(request), scripted=True, **context)
     return HTMLResponse(html, headers=UNCACHED)
 

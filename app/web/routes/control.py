@@ -7,7 +7,8 @@ from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S

@@ -11,7 +11,8 @@ from urllib.parse import quote, urlencode
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.commands.press import PRESS_ID

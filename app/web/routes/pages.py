@@ -52,6 +52,7 @@ OTHER_PAGES = (
     "users.html",
     "recipes.html",
     "alarms.html",
+    "alarm-confirm.html",
     "alarm-history.html",
     "alarm-report.html",
     "diagnostics.html",

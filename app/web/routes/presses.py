@@ -125,7 +125,7 @@ async def press(
         return _answer(request, await receipt_of_press(state, session, pressed))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        form = PressForm(command, who, form_of(body), reader, caller(request).session)
+        form = PressForm(who, form_of(body), caller(request).session, command, reader)
         return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 

@@ -12,7 +12,8 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.recipe_acts import RECIPE_ACTS

@@ -12,7 +12,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 from app.access.listing import tokens_json, users_json
 from app.access.secrets_hash import LONGEST, WAYS, new_api_token
 from app.access.users import LONGEST_NAME
-from app.commands.acts import ActReceipt, ActRequest
+from app.commands.act_receipt import ActReceipt
+from app.commands.acts import ActRequest
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.user_acts import TOKEN, USER_ACTS
