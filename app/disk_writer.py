@@ -23,6 +23,8 @@ from app.errors import LogError
 
 log = logging.getLogger("kiosk.disk")
 
+REST_SHARE: Final = 2.0  # of the time of a write, it rests until the next
+REST_S: Final = (0.03, 0.2)  # at least and at most
 RETRY_DELAYS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one is repeated
 
 Item = TypeVar("Item")
@@ -71,15 +73,20 @@ class DiskWriter(Generic[Item]):
         most: int,
         batch_most: int | None = None,
         keep: bool = False,
+        rests: bool = False,
     ) -> None:
         """`most` limits the sizes of the queued items together, without those that are being written;
         `batch_most` is how many are written at a time, by default all. `keep`: items that the disk
-        refuses stay queued, and are refused only at the end."""
+        refuses stay queued, and are refused only at the end. `rests`: it rests after each write, so
+        that in a flood few large ones leave the disk to others. What comes after a rest is written
+        at once."""
         self.name = name
         self._file = file
         self._most = most
         self._batch_most = batch_most
         self._keeps = keep
+        self._rests = rests
+        self._rest_until = 0.0  # in monotonic seconds
         self.tried = threading.Event()  # set after the first attempt to open the file
         self._queue: queue.SimpleQueue[_Queued[Item] | Mark | None] = queue.SimpleQueue()  # None wakes
         self._lock = threading.Lock()  # of the next two
@@ -158,6 +165,7 @@ class DiskWriter(Generic[Item]):
         """Opens, writes or tidies. Holds no item afterwards. False at the end."""
         if not self._is_open and time.monotonic() >= self._try_at:
             self._open()
+        self._rest()
         batch, marks = self._next()
         is_last = self._ended and self._queue.empty()
         with self._lock:
@@ -173,6 +181,11 @@ class DiskWriter(Generic[Item]):
         for mark in marks:
             mark()
         return not is_last
+
+    def _rest(self) -> None:
+        """Waits until the next write may begin; not at the end."""
+        while not self._ended and (left_s := self._rest_until - time.monotonic()) > 0:
+            time.sleep(min(left_s, REST_S[0]))
 
     def _next(self) -> tuple[list[_Queued[Item]], list[Mark]]:
         """The items of the next write and the marks behind them, as soon as there is something to
@@ -209,10 +222,13 @@ class DiskWriter(Generic[Item]):
         self.tried.set()
 
     def _write(self, batch: list[_Queued[Item]]) -> None:
-        items = [queued.item for queued in (*self._kept, *batch)]
+        items, began = [queued.item for queued in (*self._kept, *batch)], time.monotonic()
         if self._is_open and self._guard(lambda: self._file.write(items)):
             self._count(self._kept, -1)
             self._kept = []
+            if self._rests:
+                ended = time.monotonic()
+                self._rest_until = ended + min(max(REST_SHARE * (ended - began), REST_S[0]), REST_S[1])
         elif self._keeps:
             self._count(batch, 1)
             self._kept += batch

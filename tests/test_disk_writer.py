@@ -3,12 +3,14 @@
 import asyncio
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 
 import pytest
 
 from app import disk_writer
-from app.disk_writer import DiskWriter
+from app.disk_writer import REST_S, DiskWriter
 from app.errors import LogError
 from tests.support.parts import ENOUGH_S, until
 
@@ -24,6 +26,7 @@ class TextFile:
         self.batches: list[list[str]] = []
         self.refused: list[tuple[str, str]] = []
         self.events: list[str] = []
+        self.times: list[float] = []  # of each write, in monotonic seconds
 
     def open(self) -> None:
         self.events.append("open")
@@ -36,6 +39,7 @@ class TextFile:
         if self.fails is not None:
             raise self.fails
         self.batches.append([*items])
+        self.times.append(time.monotonic())
 
     def refuse(self, items: Sequence[str], error: LogError) -> None:
         self.refused += [(item, str(error)) for item in items]
@@ -73,9 +77,9 @@ def start(file: TextFile, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     writers: list[DiskWriter[str]] = []
 
     def started(
-        *, most: int = 100, batch_most: int | None = None, keep: bool = False
+        *, most: int = 100, batch_most: int | None = None, keep: bool = False, rests: bool = False
     ) -> DiskWriter[str]:
-        writer = DiskWriter("test", file, most=most, batch_most=batch_most, keep=keep)
+        writer = DiskWriter("test", file, most=most, batch_most=batch_most, keep=keep, rests=rests)
         writers.append(writer)
         writer.start()
         assert writer.tried.wait(ENOUGH_S)
@@ -102,6 +106,22 @@ def test_waiting_items_are_written_in_one_batch_in_order(file: TextFile, start: 
     assert flush(writer)
     assert file.batches == [["a"], ["b", "c", "d"]]
     assert "tidy" in file.events
+
+
+def test_a_thread_that_rests_leaves_the_disk_to_others_between_writes(
+    file: TextFile, start: Start
+) -> None:
+    writer = start(rests=True, most=1000)
+    items = [str(number) for number in range(200)]
+    for item in items:
+        writer.put(item)
+        time.sleep(0.001)
+    assert flush(writer)
+    assert file.written == items
+    assert all(later - earlier >= REST_S[0] for earlier, later in pairwise(file.times))
+    writer.put("last")
+    assert writer.close(ENOUGH_S)
+    assert file.written == [*items, "last"]
 
 
 def test_a_batch_has_no_more_items_than_allowed(file: TextFile, start: Start) -> None:

@@ -55,7 +55,9 @@ class AlarmDisk:
         self._rules = rules
         self._events = events
         self._loop = asyncio.get_running_loop()
-        self._writer: DiskWriter[Change] = DiskWriter("alarms", self, most=MAX_WAITING, keep=True)
+        self._writer: DiskWriter[Change] = DiskWriter(
+            "alarms", self, most=MAX_WAITING, keep=True, rests=True
+        )
         self._is_started = False
         # On the thread.
         self._store: AlarmStore | None = None
