@@ -1,7 +1,7 @@
 // The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press.
-import { needsPerson, openAsking } from "./asking.js";
+import { openAsking } from "./asking.js";
 import { entries, isCheckbox, isNumber, numbers } from "./entries.js";
-import { closest, find, setText } from "./show.js";
+import { closest, find, needsPerson, setText } from "./show.js";
 
 const NOT_NOW_MS = 15_000; // without an answer the question goes
 

@@ -4,10 +4,6 @@ import { coverPage, placeBeside, uncoverPage } from "./beside.js";
 import { TAP_AGAIN_MS } from "./press.js";
 import { closest, find } from "./show.js";
 
-// Whether a person confirms its presses with a PIN.
-/** @param {HTMLElement} root */
-export const needsPerson = (root) => pageGuard.page.confirms.includes(root.dataset.widget ?? "");
-
 // Opens `dialog` for the widget `root`; `onReady` is called when the second tap of the press that opens it has passed,
 // which is no answer. It goes without an answer after `notNowMs` since the last `stay`.
 /** @param {HTMLElement} root @param {HTMLElement} dialog @param {number} notNowMs @param {() => void} onReady */

@@ -1,113 +1,22 @@
-// The full text of a key in a sheet beside it: its face shows what there is room for. A touch on a locked key opens it
-// with why it is locked and what to do, and so does the "…" of the key, which a keyboard reaches. An open sheet follows
-// its key. A touch on the bar of control shows its text in full.
-import { placeBeside, uncoverPage } from "./beside.js";
+// Texts of keys that are cut. A touch on a locked key opens a sheet with why it is locked and what to do, and so does the
+// "…" of the key, which a keyboard reaches. A touch on the bar of control shows its text in full. The sheet's script comes
+// when the page is at rest, or at the first touch: without a server a lock still says why.
 import { sayOnce } from "./group-locks.js";
-import { closest, copyOf, find, setText } from "./show.js";
+import { closest, copyOf, find } from "./show.js";
 
-const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
-const FIRST_MS = 200; // so long the sheet waits for the server before it opens with the text that the page has
-const AGAIN_MS = 1000; // between two looks at the server while it is open
-const SOON_MS = 100; // after a change of the lock
-const sheet = find(document, "#whole");
-const part = find(sheet, ".lock"); // from the server
-/** @type {HTMLElement | null} */
-let shown = null; // the key, or another element, whose text the sheet shows
-let timer = 0;
-let looks = 0; // at the server: only the answer to the last one counts
+export const TEXTS = ".reasons, .why, .goal, .holding, .receipt, .result";
+/** @type {typeof import("./whole-text.js") | null} */
+let sheet = null; // when it was needed
+
+const AT_REST_MS = 4000;
+/** @type {(error: unknown) => void} */
+const noop = () => {};
+const load = () => import("./whole-text.js").then((script) => (sheet = script));
+setTimeout(() => load().catch(noop), AT_REST_MS);
 
 /** @param {HTMLElement} key */
-function isLocked(key) {
+export function isLocked(key) {
   return key.dataset.enabled ? key.dataset.enabled === "false" : key.querySelector("button")?.disabled === true;
-}
-
-const isOpen = () => sheet.matches(":popover-open");
-
-/** @param {HTMLElement} key */
-function visibleTexts(key) {
-  const locked = isLocked(key);
-  const reasons = key.querySelector(".reasons")?.textContent;
-  const shown = [...key.querySelectorAll(TEXTS)].filter((text) => {
-    if (text.matches(".why")) return locked && !reasons;
-    return !text.matches(".reasons") || locked;
-  });
-  return shown.map((text) => text.textContent.trim()).filter(Boolean);
-}
-
-// What the page itself knows. Whether there is anything.
-/** @param {HTMLElement} key */
-function showTexts(key) {
-  const texts = visibleTexts(key);
-  if (texts.length) show(find(key, ".name, h3").textContent, texts, null);
-  return texts.length > 0;
-}
-
-/** @param {string | undefined} title @param {string[]} texts @param {HTMLElement | null} help */
-function show(title, texts, help) {
-  setText(find(sheet, "h2"), title);
-  setText(find(sheet, "p"), texts.join("\n"));
-  find(sheet, "p").hidden = help !== null;
-  if (!help) part.replaceChildren();
-  else if (!part.firstElementChild?.isEqualNode(help)) part.replaceChildren(help);
-  place();
-}
-
-function place() {
-  if (shown && isOpen()) placeBeside(sheet, find(shown, "button, p").getBoundingClientRect());
-}
-
-/** @param {HTMLElement} key @param {boolean} byKeyboard */
-async function open(key, byKeyboard) {
-  if (key === shown && isOpen()) return;
-  release();
-  shown = key;
-  if (isLocked(key)) {
-    key.toggleAttribute("data-asked", true);
-    await Promise.race([refresh(key), new Promise((resolve) => setTimeout(resolve, FIRST_MS))]);
-    if (key !== shown || isOpen()) return;
-  }
-  if (!part.firstElementChild && !showTexts(key)) return release();
-  sheet.showPopover();
-  place();
-  if (byKeyboard) find(sheet, "button").focus();
-}
-
-// As the server has it now, again and again while the sheet is open.
-/** @param {HTMLElement} key */
-async function refresh(key) {
-  clearTimeout(timer);
-  const look = ++looks;
-  const { lockHelp } = await import("./lock-help.js");
-  const help = await lockHelp(closest(key, "[data-widget]")?.dataset.widget);
-  if (look !== looks || key !== shown || !isLocked(key)) return;
-  if (help) show(help.dataset.title, [], help);
-  else showTexts(key);
-  timer = setTimeout(() => refresh(key), AGAIN_MS);
-}
-
-function release() {
-  clearTimeout(timer);
-  shown?.toggleAttribute("data-asked", false);
-  shown = null;
-  part.replaceChildren();
-}
-
-// What it covers is not pressed by a tap that was meant for it.
-function close() {
-  uncoverPage();
-  if (isOpen()) sheet.hidePopover();
-}
-
-// The lock of the key, or its text, is another.
-/** @param {HTMLElement} key */
-function follow(key) {
-  if (key !== shown) return;
-  if (key.matches("[data-asked]")) {
-    clearTimeout(timer);
-    if (isLocked(key)) timer = setTimeout(() => refresh(key), SOON_MS);
-    else if (isOpen()) close();
-    else release();
-  } else if (isOpen() && !showTexts(key)) sheet.hidePopover();
 }
 
 /** @param {HTMLElement} text */
@@ -124,7 +33,7 @@ function showMore(key, cut) {
   more.toggleAttribute("data-clipped", cut);
   const focused = document.activeElement;
   if (isLocked(key) && focused?.matches("button:disabled") && key.contains(focused)) more.focus();
-  follow(key);
+  sheet?.follow(key);
 }
 
 /** @type {Set<HTMLElement>} */
@@ -163,22 +72,13 @@ function equip(key) {
   new ResizeObserver(() => mark(key)).observe(key);
   key.addEventListener("click", (event) => {
     if (closest(event.target, ".more") || (isLocked(key) && !closest(event.target, "button")))
-      open(key, event.detail === 0);
+      load().then(({ open }) => open(key, event.detail === 0), noop);
   });
 }
 
 for (const key of document.querySelectorAll('.key, [data-kind="step"], [data-kind="switch"]')) equip(key);
 
-sheet.addEventListener("beforetoggle", ({ newState }) => newState === "closed" && release());
-find(sheet, ".close").addEventListener("click", close);
-addEventListener("resize", place);
-
 const control = document.querySelector("#control");
 control?.querySelector("div")?.addEventListener("click", () => {
-  release();
-  shown = control;
-  const texts = [...control.querySelectorAll("p")].map((text) => text.textContent).filter(Boolean);
-  show(control.getAttribute("aria-label") ?? "", texts, null);
-  sheet.showPopover();
-  place();
+  load().then(({ openControl }) => openControl(control), noop);
 });

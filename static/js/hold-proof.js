@@ -1,6 +1,6 @@
 // The confirmation of the next hold by a person, where the hold needs one. The hold is the touch after it.
-import { needsPerson } from "./asking.js";
 import { enteredValues } from "./entries.js";
+import { needsPerson } from "./show.js";
 
 export class HoldProof {
   #root;

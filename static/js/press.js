@@ -1,6 +1,6 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
 import { enteredValues, forgetRobotValue } from "./entries.js";
-import { closest, find, hooksOf, isEquipped, showReceipt } from "./show.js";
+import { closest, find, hooksOf, isEquipped, needsPerson, showReceipt } from "./show.js";
 import { feelTouches, StopKeys } from "./stop-keys.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
@@ -29,6 +29,10 @@ export function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
+// Whether there is a question before its presses. Its script comes at the first touch.
+/** @param {HTMLElement} root */
+const asks = (root) => root.querySelector("dialog.ask") !== null || needsPerson(root);
+
 export class Presser {
   /** @type {import("./press-socket.js").PressSocket | null} */
   #socket = null;
@@ -42,8 +46,6 @@ export class Presser {
   /** @type {HTMLButtonElement | null} */
   #downButton = null; // the enabled button under the pointer when it went down
   #downValue = ""; // of that button then: the goal that it cancels, or the value that it sends
-  /** @type {typeof import("./ask.js").confirm} */
-  #confirm = () => {}; // of ask.js, which is loaded with the page: nothing is pressed before that
   /** @type {string | null} */
   #seen = null;
   #id = newId(); // of the next press
@@ -55,8 +57,6 @@ export class Presser {
   constructor(widgets, source) {
     this.#widgets = widgets;
     this.#source = source;
-    if (document.querySelector("dialog.ask"))
-      source.load(import("./ask.js"), ({ confirm }) => (this.#confirm = confirm));
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     feelTouches();
     // A key that is held down is one press.
@@ -81,6 +81,8 @@ export class Presser {
     this.#downValue = this.#downButton?.value ?? "";
     this.#seen = this.#source.seen; // the view at this moment
     this.#open();
+    const root = this.#buttons.get(this.#downButton);
+    if (root && asks(root)) import("./ask.js").catch(() => {}); // the click asks
   }
 
   /** @param {MouseEvent} event */
@@ -120,11 +122,14 @@ export class Presser {
     if (isCancel) click.press = byPointer ? this.#downValue : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
     Object.assign(inputs, hooksOf(root).values?.(button, byPointer ? this.#downValue : button.value));
-    const asks = root.querySelector("dialog.ask") || pageGuard.page.confirms.includes(root.dataset.widget ?? "");
     /** @param {Event} yes @param {object} [proof] */
     const answered = (yes, proof) => this.#press(root, button, inputs, { ...this.#moment(yes), ...proof });
-    if (isCancel || !asks) this.#press(root, button, inputs, click);
-    else this.#confirm(root, answered, button, inputs);
+    if (isCancel || !asks(root)) this.#press(root, button, inputs, click);
+    else
+      import("./ask.js").then(
+        ({ confirm }) => confirm(root, answered, button, inputs),
+        (error) => showReceipt(this.#widgets.values(), root, this.#unsent(error)),
+      );
   }
 
   // The view at an event, and the event's time by the server's clock.

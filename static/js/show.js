@@ -22,6 +22,10 @@ export function isEquipped({ dataset: { kind = "" } }) {
   return registered.has(kind) || !pageGuard.page.kinds.includes(kind);
 }
 
+// Whether a person confirms its presses with a PIN.
+/** @param {HTMLElement} root */
+export const needsPerson = (root) => pageGuard.page.confirms.includes(root.dataset.widget ?? "");
+
 // An element that the markup must have.
 /** @template {string} S @param {ParentNode} root @param {S} selector @returns {PageElement<S>} */
 export function find(root, selector) {

@@ -425,7 +425,7 @@ def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) ->
 
 @pytest.mark.parametrize(
     ("panel", "widget", "most_files", "most_bytes"),
-    [(REFERENCE, "operation", 17, 44_500), (SHIPPED, "stop", 30, 65_000)],
+    [(REFERENCE, "operation", 17, 44_500), (SHIPPED, "stop", 27, 61_000)],
     ids=["reference", "shipped"],
 )
 def test_the_first_page_is_small_and_asks_no_other_host(

@@ -321,6 +321,38 @@ def test_the_second_tap_of_an_answer_presses_nothing_below(
     expect(dialog).to_be_visible()  # a later tap is a press
 
 
+def test_a_question_comes_late_and_says_so_where_it_can_not_come(opens: Opens, page: Page) -> None:
+    """Its script is loaded at the first touch: a press before that waits for it, and is not lost."""
+    mine = opens(page, True)
+    held: list[Route] = []
+    lost: list[Route] = []
+    page.route("**/ask.js", lambda route: held.append(route))
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    start(page, 3).click()
+    page.wait_for_timeout(300)
+    assert held
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    for route in held:
+        route.continue_()
+    page.unroute("**/ask.js")
+    dialog = page.get_by_role("dialog")
+    expect(dialog.locator(".yes")).to_be_enabled()
+    dialog.locator(".yes").click()
+    until(lambda: pressed(mine) == 1, "it is pressed")
+
+    def lose(route: Route) -> None:
+        lost.append(route)
+        route.abort()
+
+    page.route("**/ask.js", lose)
+    page.reload()
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    start(page, 3).click()
+    expect(page.locator("#receipt-go3")).to_contain_text("Not sent")
+    assert lost
+    assert pressed(mine) == 1
+
+
 def test_an_answer_that_opens_under_a_resting_finger_is_not_given(opens: Opens, page: Page) -> None:
     mine = opens(page, True)
     expect(page.locator("html[data-floor]")).to_be_attached()

@@ -52,7 +52,8 @@ def asked(button: Locator) -> Locator:
     dialog = button.page.get_by_role("dialog")
 
     def asks() -> bool:
-        button.click()
+        if not dialog.is_visible():
+            button.click()
         return dialog.is_visible()
 
     until(asks, "it asks", every_s=0.2)
