@@ -252,6 +252,7 @@ SHOWS_AT: Final[Mapping[str, str]] = {
     'action = "Switch on the fan"': 'alarms = ["oven"]',
     'group = "Oven"': 'group = ["Oven"]',
     'dialect = "rmw_zenoh"': "domain = 7",
+    "overview = true": 'total = "All robots"',
     'ack_command = "tell"': 'ack_input = "note"',
     'role = "reset"': 'colour = "blue"',
     'durability = "volatile"': 'qos = { durability = "volatile" }',

@@ -78,7 +78,9 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
                 key = next(step for step in reversed(path) if isinstance(step, str))
                 header = ".".join(step for step in path if isinstance(step, str))
                 message = describe_error(detail, key, header)
-                if detail["type"] == "model_type" and not isinstance(detail["input"], Mapping):
+                if path == ("alarms",) and isinstance(detail["input"], list):
+                    message = "is the table [alarms] of what all alarms share: one alarm is [[alarm]]"
+                elif detail["type"] == "model_type" and not isinstance(detail["input"], Mapping):
                     message += _its_keys(path, _resolve_location(detail["loc"])[0], header)
                 faults.append(Fault(place_of(path), message))
     of_keys, follow = key_faults(keys)

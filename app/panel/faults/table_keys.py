@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from app.errors import Fault
 from app.interfaces.validation import format_value
+from app.panel.faults.other_keys import ANSWERED, other_key
 from app.panel.faults.places import place_of
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
@@ -79,6 +80,7 @@ def key_faults(tables: Mapping[Path, TableKeys]) -> tuple[list[Fault], Consequen
     faults: list[Fault] = []
     follow: Consequences = []
     for table in tables.values():
+        faults += _other_keys(table)
         faults += _misplaced_keys(table, tables)
         faults += _misspelt_keys(table, follow)
     for table in tables.values():
@@ -86,6 +88,18 @@ def key_faults(tables: Mapping[Path, TableKeys]) -> tuple[list[Fault], Consequen
             _wrong_kind(table, follow) or _missing_header(table, follow) or _remaining_faults(table)
         )
     return faults, follow
+
+
+def _other_keys(table: TableKeys) -> Iterator[Fault]:
+    """Faults of keys that have another name here."""
+    header = next((step for step in reversed(table.path) if isinstance(step, str)), "")
+    hints = {key: other_key(header, key) for key in table.unknown}
+    if not all(hints.values()) or _missing_header(table, []):
+        return
+    answered = ANSWERED.get(header, ()) if hints else ()
+    table.missing[:] = [name for name in table.missing if name not in answered]
+    table.unknown.clear()
+    yield from (table.fault(key, f"unknown key; {hint}") for key, hint in hints.items())
 
 
 def _misplaced_keys(table: TableKeys, tables: Mapping[Path, TableKeys]) -> Iterator[Fault]:

@@ -10,9 +10,10 @@ from app.interfaces.validation import list_names as list_names
 from app.panel.values import number_text
 
 NAME_SIMILARITY: Final = 0.7
+NO_ID: Final = 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most'
 # The rule of a text, by its key.
 PATTERNS: Final[Mapping[str, str]] = {
-    "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
+    **dict.fromkeys(("id", "robot", "needs", "groups", "interlock"), NO_ID),
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
     "constants": 'is not how names of constants start: it must be like STATUS_, or "" for all',
     "parameter": "is not the name of a parameter: it has no spaces",
@@ -36,7 +37,18 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",
     "alarm": "tables: write [[alarm]]",
+    "font": "tables: write [[font]]",
+    "source": "tables: write [[source]]",
+    "condition": "tables: write [[condition]]",
+    "recipe": "tables: write [[recipe]]",
+    "pen": "tables: write [[page.widget.pen]]",
+    "detail": "tables: write [[state.detail]]",
     "inhibits": 'ids of controls: write ["start"]',
+}
+# What the numbers of a key mean.
+NUMBERS_OF: Final[Mapping[str, str]] = {
+    "priority": "a number: 1 high, 2 medium, 3 low, 4 diagnostic",
+    "critical_priority": "a number: 1 high, 2 medium, 3 low, 4 diagnostic",
 }
 # The limits of a number, by pydantic's names.
 LIMITS: Final[Mapping[str, str]] = {
@@ -76,6 +88,8 @@ def describe_error(error: Mapping[str, Any], key: str, header: str = "") -> str:
     for name, words in LIMITS.items():
         if name in about:
             return f"must be {words.format(number_text(float(about[name])))}, not {value}"
+    if key in NUMBERS_OF and kind.startswith("int"):
+        return f"must be {NUMBERS_OF[key]}, not {value}"
     return f"{_must_be(kind)}, not {value}"
 
 
