@@ -5,13 +5,17 @@ one slice.
 """
 
 import asyncio
+import logging
 import math
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Final, TypeVar
 
+from app.errors import DecodeError
 from app.interfaces import FieldReader, Fields, Walk
+
+log = logging.getLogger("kiosk")
 
 FIRST_SHARE_S: Final = 0.01  # of a turn in which messages arrive, for all of them
 LATER_SHARE_S: Final = 0.003  # of each later turn
@@ -45,10 +49,17 @@ class Slices:
         return None if self._now() >= until else self.read_until(walk, until)
 
     def read_until(self, walk: Walk[Result], until: float) -> Result | None:
-        """The same until a time (monotonic seconds)."""
-        while (result := walk.advance()) is None:
-            if self._now() >= until:
-                return None
+        """The same until a time (monotonic seconds). What else a decoder throws is logged, and is a
+        DecodeError too."""
+        try:
+            while (result := walk.advance()) is None:
+                if self._now() >= until:
+                    return None
+        except DecodeError:
+            raise
+        except Exception as error:  # else who waits for this message would wait for ever
+            log.exception("a message can't be decoded")
+            raise DecodeError(f"its decoder failed: {error}") from error
         return result
 
     def schedule(self, go_on: Resume) -> None:

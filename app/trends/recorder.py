@@ -6,6 +6,7 @@ publishes delays no press and no hold by more than a slice.
 """
 
 import asyncio
+import logging
 import math
 import time
 from itertools import islice
@@ -20,6 +21,8 @@ from app.robot.history import FieldHistory
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 from app.robot.state import RobotState
+
+log = logging.getLogger("kiosk.trends")
 
 DECODE_AFTER_S: Final = 0.2
 MAX_PENDING: Final = 4_000  # samples that are not decoded yet
@@ -120,6 +123,10 @@ class TrendRecorder:
         try:
             values = self._readers[pending.key].read(pending.data, pending.wall)
         except DecodeError:  # the topic's state counts and logs it
+            self._interrupt(pending.key)
+            return
+        except Exception:  # the next sample has another try
+            log.exception("a sample of %s is missing in the trends", pending.key)
             self._interrupt(pending.key)
             return
         at = self._robot.history.time(pending.at)

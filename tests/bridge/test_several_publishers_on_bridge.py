@@ -87,7 +87,11 @@ def test_joints_of_two_nodes_do_not_disturb_each_other(
     with live_server(own_bridge, tmp_path, PANEL) as kiosk:
         until(lambda: kiosk.widget("go")["enabled"], "the lift's position is received")
         until(lambda: "—" not in kiosk.widget("arm")["joint_values"], "both parts are received")
-        until(lambda: [value for value in past(kiosk) if value is not None], "the trend has begun")
+        try:
+            until(lambda: [value for value in past(kiosk) if value is not None], "the trend has begun")
+        except AssertionError as error:
+            shown = kiosk.widget("arm")["joint_values"], kiosk.snapshot()["widgets"]["past"]
+            raise AssertionError(f"{error}: {shown}, {kiosk.process.text}") from error
         assert looks(kiosk) == {(True, ("+0.2", "+0.2"))}
         shown = past(kiosk)  # with gaps only where it begins, and where a node stood still
         assert shown.count(None) < len(shown) / 4

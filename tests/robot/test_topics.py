@@ -358,3 +358,13 @@ def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> N
         assert len(INTERFACES.decode(event, data).changed_parameters) == 1990
         ratios.append((time.thread_time() - middle) / (middle - begin))
     assert min(ratios) < LONGEST_TURN_S / ADDITIONS_S
+
+
+def test_a_decoder_that_fails_is_a_message_that_can_not_be_read(caplog: pytest.LogCaptureFixture) -> None:
+    class Broken:
+        def advance(self) -> None:
+            raise KeyError("broken")
+
+    with pytest.raises(DecodeError, match="decoder failed: 'broken'"):
+        Slices(Clock()).read_until(Broken(), NOW + 1)
+    assert "a message can't be decoded" in caplog.text

@@ -4,6 +4,7 @@ import asyncio
 import math
 import time
 from collections.abc import Coroutine
+from types import SimpleNamespace
 from typing import Any, Final
 
 import pytest
@@ -171,3 +172,28 @@ def test_two_trends_share_the_history_of_a_field_for_the_longer_time() -> None:
         assert cell.field().keep_s == 7 * 86_400
 
     run(work())
+
+
+def test_a_decoder_that_fails_once_loses_one_sample_and_ends_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recorded = Recorded(panel_of(TREND))
+    reader = recorded.recorder._readers[recorded.robot.key("/speed")]
+    read, failures = reader.read, [KeyError("broken")]
+
+    def fails_once(data: bytes, wall: float) -> Any:
+        if failures:
+            raise failures.pop()
+        return read(data, wall)
+
+    monkeypatch.setattr(recorded.recorder, "_readers", {"speed": SimpleNamespace(read=fails_once)})
+
+    async def work() -> None:
+        recorded.says(1.0)
+        await recorded.decoded()
+        await asyncio.sleep(0.05)
+        recorded.says(2.0)
+        await recorded.decoded()
+
+    run(work())
+    assert recorded.values() == [(2.0, True)]
