@@ -86,12 +86,9 @@ def test_joints_of_two_nodes_do_not_disturb_each_other(
         node.every("/joint_states", joint(name, 0.25), 0.05)
     with live_server(own_bridge, tmp_path, PANEL) as kiosk:
         until(lambda: kiosk.widget("go")["enabled"], "the lift's position is received")
-        until(lambda: "—" not in kiosk.widget("arm")["joint_values"], "both parts are received")
-        try:
-            until(lambda: [value for value in past(kiosk) if value is not None], "the trend has begun")
-        except AssertionError as error:
-            shown = kiosk.widget("arm")["joint_values"], kiosk.snapshot()["widgets"]["past"]
-            raise AssertionError(f"{error}: {shown}, {kiosk.process.text}") from error
+        both = ["normal", "normal"]
+        until(lambda: kiosk.widget("arm")["joint_levels"] == both, "both parts are received")
+        until(lambda: [value for value in past(kiosk) if value is not None], "the trend has begun")
         assert looks(kiosk) == {(True, ("+0.2", "+0.2"))}
         shown = past(kiosk)  # with gaps only where it begins, and where a node stood still
         assert shown.count(None) < len(shown) / 4
@@ -102,6 +99,8 @@ def test_joints_of_two_nodes_do_not_disturb_each_other(
         )
         arm = kiosk.widget("arm")
         assert (arm["state"], arm["joint_levels"]) == ("live", ["missing", "normal"])
+    # Else the bridge may not find the second node: `deploy/fastdds.xml`.
+    assert "invalid type object" not in own_bridge.process.text
 
 
 PERMIT: Final = """

@@ -360,7 +360,9 @@ def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> N
     assert min(ratios) < LONGEST_TURN_S / ADDITIONS_S
 
 
-def test_a_decoder_that_fails_is_a_message_that_can_not_be_read(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_decoder_that_fails_is_a_message_that_can_not_be_read(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     class Broken:
         def advance(self) -> None:
             raise KeyError("broken")

@@ -246,6 +246,7 @@ class RosNode(Commanded):
                 "ROS_DOMAIN_ID": str(domain),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                 "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+                "FASTDDS_DEFAULT_PROFILES_FILE": str(ROOT / "deploy/fastdds.xml"),
                 "RCUTILS_LOGGING_USE_STDOUT": "0",
                 "ROS_LOG_DIR": tempfile.gettempdir(),
             },
