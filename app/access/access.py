@@ -213,7 +213,9 @@ class Access:
 
     def sign_in_external(self, client: Client, user: ExternalUser) -> Session:
         """Signs in a user whom the plant's provider has checked."""
-        return self._begin(client, "oidc", user.name, user.role, user.groups)
+        session = self._begin(client, "oidc", user.name, user.role, user.groups)
+        session.id_token = user.id_token
+        return session
 
     def _begin(self, client: Client, way: Way | Literal["oidc"], *about: Any) -> Session:
         if before := self.sessions.end_client(client.id):

@@ -16,7 +16,7 @@ from app.access.sessions import Session
 from app.access.users import rights_of
 from app.i18n import say
 from app.permission.clients import anonymous
-from app.permission.confirmations import BY_PROGRAM, SIGN_IN, ConfirmedBy
+from app.permission.confirmations import BY_PROGRAM, SIGN_IN, WITHOUT_PIN, ConfirmedBy
 from app.permission.principal import Principal
 from app.permission.role_locks import hardest, role_lock, role_name, unmet
 
@@ -62,6 +62,8 @@ class Confirmer:
         if refusal := _refusal(who, session, question, attempt):
             return refusal, ""
         if question.confirmation == "pin":
+            if session is not None and session.role:
+                return Checked(None, say(WITHOUT_PIN), WITHOUT_PIN), ""
             attempt = replace(attempt, name=who.user)
         checked = await self._access.check(who.client, attempt, "confirm", question.widget)
         if checked.user is None or session is None:

@@ -11,7 +11,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final, TypeVar
 
@@ -38,7 +38,7 @@ AGAIN_S: Final = 2
 REASONS: Final = frozenset(
     {
         "oidc_away", "oidc_refused", "oidc_invalid", "oidc_no_role", "oidc_late", "oidc_secret",
-        "oidc_not_installed",
+        "oidc_not_installed", "oidc_weak",
     }
 )  # fmt: skip
 Result = TypeVar("Result")
@@ -51,6 +51,7 @@ class ExternalUser:
     name: str
     role: str
     groups: frozenset[str]
+    id_token: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +119,18 @@ class OidcSignIns:
 
     async def user_of(self, begun: Begun, code: str) -> ExternalUser:
         """The user whom a code stands for; OidcError if they may not sign in here."""
-        claims = await self._run(
-            partial(self.provider.claims, code, begun.redirect_uri, begun.nonce, begun.verifier)
+        token = await self._run(
+            partial(self.provider.id_token, code, begun.redirect_uri, begun.nonce, begun.verifier)
         )
-        return external_user(self.rules, self._groups, claims)
+        return replace(external_user(self.rules, self._groups, token.claims), id_token=token.token)
+
+    async def end_url(self, id_token: str, back: str) -> str:
+        """Where a browser signs out at the provider too, and comes back to `back`; "" if it can't now:
+        the panel's own session ends all the same."""
+        try:
+            return await self._run(partial(self.provider.end_session_url, id_token, back))
+        except (OidcError, TooMany):
+            return ""
 
     def reason(self, code: str) -> TextLike:
         """Why a sign-in failed, by the code of the sentence; "" for another one."""

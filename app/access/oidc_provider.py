@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping
 from http.client import HTTPException
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any, Final, NamedTuple
 from urllib.error import HTTPError
 from urllib.parse import quote, urlencode
 from urllib.request import HTTPRedirectHandler, Request, build_opener
@@ -43,6 +43,13 @@ class OidcError(KioskError):
         super().__init__(text)
         self.why = why
         self.reason = text
+
+
+class IdToken(NamedTuple):
+    """An ID token, and its checked claims."""
+
+    token: str
+    claims: Mapping[str, Any]
 
 
 class _NoRedirect(HTTPRedirectHandler):
@@ -81,6 +88,11 @@ class OidcProvider:
         is signed in there: the one before may have left the panel."""
         parameters = _authlib("oauth2.rfc6749.parameters")
         challenge = _authlib("oauth2.rfc7636").create_s256_code_challenge(verifier)
+        rules, further = self.rules, {}
+        if rules.acr_values:
+            further["acr_values"] = " ".join(rules.acr_values)
+        if rules.max_age_s is not None:
+            further["max_age"] = str(rules.max_age_s)
         url: str = parameters.prepare_grant_uri(
             self._endpoint("authorization_endpoint"),
             self.rules.client_id,
@@ -92,11 +104,25 @@ class OidcProvider:
             code_challenge=challenge,
             code_challenge_method="S256",
             prompt="login",
+            **further,
         )
         return url
 
-    def claims(self, code: str, redirect_uri: str, nonce: str, verifier: str) -> Mapping[str, Any]:
-        """The checked claims of the ID token that a code stands for; OidcError for one that is not
+    def end_session_url(self, id_token: str, back: str) -> str:
+        """Where the browser goes to sign out there too; "" if the provider has no such address. It
+        comes back to `back`."""
+        if "end_session_endpoint" not in self._metadata():
+            return ""
+        query = {
+            "id_token_hint": id_token,
+            "post_logout_redirect_uri": back,
+            "client_id": self.rules.client_id,
+        }
+        address = self._endpoint("end_session_endpoint")
+        return f"{address}{'&' if '?' in address else '?'}{urlencode(query)}"
+
+    def id_token(self, code: str, redirect_uri: str, nonce: str, verifier: str) -> IdToken:
+        """The ID token that a code stands for, with its checked claims; OidcError for one that is not
         valid."""
         form = {
             "grant_type": "authorization_code",
@@ -116,7 +142,7 @@ class OidcProvider:
         token = answer.get("id_token")
         if not isinstance(token, str):
             raise self._invalid("it has no ID token")
-        return self._checked(token, nonce)
+        return IdToken(token, self._checked(token, nonce))
 
     def _checked(self, token: str, nonce: str) -> Mapping[str, Any]:
         jose, jwt = importlib.import_module("joserfc.errors"), importlib.import_module("joserfc.jwt")
@@ -137,8 +163,22 @@ class OidcProvider:
         audience = claims["aud"] if isinstance(claims["aud"], list) else [claims["aud"]]
         if len(audience) > 1 and claims.get("azp") != rules.client_id:
             raise self._invalid("it is for several clients, and not named for this one")
+        self._check_way(claims)
         checked: Mapping[str, Any] = dict(claims)
         return checked
+
+    def _check_way(self, claims: Mapping[str, Any]) -> None:
+        """OidcError for a sign-in in another way than the panel asks for, or that was too long ago."""
+        rules, at = self.rules, claims.get("auth_time")
+        why = ""
+        if rules.acr_values and claims.get("acr") not in rules.acr_values:
+            why = f"its acr is {claims.get('acr')!r}"
+        if rules.max_age_s is not None:
+            since = at if isinstance(at, int | float) and not isinstance(at, bool) else float("-inf")
+            if self._wall() - since > rules.max_age_s + LEEWAY_S:
+                why = f"its auth_time is {at!r}"
+        if why:
+            raise OidcError(say("oidc_weak", name=rules.name), why)
 
     def _decoded(self, jwt: Any, token: str) -> Any:
         """The token, its signature checked by the provider's keys. A key that is not known is fetched,

@@ -18,7 +18,8 @@ MOST: Final = 500
 class Session:
     """`client` is the browser that has it. `touched_at` is monotonic seconds; `holds`
     are the holds under way, during which it does not become idle. `role` and `groups` are those of a
-    user whom the plant's provider knows, "" for a user of the users' file."""
+    user whom the plant's provider knows, "" for a user of the users' file; `id_token` is what ends the
+    session there."""
 
     user: str
     client: Client
@@ -27,6 +28,7 @@ class Session:
     holds: int = 0
     role: str = ""
     groups: frozenset[str] = frozenset()
+    id_token: str = field(default="", repr=False)
 
 
 class Sessions:

@@ -11,6 +11,7 @@ Group = Annotated[str, Field(min_length=1, max_length=200)]
 Groups = Annotated[tuple[Group, ...], Field(strict=False, max_length=50)]
 Claim = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.:/-]{1,100}$")]
 Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
+AcrValue = Annotated[str, Field(pattern=r"^[!-~]{1,200}$")]
 LOOPBACK: Final = ("localhost", "127.0.0.1", "::1")
 
 
@@ -44,6 +45,8 @@ class OidcRules(Description):
     secret_file: Annotated[str, AfterValidator(_check_path)] | None = None
     user_claim: Claim = "preferred_username"
     groups_claim: Claim = "groups"
+    acr_values: Annotated[tuple[AcrValue, ...], Field(strict=False, max_length=20)] = ()
+    max_age_s: Annotated[int, Field(gt=0, le=86_400)] | None = None
     viewer: Groups = ()
     operator: Groups = ()
     maintenance: Groups = ()

@@ -15,6 +15,7 @@ WITHOUT_USERS: Final = "confirm_without_users"
 WITHOUT_SECOND: Final = "confirm_without_second"
 SIGN_IN: Final = "confirm_sign_in"
 BY_PROGRAM: Final = "confirm_by_program"
+WITHOUT_PIN: Final = "confirm_without_pin"  # a user of the plant's provider
 BY_ONE: Final[Mapping[Means, str]] = {
     "pin": "confirmed_pin",
     "password": "confirmed_password",
@@ -62,14 +63,18 @@ UNKNOWN_USERS: Final = ConfirmLocks()
 
 
 def confirm_lock(
-    confirmation: str, needs: frozenset[str], users: Sequence[Principal], role: TextLike
+    confirmation: str,
+    needs: frozenset[str],
+    users: Sequence[Principal],
+    role: TextLike,
+    provider: bool = False,
 ) -> Verdict | None:
     """Why a command can't be confirmed by any of the panel's users; None if it can. `role` names what
-    both persons need."""
+    both persons need. With the plant's `provider` the first of two persons may be a user of it."""
     if not users:
         return locked(WITHOUT_USERS)
     able = [user for user in users if all(user.meets(need) for need in needs)]
-    if confirmation == "two_persons" and len(able) < 2:
+    if confirmation == "two_persons" and len(able) < (1 if provider else 2):
         return Verdict(False, WITHOUT_SECOND, say(WITHOUT_SECOND, role=role))
     return None
 

@@ -37,6 +37,7 @@ def release_control(state: AppState, session: Session, reason: EndReason) -> Non
 def renew_confirm_locks(state: AppState) -> None:
     """Presses that nobody, or too few users, can confirm are locked, and unlocked when they can."""
     panel, users = state.fleet.panel, able_users(state.access)
+    provider = state.access.oidc is not None
     confirmed = [
         (command.id, confirmation_of(command), panel.needs.commands[command.id])
         for command in panel.commands
@@ -47,7 +48,7 @@ def renew_confirm_locks(state: AppState) -> None:
     locks: dict[str, Verdict] = {}
     for name, confirmation, needs in confirmed:
         role = role_name(hardest(needs)) if needs else ""
-        if confirmation and (lock := confirm_lock(confirmation, needs, users, role)):
+        if confirmation and (lock := confirm_lock(confirmation, needs, users, role, provider)):
             locks[name] = lock
     if locks == state.fleet.confirm_locks.verdicts:
         return

@@ -44,15 +44,15 @@ def code_of(client: OidcProvider, verifier: str = VERIFIER) -> str:
 
 
 def claims(client: OidcProvider, verifier: str = VERIFIER, nonce: str = NONCE) -> Any:
-    return client.claims(code_of(client), BACK, nonce, verifier)
+    return client.id_token(code_of(client), BACK, nonce, verifier).claims
 
 
 def test_a_code_becomes_checked_claims_once(plant: Provider) -> None:
     client = OidcProvider(rules(plant))
     code = code_of(client)
-    assert client.claims(code, BACK, NONCE, VERIFIER)["preferred_username"] == "sato"
+    assert client.id_token(code, BACK, NONCE, VERIFIER).claims["preferred_username"] == "sato"
     with pytest.raises(OidcError) as refused:
-        client.claims(code, BACK, NONCE, VERIFIER)
+        client.id_token(code, BACK, NONCE, VERIFIER)
     assert refused.value.reason.code == "oidc_refused"
     assert SECRET not in str(plant.forms)
 
@@ -77,6 +77,39 @@ def test_an_id_token_that_is_wrong_is_refused(plant: Provider, wrong: dict[str, 
     with pytest.raises(OidcError) as refused:
         claims(OidcProvider(rules(plant)))
     assert refused.value.reason.code == "oidc_invalid"
+
+
+def test_a_stronger_and_fresh_sign_in_is_asked_for_and_checked(plant: Provider) -> None:
+    client = OidcProvider(rules(plant, acr_values=["two", "three"], max_age_s=60))
+    plant.claims = {"acr": "two", "auth_time": int(time.time())}
+    assert claims(client)["acr"] == "two"
+    assert (plant.asked["acr_values"], plant.asked["max_age"]) == ("two three", "60")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"acr": "one"},
+        {"acr": None},
+        {"acr": ["two"]},
+        {"auth_time": int(time.time()) - 3600},
+        {"auth_time": None},
+        {"auth_time": "now"},
+        {"auth_time": True},
+    ],
+)
+def test_a_weaker_or_old_sign_in_is_refused(plant: Provider, wrong: dict[str, Any]) -> None:
+    client = OidcProvider(rules(plant, acr_values=["two"], max_age_s=60))
+    plant.claims = {"acr": "two", "auth_time": int(time.time())} | wrong
+    with pytest.raises(OidcError) as refused:
+        claims(client)
+    assert refused.value.reason.code in ("oidc_weak", "oidc_invalid")
+
+
+def test_what_is_not_asked_for_is_not_checked(plant: Provider) -> None:
+    plant.claims = {"acr": "0", "auth_time": 1}
+    assert claims(OidcProvider(rules(plant)))["acr"] == "0"
+    assert {"acr_values", "max_age"}.isdisjoint(plant.asked)
 
 
 def test_a_signature_by_another_key_is_refused(plant: Provider) -> None:

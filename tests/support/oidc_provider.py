@@ -21,7 +21,8 @@ SECRET: Final = "canary-client-secret"
 
 class Provider:
     """`claims` go into the next ID tokens in place of the right ones; `status` is that of every answer.
-    `forms` are the requests for tokens."""
+    `forms` are the requests for tokens, `asked` the last request for a sign-in. With `ends_sessions` it
+    has an address for sign-outs."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -31,6 +32,9 @@ class Provider:
         self.status = 200
         self.issuer = url
         self.forms: list[dict[str, str]] = []
+        self.ends_sessions = True
+        self.asked: dict[str, str] = {}
+        self.ended: list[str] = []  # the `sub` of the sessions that were ended
         self._codes: dict[str, dict[str, str]] = {}
 
     def renew_key(self, kid: str) -> None:
@@ -39,6 +43,8 @@ class Provider:
 
     def about(self) -> dict[str, Any]:
         names = {"authorization_endpoint": "auth", "token_endpoint": "token", "jwks_uri": "keys"}
+        if self.ends_sessions:
+            names["end_session_endpoint"] = "end"
         return {"issuer": self.issuer} | {name: f"{self.url}/{path}" for name, path in names.items()}
 
     def keys(self) -> dict[str, Any]:
@@ -49,9 +55,17 @@ class Provider:
         assert asked["response_type"] == "code"
         assert asked["code_challenge_method"] == "S256"
         assert asked["prompt"] == "login"
+        self.asked = asked
         code = secrets.token_urlsafe(16)
         self._codes[code] = asked
         return f"{asked['redirect_uri']}?{urlencode({'code': code, 'state': asked['state']})}"
+
+    def end(self, asked: dict[str, str]) -> str:
+        """Where the browser goes after a sign-out here."""
+        claims = jwt.decode(asked["id_token_hint"], self.key, ["RS256"]).claims
+        assert claims["aud"] == asked["client_id"] == CLIENT
+        self.ended.append(claims["sub"])
+        return asked["post_logout_redirect_uri"]
 
     def token(self, form: dict[str, str], authorization: str) -> dict[str, Any] | None:
         """The tokens for a code, once; None for a wrong one."""
@@ -83,9 +97,10 @@ def provider(host: str = "127.0.0.1") -> Iterator[Provider]:
         def do_GET(self) -> None:
             parts = urlsplit(self.path)
             asked = {name: values[0] for name, values in parse_qs(parts.query).items()}
-            if parts.path == "/auth":
+            if parts.path in ("/auth", "/end"):
+                leads = mine.authorized(asked) if parts.path == "/auth" else mine.end(asked)
                 self.send_response(303)
-                self.send_header("location", mine.authorized(asked))
+                self.send_header("location", leads)
                 self.end_headers()
             else:
                 self._answer(mine.keys() if parts.path == "/keys" else mine.about())

@@ -1,5 +1,6 @@
 """Sign-in by a provider over HTTP: the way there and back, who may, and what another site can't do."""
 
+import html
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -28,6 +29,22 @@ engineer = ["staff"]
 [[page]]
 id = "a"
 title = "A"
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Bool"
+message = {{ data = true }}
+confirm_press = "pin"
+[[page.widget]]
+id = "bypass"
+kind = "publish"
+label = "Bypass"
+topic = "/bypass"
+type = "std_msgs/msg/Bool"
+message = {{ data = true }}
+confirm_press = "two_persons"
 """
 
 
@@ -84,6 +101,42 @@ def test_a_user_of_the_plant_signs_in_and_out(
     assert (rows[-1]["who"], rows[-1]["outcome"]) == ("oidc:sato", "accepted")
     assert browser.delete("/session").status_code == 204
     assert browser.get("/session").json()["user"] == ""
+
+
+def test_a_sign_out_ends_the_session_at_the_provider_too(
+    browsers: Browsers, kiosk: Server, plant: Provider
+) -> None:
+    browser = browsers.opened(kiosk.url)
+    came_back(browser, gone_to_provider(browser))
+    plant.ended.clear()
+    answer = browser.post("/session/end")
+    assert answer.status_code == 200
+    assert browser.get("/session").json()["user"] == ""
+    address = html.unescape(answer.text.partition('content="0;url=')[2].partition('"')[0])
+    assert address.startswith(f"{plant.url}/end?")
+    leads = httpx.get(address, trust_env=False).headers["location"]
+    assert (leads, plant.ended) == (f"{kiosk.url}/signin", ["1"])
+    local = browsers.signed_in(kiosk.url, "M. Sato", pin="2580")
+    assert local.post("/session/end").headers["location"] == "/signin"
+
+
+def test_a_user_of_the_provider_has_no_pin_and_is_shown_what_to_do(
+    browsers: Browsers, kiosk: Server
+) -> None:
+    browser = browsers.opened(kiosk.url)
+    came_back(browser, gone_to_provider(browser))
+    sheet = browser.get("/widgets/start/confirm", headers=PAGE).text
+    assert "Sign in as a user of this panel" in sheet
+    assert 'name="_pin"' not in sheet
+    answer = browser.post("/widgets/start/confirm", json={"pin": "2580"})
+    assert (answer.status_code, answer.json()["code"]) == (403, "confirm_without_pin")
+    second = {"user": "M. Sato", "pin": "2580"}
+    answer = browser.post("/widgets/bypass/confirm", json=second)
+    assert answer.status_code == 200, answer.text
+    body = {"inputs": {}, "confirmation": answer.json()["confirmation"]}
+    receipt = browser.post("/widgets/bypass", json=body).json()
+    assert "oidc:sato" in receipt["reason"]
+    assert "M. Sato" in receipt["reason"]
 
 
 def test_a_code_works_once_and_in_its_own_browser_only(browsers: Browsers, kiosk: Server) -> None:

@@ -9,7 +9,7 @@ from app.panel.widgets.confirmed import Confirmed, confirmation_of
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.recipe_load import RecipeLoad
-from app.permission.confirmations import SIGN_IN
+from app.permission.confirmations import SIGN_IN, WITHOUT_PIN
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
@@ -88,7 +88,7 @@ def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str
         title=title,
         question=subject.ask,
         consequence=subject.consequence,
-        lock="" if who.user and not who.program else say(SIGN_IN),
+        lock=_lock(state, two, who),
         people=names if two else [],
         typed=two and not here,
         by_pin="pin" in ways,
@@ -99,6 +99,13 @@ def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str
         typed_digits=len(state.access.typed_digits(who.client.id, digits_key(subject.id))),
         words_of={name: say(f"signin_{name}") for name in WORDS} | {"second": say("confirm_second")},
     )
+
+
+def _lock(state: AppState, two: bool, who: Principal) -> TextLike:
+    """Why nobody can confirm it at this browser."""
+    if not who.user or who.program:
+        return say(SIGN_IN)
+    return "" if two or state.access.book.user(who.user) else say(WITHOUT_PIN)
 
 
 def digits_key(subject: str) -> str:

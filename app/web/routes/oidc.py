@@ -10,28 +10,22 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
-from markupsafe import Markup
 
 from app.access.oidc import LIFE_S, OidcSignIns
 from app.access.oidc_provider import OidcError
 from app.access.secrets_hash import same_text
 from app.errors import NotFound
-from app.i18n import render, say
+from app.i18n import say
 from app.web.app_state import AppState, CurrentState, site_of
 from app.web.client_cookie import OTHER_SITES, caller, set_session_cookie
-from app.web.language import language_of
 from app.web.openapi_parts import PAGE, errors
+from app.web.page_on import page_on
 
 router = APIRouter()
 
 COOKIE: Final = "panel_oidc"
 BACK: Final = "/session/oidc/back"
 Text = Annotated[str, Query(max_length=4000)]
-PAGE_ON: Final = Markup(
-    '<!doctype html><html lang="{language}"><head><meta charset="utf-8"><title>{text}</title>'
-    '<meta http-equiv="refresh" content="0;url={url}"></head>'
-    '<body><p><a href="{url}">{text}</a></p></body></html>'
-)
 
 
 @router.get(
@@ -85,9 +79,7 @@ async def back(
         session_id = state.access.sign_in_external(begun.client, user).id
     except OidcError as refused:
         url = _sign_in_page(state, refused)
-    language = language_of(request)
-    html = PAGE_ON.format(language=language, url=url, text=render(say("oidc_go_on"), language))
-    answer = HTMLResponse(html, headers={"cache-control": "no-store"})
+    answer = page_on(request, url)
     if session_id:
         set_session_cookie(answer, request, session_id)
     return _with_cookie(answer, request, "")

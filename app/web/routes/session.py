@@ -10,10 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.access.access import Attempt, Checked
 from app.access.secrets_hash import LONGEST, WAYS
+from app.access.sessions import Session
 from app.access.users import LONGEST_NAME
 from app.errors import InputError
 from app.i18n import render, say
-from app.permission.confirmations import BY_PROGRAM
+from app.permission.confirmations import BY_PROGRAM, WITHOUT_PIN
 from app.permission.confirmations import SIGN_IN as SIGN_IN_FIRST
 from app.permission.role_locks import ROLE_LOCK
 from app.roles import ROLES
@@ -25,7 +26,8 @@ from app.web.client_cookie import (
     set_session_cookie,
 )
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, Described, described_body, errors
+from app.web.openapi_parts import FORM, JSON, PAGE, Described, described_body, errors
+from app.web.page_on import page_on
 from app.web.request_body import act_body_of, as_model
 
 router = APIRouter()
@@ -33,7 +35,10 @@ router = APIRouter()
 FIELDS_MOST: Final = 8
 # Of a confirmation: what is no wrong secret.
 NOT_ASKED: Final = frozenset(
-    {SIGN_IN_FIRST, BY_PROGRAM, ROLE_LOCK, "confirm_same_person", "confirm_second_role"}
+    {
+        *(SIGN_IN_FIRST, BY_PROGRAM, WITHOUT_PIN, ROLE_LOCK),
+        *("confirm_same_person", "confirm_second_role"),
+    }
 )
 Secret = Annotated[str, Field(max_length=LONGEST)]
 
@@ -160,11 +165,18 @@ async def sign_out(request: Request, state: CurrentState) -> Response:
     status_code=303,
     response_class=RedirectResponse,
     summary="Sign out, by a form",
-    responses=errors(403),
+    responses=errors(403) | {200: {"description": "leads to the plant's provider", "content": PAGE}},
 )
 async def sign_out_by_form(request: Request, state: CurrentState) -> Response:
-    _end(request, state)
-    return set_session_cookie(RedirectResponse(f"{state.root}/signin", 303), request, "")
+    """A user whom the plant's provider knows signs out there too: by a page that leads to it, since
+    the answer to a form must not redirect to another site."""
+    session, page = _end(request, state), f"{state.root}/signin"
+    answer: Response = RedirectResponse(page, 303)
+    if session is not None and session.id_token and state.access.oidc is not None:
+        back = f"{request.url.scheme}://{request.url.netloc}{page}"
+        if url := await state.access.oidc.end_url(session.id_token, back):
+            answer = page_on(request, url)
+    return set_session_cookie(answer, request, "")
 
 
 @router.post(
@@ -195,11 +207,13 @@ def attempt_of(body: SignIn) -> Attempt:
     return Attempt(body.user, way, getattr(body, way))
 
 
-def _end(request: Request, state: AppState) -> None:
+def _end(request: Request, state: AppState) -> Session | None:
+    """Signs out who is signed in at the browser; returns the session."""
     who = caller(request)
     session = state.access.sessions.get(who.session, who.client(state).id)
     if session is not None:
         state.access.sign_out(session)
+    return session
 
 
 def _about(state: AppState, who: Caller) -> JSONResponse:
