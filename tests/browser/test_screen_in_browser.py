@@ -205,6 +205,17 @@ def test_without_scripts_all_groups_are_there(cell: Server, without_scripts: Pag
         expect(without_scripts.locator(".group-tab:visible")).to_have_count(0)
 
 
+@pytest.mark.parametrize(
+    "path", ["alarms", "alarms/history", "alarms/report", "log", "diagnostics", "users"]
+)
+def test_a_phone_shows_the_pages_that_have_no_widgets(cell: Server, page: Page, path: str) -> None:
+    sized(page, 390, 844).goto(f"{cell.url}/{path}")
+    page.evaluate(DRAWN)
+    assert page.locator("main .group").locator("visible=true").count() > 0
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    assert page.locator("main").inner_text().strip()
+
+
 def test_a_phone_only_shows(cell: Server, page: Page) -> None:
     sized(page, 390, 844).goto(f"{cell.url}/pages/cell")
     pressed = page.locator("form.page").locator("button, input").locator("visible=true")
