@@ -12,6 +12,8 @@ from typing import Any, Final, Protocol
 from app.commands.acts import Act, ActRequest, Applied, Finish, server_and_control_permit
 from app.errors import InputError
 from app.i18n import Text, TextLike, joined, number, say
+from app.permission.confirmations import ConfirmLocks, unconfirmed
+from app.permission.verdict import Verdict
 from app.recipes.book import Author, Change, ImportChange, RecipeBook
 from app.recipes.csv_text import read_rows
 from app.recipes.field_text import differences_text
@@ -39,6 +41,23 @@ class RecipeChange(Applied):
     set: TextLike = ""
     name: TextLike = ""
     changes: TextLike = ""
+
+
+def lock_of_recipe(
+    books: RecipeBooks, confirm_locks: ConfirmLocks, request: ActRequest
+) -> Verdict | None:
+    """Why an act is refused because no person has confirmed it, or none can; None if it is not."""
+    book = books.book(request.object.partition("/")[0])
+    confirmation = book.load.set.confirm_edit if book else None
+    if book is None or confirmation is None:
+        return None
+    lock = confirm_locks.lock_of(edit_key(book.load.id))
+    return lock or unconfirmed(confirmation, request.who, request.confirmed)
+
+
+def edit_key(set_id: str) -> str:
+    """Under which `ConfirmLocks` has the changes of a set of recipes."""
+    return f"recipe {set_id}"
 
 
 Plan = Callable[[RecipeBook, Author, str, Mapping[str, Any]], Change | Text]

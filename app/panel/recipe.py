@@ -52,6 +52,7 @@ class RecipeSet(Description):
     ]
     interlocks: Interlocks = Field(default=(), alias="interlock")
     confirm_press: ConfirmPress = False
+    confirm_edit: Literal["pin", "two_persons"] | None = None
     topic: TopicName | None = None
     service: TopicName | None = None
     node: NodeName | None = None

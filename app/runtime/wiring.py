@@ -14,7 +14,7 @@ from app.commands.alarm_acts import ALARM_ACTS, lock_of_alarm, needs_of_alarm
 from app.commands.control_acts import CONTROL_ACTS, log_hand_over
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS, Doctor, NoDoctor
 from app.commands.press_guard import PressGuard
-from app.commands.recipe_acts import RECIPE_ACTS
+from app.commands.recipe_acts import RECIPE_ACTS, lock_of_recipe
 from app.commands.shift_acts import SHIFT_ACTS
 from app.dialect.type_hashes import distribution_hashes
 from app.interfaces import load_interfaces
@@ -163,7 +163,13 @@ def wire_session(
             partial(needs_of_alarm, alarms.engine),
             partial(lock_of_alarm, alarms.engine, server.confirm_locks),
         ),
-        recipe_acts=ActRunner("recipe", RECIPE_ACTS, recipes, act_context),
+        recipe_acts=ActRunner(
+            "recipe",
+            RECIPE_ACTS,
+            recipes,
+            act_context,
+            further_lock=partial(lock_of_recipe, recipes, server.confirm_locks),
+        ),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
         shift_acts=ActRunner("alarm", SHIFT_ACTS, None, act_context),
         press_guard=press_guard,

@@ -30,6 +30,7 @@ from app.web.routes import (
     parameters,
     press_socket,
     presses,
+    recipe_confirm,
     recipes,
     recordings,
     session,
@@ -56,6 +57,7 @@ ROBOT_ROUTES: Final = (
     log_lines,
     lock_help,
     trends,
+    recipe_confirm,
     recipes,
 )
 ALARM_ROUTES: Final = (alarms, alarm_confirm, alarm_history, alarm_report)

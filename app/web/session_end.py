@@ -7,12 +7,13 @@ from app.access.access import EndReason
 from app.access.confirmer import able_users
 from app.access.sessions import Session
 from app.commands.alarm_acts import confirm_key
+from app.commands.recipe_acts import edit_key
 from app.panel.widgets.confirmed import confirmation_of
 from app.permission.confirmations import confirm_lock
 from app.permission.principal import Principal
 from app.permission.role_locks import hardest, role_name
 from app.permission.verdict import Verdict
-from app.roles import OPERATOR
+from app.roles import MAINTENANCE, OPERATOR
 from app.web.app_state import AppState
 
 log = logging.getLogger("kiosk.access")
@@ -45,6 +46,8 @@ def renew_confirm_locks(state: AppState) -> None:
     for alarm in panel.alarms:
         needs = frozenset({alarm.needs or OPERATOR, OPERATOR})
         confirmed.append((confirm_key(alarm.id), alarm.confirm_act or "", needs))
+    for table in panel.recipes:
+        confirmed.append((edit_key(table.id), table.confirm_edit or "", frozenset({MAINTENANCE})))
     locks: dict[str, Verdict] = {}
     for name, confirmation, needs in confirmed:
         role = role_name(hardest(needs)) if needs else ""
@@ -62,8 +65,10 @@ def renew_confirm_locks(state: AppState) -> None:
 
 def _described(name: str) -> str:
     """What is locked, by its name in `ConfirmLocks`."""
-    alarm = name.removeprefix(confirm_key(""))
-    return f'widget "{name}"' if alarm == name else f'alarm "{alarm}"'
+    for kind, prefix in (("alarm", confirm_key("")), ("changes of recipes", edit_key(""))):
+        if name.startswith(prefix):
+            return f'{kind} "{name.removeprefix(prefix)}"'
+    return f'widget "{name}"'
 
 
 def follow_users(state: AppState) -> None:

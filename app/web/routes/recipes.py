@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Annotated, Any, Final
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
@@ -16,10 +16,8 @@ from app.commands.act_receipt import ActReceipt
 from app.commands.acts import ActRequest
 from app.commands.press import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
-from app.commands.recipe_acts import RECIPE_ACTS
 from app.errors import InputError, NotFound
 from app.i18n import Text, TextLike, localized, say
-from app.panel.base import ID
 from app.recipes.book import RecipeBook
 from app.recipes.csv_text import csv_text
 from app.recipes.recipe import clean_name
@@ -32,16 +30,16 @@ from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fiel
 from app.web.rendering.recipe_ask import recipe_ask
 from app.web.rendering.recipes_page import Mode, entries_of, recipes_context, word
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.routes.confirm_forms import entered_fields
 from app.web.routes.press_forms import is_second_tap
 from app.web.routes.presses import STATUS
+from app.web.routes.recipe_confirm import ActName, Edit, SetId, confirmed_edit
 
 router = APIRouter()
 
 TOO_OFTEN: Final = say("control_too_often")
 TOO_SOON: Final = say("press_too_soon")
 CSV: Final = "text/csv"
-SetId = Annotated[str, Path(pattern=ID, description="the id of a [[recipe]]")]
-ActName = Annotated[str, Path(json_schema_extra={"enum": list(RECIPE_ACTS)})]
 RecipeId = Annotated[str, Field(max_length=64)]
 # Fields of a form that are not the value of an input: "-" stands before them, as before no input.
 OWN_FIELDS: Final = ("id", "recipe", "version", "to", "name", "csv")
@@ -183,13 +181,21 @@ async def act(
     book, kind, content = _book(state, set), kind_of(request), await body_of(request)
     session = _session_of(state, session, set)
     form = form_of(content) if kind == FORM else None
+    entered = entered_fields(form) if form is not None else {}
     body = (
         _form_body(book, act, form, language_of(request)) if form is not None else _body(kind, content)
     )
     who, token = principal_with_new_token(request, state)
     act_id = f"{body.id}.{act}.{body.recipe}"[:400] if body.id else secrets.token_hex(8)
     at = body.at.timestamp() if body.at else None
+    confirmed, asking = None, None
+    if form is not None:
+        edit = Edit(book, act, body.recipe, body.inputs, form, entered)
+        confirmed, asking = await confirmed_edit(request, state, session, edit)
+    if asking is not None:
+        return asking
     asked = ActRequest(act, who, f"{set}/{body.recipe}", body.inputs, at, form is None)
+    asked = asked._replace(confirmed=confirmed)
     runner = session.recipe_acts
     refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
