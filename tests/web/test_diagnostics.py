@@ -235,6 +235,7 @@ def test_check_is_an_act_whose_findings_are_shown(cell: Server) -> None:
     assert {"demo_mode", "server_running"} <= {finding["code"] for finding in doctor["findings"]}
     assert not doctor["running"]
     assert "simulated robot" in page(cell)
+    assert f"Findings: {len(doctor['findings'])}" in page(cell)
     again = cell.http.post("/diagnostics/check", json={"id": "check-0001"})
     assert again.json()["id"] == "check-0001"
     assert not diagnostics(cell)["doctor"]["running"]
