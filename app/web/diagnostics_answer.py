@@ -6,6 +6,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.commands.press import PRESS_ID
 from app.runtime.doctor_process import FoundFault
+from app.web.act_answer import ActAnswer
 
 View = Literal["topics", "servers", "graph", "nodes", "links"]
 Form = Literal["text", "hex"]
@@ -241,15 +242,8 @@ class LookAnswer(BaseModel):
     messages: list[LookedMessageAnswer]
 
 
-class DiagnosticReceipt(BaseModel):
+class DiagnosticReceipt(ActAnswer):
     """The receipt of an act: `reason` is "" where it was done, `code` is its stable name. `recording`
     is the address of the recording that was shared, "" of other acts."""
 
-    id: str
-    act: str
-    outcome: str
-    code: str
-    reason: str
-    at: AwareDatetime
-    done: bool
     recording: str

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.alarms.report import read_report
@@ -18,13 +18,11 @@ from app.commands.act_receipt import ActReceipt
 from app.commands.acts import ActRequest
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.shift_acts import LONGEST_MESSAGE, SHIFT_ACTION
-from app.i18n import localized
+from app.web.act_answer import ActAnswer, act_answer
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import principal_with_new_token, set_client_cookie
 from app.web.framed_page import FramedPage, framed_page
-from app.web.language import language_of
 from app.web.openapi_parts import described_body, errors, fields, refusals
 from app.web.rendering.alarm_report_page import COUNTED, ReportParts, now, report_context
 from app.web.rendering.alarm_report_query import ReportQuery
@@ -32,7 +30,6 @@ from app.web.rendering.alarms_page import word
 from app.web.rendering.log_words import word as log_word
 from app.web.request_body import act_body_of, as_model
 from app.web.routes.alarm_history import read_figures_of
-from app.web.routes.presses import STATUS
 
 router = APIRouter()
 
@@ -50,16 +47,8 @@ class MessageBody(BaseModel):
     at: AwareDatetime | None = None
 
 
-class MessageReceipt(BaseModel):
+class MessageReceipt(ActAnswer):
     """The receipt: `reason` is "" where it was done, `code` is its stable name."""
-
-    id: str
-    act: str
-    outcome: str
-    code: str
-    reason: str
-    at: AwareDatetime
-    done: bool
 
 
 @router.get(
@@ -129,9 +118,7 @@ def _answer(request: Request, state: AppState, receipt: ActReceipt, is_form: boo
         shown = receipt.code if receipt.cause == "limit" else receipt.id
         query = f"?act={quote(shown, safe='')}" if receipt.reason else ""
         return RedirectResponse(f"{state.root}/alarms/report{query}", status_code=303)
-    content = localized({**receipt.as_json(), "done": receipt.done}, language_of(request))
-    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+    return act_answer(request, receipt)
 
 
 async def _messages(state: AppState, before: Shift, shift: Shift) -> list[Row]:

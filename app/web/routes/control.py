@@ -4,26 +4,23 @@ import secrets
 from typing import Annotated, Final, TypeVar
 
 from fastapi import APIRouter, Path, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
+from fastapi.responses import RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.commands.act_receipt import ActReceipt
 from app.commands.acts import ActRequest
 from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
 from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
-from app.i18n import localized
 from app.panel.base import ID
 from app.permission.control_authority_view import for_role, role
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
+from app.web.act_answer import ActAnswer, act_answer
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import principal_of, principal_with_new_token, set_client_cookie
-from app.web.language import language_of
 from app.web.openapi_parts import FORM, JSON, described_body, errors, fields, refusals
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.presses import STATUS
 
 router = APIRouter()
 
@@ -56,17 +53,10 @@ class KeepAlive(BaseModel):
 Fields = TypeVar("Fields", bound=BaseModel)
 
 
-class ControlAnswer(BaseModel):
+class ControlAnswer(ActAnswer):
     """The receipt of an act: `reason` is "" where it was done, `code` is its stable name; `browser` is
     the id of the client, `control` who has control now."""
 
-    id: str
-    act: str
-    outcome: str
-    code: str
-    reason: str
-    at: AwareDatetime
-    done: bool
     browser: str
     control: dict[str, bool | str]
 
@@ -134,15 +124,8 @@ def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Re
 
 def _json(request: Request, session: RobotSession, who: Principal, receipt: ActReceipt) -> Response:
     control = session.control.view()
-    content = {
-        **receipt.as_json(),
-        "done": receipt.done,
-        "browser": who.client.id,
-        "control": for_role(control, role(control, who, session.control.rules)),
-    }
-    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    content = localized(content, language_of(request))
-    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+    shown = for_role(control, role(control, who, session.control.rules))
+    return act_answer(request, receipt, browser=who.client.id, control=shown)
 
 
 def _required(session: RobotSession) -> None:

@@ -16,7 +16,6 @@ from app.commands.acts import ActRequest
 from app.commands.control_acts import TOO_OFTEN
 from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import KioskError, NotFound
 from app.i18n import TextLike, localized, say
 from app.interfaces.names import Qos
@@ -27,6 +26,7 @@ from app.runtime.robot_session import RobotSession
 from app.survey.forwarding import topic_forwarding
 from app.survey.model import SurveyedTopic
 from app.view.diagnostic_graph import robots_in
+from app.web.act_answer import act_answer
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import (
     client_of,
@@ -49,7 +49,6 @@ from app.web.rendering.diagnostics_json import diagnostics_json, look_json, mqtt
 from app.web.rendering.diagnostics_page import diagnostics_context, versions
 from app.web.rendering.diagnostics_texts import TEXTS, word
 from app.web.request_body import act_body_of, as_model
-from app.web.routes.presses import STATUS
 from app.web.shared_recordings import SharedLinks, links_of
 
 if TYPE_CHECKING:
@@ -261,10 +260,7 @@ async def _share(
 
 
 def _receipt(request: Request, receipt: ActReceipt, address: str) -> Response:
-    about = {"done": receipt.done, "recording": address}
-    content = localized({**receipt.as_json(), **about}, language_of(request))
-    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+    return act_answer(request, receipt, recording=address)
 
 
 def _back(state: AppState, form: Mapping[str, str], receipt: ActReceipt) -> Response:
