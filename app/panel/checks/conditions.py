@@ -80,6 +80,8 @@ def _sentence_faults(place: str, condition: Condition) -> Iterator[Fault]:
     for text in texts:
         if re.search("[{}]", text.replace(VALUE, "", 1)):
             message = f'"{text}" may have {VALUE} once and no other braces, like "Air is at {VALUE}."'
+            if "{value:" in text:
+                message += '; its format is a key of the condition, such as format = ".1f"'
             yield Fault(f"{place}.locked", message)
             return
 
