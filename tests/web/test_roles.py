@@ -157,7 +157,7 @@ def test_a_lock_says_in_each_language_what_to_do(browsers: dict[str, httpx.Clien
         .json()["reason"]
         for language in ("en", "de", "ja")
     ]
-    said = ("Sign in as tooling.", "Als tooling anmelden.", "サインイン (tooling)")
+    said = ("Sign in as tooling.", "Als tooling anmelden.", "サインイン: tooling。")
     assert [reason.endswith(sentence) for reason, sentence in zip(reasons, said, strict=True)] == [
         True
     ] * 3, reasons
