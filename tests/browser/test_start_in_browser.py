@@ -44,7 +44,8 @@ FAULTS: Final[dict[str, dict[str, Any] | None]] = {
     "an error": {"content_type": "text/javascript", "body": 'throw new Error("at import");'},
     "nothing": None,
 }
-# The script of each part, with a page of the shipped panel that loads it.
+# The script of each part, with a page of the shipped panel that loads it. Those of questions and of
+# sheets come later.
 SCRIPTS: Final = {
     "main": "operation",
     "source": "operation",
@@ -55,7 +56,6 @@ SCRIPTS: Final = {
     "entries": "operation",
     "full-text": "operation",
     "tabs": "cell",
-    "ask": "cell",
     "holding": "cell",
     "inputs": "recipe",
     "number-text": "recipe",
