@@ -6,7 +6,7 @@
 
 import sys
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 from app.audit.copied import Comparison, read_copy
 from app.audit.signed_part import Signed
 from app.audit.verify import verify
+from app.cli.data_folder import add_data_folder, data_folder
 from app.cli.parser import Parser
 from app.errors import KioskError, LogError
-from app.settings import Settings
 
 if TYPE_CHECKING:
     from app.audit.shown_panel import Run
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 
 def _verify(options: Namespace) -> int:
-    folder = options.data or _usual_folder()
+    folder = data_folder(options)
     comparison = Comparison(read_copy(options.against)) if options.against else None
     against = comparison.fault if comparison else None
     verification = verify(folder, options.head, options.key or _own_key(folder), against)
@@ -80,7 +80,7 @@ def _proof(signed: Signed, is_pinned: bool) -> Iterator[str]:
 def _key(options: Namespace) -> int:
     from app.audit.log_key import load_key
 
-    folder = options.data or _usual_folder()
+    folder = data_folder(options)
     key = load_key(folder)
     if key is None:
         print(f"there is no key in {folder}: the server makes it at its first start", file=sys.stderr)
@@ -102,7 +102,7 @@ def _panel(options: Namespace) -> int:
     """Prints the panel file that was shown at a time, or writes it and all of its files."""
     from app.audit.shown_panel import read_panel, runs, shown_at
 
-    folder = options.data or _usual_folder()
+    folder = data_folder(options)
     starts = runs(folder)
     now = time.time_ns() // 1_000_000
     try:
@@ -148,22 +148,12 @@ def _time(text: str) -> int:
         raise ArgumentTypeError(f'"{text}" is not a time, like 2027-01-20T10:00') from None
 
 
-def _usual_folder() -> Path:
-    """That of a server that was started with these settings."""
-    settings = Settings.from_environment()
-    if settings.data is not None:  # a panel file with a fault does not matter then
-        return settings.data
-    from app.panel import load_panel  # takes half of the command's time, and is seldom needed
-
-    return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
-
-
 def make_parser(prog: str) -> Parser:
     parser = Parser(prog=prog, description="The operator's log.")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     check = commands.add_parser("verify", help="check that no entry was changed")
     check.set_defaults(run=_verify)
-    _add_data(check)
+    add_data_folder(check)
     check.add_argument(
         "--head",
         default="",
@@ -186,10 +176,10 @@ def make_parser(prog: str) -> Parser:
     )
     key = commands.add_parser("key", help="print the public key that signs the log")
     key.set_defaults(run=_key)
-    _add_data(key)
+    add_data_folder(key)
     panel = commands.add_parser("panel", help="print the panel file that was shown at a time")
     panel.set_defaults(run=_panel)
-    _add_data(panel)
+    add_data_folder(panel)
     panel.add_argument(
         "--at",
         type=_time,
@@ -203,9 +193,3 @@ def make_parser(prog: str) -> Parser:
         help="write the panel file and all files that it used into this folder",
     )
     return parser
-
-
-def _add_data(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
-    )

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 from app.access.access_log import last_uses
@@ -38,12 +37,10 @@ from app.access.secrets_hash import (
 )
 from app.access.users import UserBook, UsersError, check_group, check_name
 from app.access.users_file import UsersFile
-from app.cli.arguments import environment
+from app.cli.data_folder import add_data_folder, data_folder
 from app.cli.parser import Parser
 from app.errors import KioskError
-from app.panel import load_panel
 from app.roles import ROLES
-from app.settings import Settings
 
 PROG: Final = "python -m app.cli users"
 
@@ -51,7 +48,7 @@ PROG: Final = "python -m app.cli users"
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     options = make_parser(prog).parse_args(arguments)
     try:
-        file = UsersFile(_folder(options))
+        file = UsersFile(data_folder(options))
     except (KioskError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
@@ -64,14 +61,6 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(f"{file.path}: {error.strerror or error}", file=sys.stderr)
         return 2
     return status
-
-
-def _folder(options: Any) -> Path:
-    """The data folder; the panel is read only if it decides which."""
-    settings = Settings.from_environment({**os.environ, **environment(options)})
-    if settings.data is not None:
-        return settings.data
-    return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
 
 
 def _change(options: Any, file: UsersFile, edit: Callable[[UserBook], UserBook], detail: str) -> None:
@@ -210,8 +199,7 @@ def make_parser(prog: str) -> Parser:
         command: Parser = commands.add_parser(act, help=about)
         if name:
             command.add_argument("name", metavar=name, help="as it is shown, and typed at a sign-in")
-        command.add_argument("--data", metavar="FOLDER", help="the data folder (KIOSK_DATA)")
-        command.add_argument("--panel", metavar="PANEL", help="the panel whose data folder it is")
+        add_data_folder(command)
         command.set_defaults(run=run, act=act)
         return command
 

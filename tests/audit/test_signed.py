@@ -21,6 +21,7 @@ from app.audit.store import COLUMNS, INSERT, Store
 from app.audit.verify import verify
 from app.cli.log import main
 from app.errors import LogError
+from app.settings import APP
 
 FROM = Origin(address="10.0.0.7", browser="b1", who="Kim")
 
@@ -225,3 +226,18 @@ def test_signatures_are_read_with_every_step_or_by_their_name(data: Path) -> Non
     assert "signed" not in kinds()
     assert "signed" in kinds(every=True)
     assert kinds(outcome="signed") == {"signed"}
+
+
+def test_the_log_of_a_panel_is_found_by_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A live panel has another data folder than the demo, which is the default."""
+    monkeypatch.delenv("KIOSK_DATA", raising=False)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    panel = tmp_path / "cell1.toml"
+    panel.write_text('title = "Cell"\nmode = "live"\n[[page]]\nid = "one"\ntitle = "One"\n')
+    (tmp_path / APP).mkdir()
+    key = load_or_make_key(tmp_path / APP).public
+    assert main(["key", "--panel", str(panel)]) == 0
+    assert capsys.readouterr().out == f"{key}\n"
+    assert main(["key"]) == 1  # that of the demo, which never ran
