@@ -114,7 +114,7 @@ def test_pages_presses_events_holds_and_pictures_work_below_a_path(
     page.mouse.move(*middle(jog))
 
     def holds() -> bool:
-        """A machine that stands still for a moment loses the page's stream: then it is pressed again."""
+        """A page on a machine that stands still loses its stream: then it is pressed again."""
         page.mouse.up()
         expect(press_button(page, "jog")).to_be_enabled()
         page.mouse.down()
