@@ -16,6 +16,7 @@ from app.access.oidc import ExternalUser, OidcSignIns
 from app.access.secret_checker import SecretChecker
 from app.access.secrets_hash import Cost, Way, cost_of_machine, memory_of_machine
 from app.access.sessions import Session, Sessions
+from app.access.typed_digits import TypedDigits
 from app.access.users import Edit, User, UserBook, rights_of
 from app.access.users_file import Loaded, Stamp, UsersFile
 from app.i18n import TextLike, say
@@ -30,10 +31,6 @@ log = logging.getLogger("kiosk.access")
 
 TOKEN_QUOTA: Final = Quota(100, 50)
 WATCHED_EVERY_S: Final = 0.5
-DIGITS: Final = frozenset("0123456789")
-MOST_DIGITS: Final = 12
-TYPED_KEPT_S: Final = 60.0
-TYPED_KEPT: Final = 100  # browsers
 EndReason = Literal["sign_out", "hand_over", "idle", "changed"]
 
 
@@ -81,7 +78,7 @@ class Access:
         self._reader = ThreadPoolExecutor(1, "users")
         self._stamp: Stamp | None = None
         self._monotonic = monotonic
-        self._typed: dict[str, tuple[str, str, float]] = {}
+        self.typed_digits = TypedDigits(monotonic)
         self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
@@ -261,26 +258,6 @@ class Access:
         for listener in self._listeners:
             listener(session, reason)
         self._changed()
-
-    def typed_digits(self, client: str, user: str) -> str:
-        """The digits that a browser without scripts has typed for this user."""
-        name, digits, at = self._typed.get(client, ("", "", 0.0))
-        return digits if name == user and self._monotonic() - at < TYPED_KEPT_S else ""
-
-    def type_digit(self, client: str, user: str, digit: str) -> None:
-        """A digit, "delete" or "clear" of a browser without scripts."""
-        digits = self.typed_digits(client, user)
-        self._typed.pop(client, None)
-        if digit == "delete":
-            digits = digits[:-1]
-        elif digit in DIGITS:
-            digits = (digits + digit)[:MOST_DIGITS]
-        else:
-            digits = ""
-        if client and digits:
-            self._typed[client] = (user, digits, self._monotonic())
-        while len(self._typed) > TYPED_KEPT:
-            self._typed.pop(next(iter(self._typed)))
 
     async def watch(self) -> None:
         """Reads changes of the users' file and signs out idle users, until it is cancelled."""

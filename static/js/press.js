@@ -29,9 +29,8 @@ export function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// Whether there is a question before its presses. Its script comes at the first touch.
-/** @param {HTMLElement} root */
-const asks = (root) => root.querySelector("dialog.ask") !== null || needsPerson(root);
+/** @param {HTMLElement | undefined} root whether there is a question before its presses: its script comes at a touch */
+const asks = (root) => root !== undefined && (root.querySelector("dialog.ask") !== null || needsPerson(root));
 
 export class Presser {
   /** @type {import("./press-socket.js").PressSocket | null} */
@@ -81,8 +80,7 @@ export class Presser {
     this.#downValue = this.#downButton?.value ?? "";
     this.#seen = this.#source.seen; // the view at this moment
     this.#open();
-    const root = this.#buttons.get(this.#downButton);
-    if (root && asks(root)) import("./ask.js").catch(() => {}); // the click asks
+    if (asks(this.#buttons.get(this.#downButton))) import("./ask.js").catch(() => {}); // the click asks
   }
 
   /** @param {MouseEvent} event */

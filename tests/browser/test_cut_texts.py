@@ -121,8 +121,8 @@ def test_the_lock_of_a_role_is_whole_on_every_button(tmp_path: Path, page: Page,
                         tabs.nth(number).click()
                         page.evaluate(DRAWN)
                     # On a busy machine a page may have lost its server for a moment.
-                    found = page.evaluate(CUT_REASONS)
-                    shown = [why for why in found if all(part in why[1] for part in parts)]
+                    reasons = page.evaluate(CUT_REASONS)
+                    shown = [why for why in reasons if all(part in why[1] for part in parts)]
                     seen += len(shown)
                     cut += [
                         f"{path} {width}x{height} {w}: {text}" for w, text, is_cut in shown if is_cut

@@ -357,7 +357,8 @@ def test_panel_shows_the_recorded_values(tmp_path: Path, servers: Callable[[Serv
         kiosk = servers(Server(ROOT, KIOSK_MODE="live", **environment))
         until(lambda: kiosk.widget("last_heard")["text"] == "first", "it shows the first")
         until(lambda: kiosk.widget("last_heard")["text"] == "second", "it shows the second")
-        assert kiosk.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
+        banner = "SIMULATED ROBOT"
+        until(lambda: kiosk.snapshot()["notice"]["banner"] == banner, "the banner says so")
     finally:
         assert simulator.end() == 0, simulator.text
 

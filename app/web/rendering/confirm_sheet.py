@@ -96,7 +96,7 @@ def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str
         by_badge="badge" in ways,
         yes=subject.yes,
         chosen=chosen,
-        typed_digits=len(state.access.typed_digits(who.client.id, digits_key(subject.id))),
+        typed_digits=len(state.access.typed_digits.read(who.client.id, digits_key(subject.id))),
         words_of={name: say(f"signin_{name}") for name in WORDS} | {"second": say("confirm_second")},
     )
 

@@ -73,8 +73,8 @@ async def confirm_page(
     state: CurrentState,
     query: Annotated[ConfirmQuery, Query()],
 ) -> Response:
-    found = state.fleet.alarms.engine.alarms.get(alarm)
-    subject = _subject(found, act) if found else None
+    standing = state.fleet.alarms.engine.alarms.get(alarm)
+    subject = _subject(standing, act) if standing else None
     if subject is None:
         raise NotFound(f'there is no act "{act:.40}" on an alarm "{alarm:.64}" that a person confirms')
     who = caller(request).principal(state)
@@ -111,7 +111,7 @@ async def confirmed_act(
     typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
     if entered["_digit"] != "enter" or (too_soon and not typed):
         if entered["_digit"] != "enter":
-            state.access.type_digit(who.client.id, digits, entered["_digit"])
+            state.access.typed_digits.press(who.client.id, digits, entered["_digit"])
         return None, _asking(state, alarm_id, act, content, entered["_user"])
     form = ConfirmForm(who, content, client.session)
     by, checked = await checked_entry(state, subject, act, form, entered)

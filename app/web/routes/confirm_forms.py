@@ -63,7 +63,7 @@ async def confirmed_by_form(
     subject = press_subject(state, session, form.widget, value)
     failed: TextLike = ""
     if entered["_digit"] not in ("", "enter"):
-        state.access.type_digit(who.client.id, digits_key(subject.id), entered["_digit"])
+        state.access.typed_digits.press(who.client.id, digits_key(subject.id), entered["_digit"])
     elif entered["_digit"] == "enter" and not too_soon:
         inputs = inputs_of(form.widget, dict(form.fields))
         confirmed, checked = await checked_entry(state, subject, inputs, form, entered)
@@ -81,8 +81,8 @@ async def checked_entry(
 ) -> tuple[ConfirmedBy | None, Checked]:
     """Who confirmed it with what was entered; else why nobody did. `inputs` is their fingerprint."""
     who, digits = form.principal, digits_key(subject.id)
-    entered["_pin"] = entered["_pin"] or state.access.typed_digits(who.client.id, digits)
-    state.access.type_digit(who.client.id, digits, "clear")
+    entered["_pin"] = entered["_pin"] or state.access.typed_digits.read(who.client.id, digits)
+    state.access.typed_digits.press(who.client.id, digits, "clear")
     ways = [way for way in ("_badge", "_password", "_pin") if entered[way]]
     if not ways:
         return None, _missing("confirm_empty")

@@ -75,7 +75,7 @@ async def confirmed_edit(
     too_soon = is_second_tap(edit.form)
     typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
     if digit and digit != "enter":
-        state.access.type_digit(who.client.id, digits_key(subject.id), digit)
+        state.access.typed_digits.press(who.client.id, digits_key(subject.id), digit)
     elif digit and (typed or not too_soon):
         form = ConfirmForm(who, edit.form, client.session)
         by, checked = await checked_entry(state, subject, edit.act, form, entered)

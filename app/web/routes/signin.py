@@ -75,7 +75,7 @@ async def page(
         "can_password": "password" in ways,
         "oidc": oidc,
         "has_badges": any(known.badge for known in book.users),
-        "typed": len(state.access.typed_digits(who.client.id, name)) if name else 0,
+        "typed": len(state.access.typed_digits.read(who.client.id, name)) if name else 0,
         "failed": _said(state, query.refused, name, who.client.address, here),
         "words_of": sign_in_words() | {"secret_of": _title(chosen, by_password)},
     }
@@ -101,12 +101,12 @@ async def pad(request: Request, state: CurrentState, other: bool = False) -> Res
     form = as_model(PadForm, form_of(await body_of(request), 8))
     user, client = form.user, caller(request).client(state)
     if form.digit == "enter":
-        pin = form.pin or state.access.typed_digits(client.id, user)
-        state.access.type_digit(client.id, user, "clear")
+        pin = form.pin or state.access.typed_digits.read(client.id, user)
+        state.access.typed_digits.press(client.id, user, "clear")
         if pin:
             return await signed_in(request, state, Attempt(user, "pin", pin), True, other)
     else:
-        state.access.type_digit(client.id, user, form.digit)
+        state.access.typed_digits.press(client.id, user, form.digit)
     return RedirectResponse(f"{state.root}/signin?{sign_in_query(user, other)}", 303)
 
 
