@@ -73,7 +73,7 @@ def _load(file: TomlFile) -> Panel:
     written = {key: value for key, value in file.tables.items() if key not in NOT_WRITTEN}
     if faults := _source_faults(written, file):
         raise PanelError(str(file.path), _sorted_faults(faults, file))
-    with_sources = _with_sources(written) if NAME in written else None
+    with_sources = _with_sources(written) if _names_source(written) else None
     if with_sources and with_sources.faults:
         raise PanelError(str(file.path), _sorted_faults(with_sources.faults, file))
     tables = with_sources.tables if with_sources else written
@@ -114,8 +114,15 @@ def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
     return [*duplicate_ids(NAME, [source.id for source in sources])]
 
 
+def _names_source(value: Any) -> bool:
+    """Whether a table is a source, or names one."""
+    if isinstance(value, dict):
+        return NAME in value or any(map(_names_source, value.values()))
+    return isinstance(value, list) and any(map(_names_source, value))
+
+
 def _with_sources(tables: dict[str, Any]) -> "Expanded":
-    """Imported only where a panel has sources, for a faster start."""
+    """Imported only where a panel speaks of sources, for a faster start."""
     from app.panel.source_tables import expanded
 
     return expanded(tables)

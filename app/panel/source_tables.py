@@ -38,7 +38,8 @@ class Expanded:
 
 def expanded(tables: dict[str, Any]) -> Expanded:
     """The tables of a panel file, whose sources are good, with the keys of those that they name."""
-    known = {table["id"]: (f"{NAME}[{number}]", table) for number, table in enumerate(tables[NAME])}
+    sources = enumerate(tables.get(NAME, ()))
+    known = {table["id"]: (f"{NAME}[{number}]", table) for number, table in sources}
     made = Expanded({})
     made.tables.update(_Walk(known, made).table(Panel, tables, ""))
     return made
@@ -77,7 +78,8 @@ class _Walk:
     def _with_source(self, table: dict[str, Any], keys: list[str], place: str) -> dict[str, Any]:
         name = table.pop(NAME)
         if not isinstance(name, str) or name not in self._sources:
-            message = f"no source {format_value(name)}; there is {list_names(sorted(self._sources))}"
+            there = f"; there is {list_names(sorted(self._sources))}" if self._sources else ""
+            message = f"no source {format_value(name)}{there or f': write a [[{NAME}]] with this id'}"
             self._made.faults.append(Fault(f"{place}.{NAME}", message))
             return table
         at, source = self._sources[name]

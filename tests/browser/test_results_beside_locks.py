@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support.browser.pages import place, widget
-from tests.support.parts import Server
+from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
 PANEL: Final = """
@@ -103,7 +103,13 @@ def test_a_result_is_readable_beside_the_lock(cell: Server, page: Page, size: tu
     expect(result).to_have_attribute("data-outcome", "succeeded")
     expect(button).to_be_enabled()
     expect(result).to_contain_text(" m")
-    inside, lock, told = key.evaluate(LOCK)  # at once: the next event opens it again
+
+    def places() -> list[list[float]] | None:
+        """In one moment: the next event opens it again."""
+        seen: list[list[float] | None] = key.evaluate(LOCK)
+        return [place for place in seen if place] if all(seen) else None
+
+    inside, lock, told = until(places, "the lock and the result are shown")
     assert lock[1] <= told[0] + 1
     assert told[1] <= inside[1]
 

@@ -32,6 +32,9 @@ PAGE: Final = '[[page]]\nid = "example"\ntitle = "Example"\n'
 INTERLOCKS: Final = {
     "operation": '[[interlock]]\nid = "operation"\ntopic = "/operation_enabled"\n',
 }
+SOURCES: Final = {
+    "air": '[[source]]\nid = "air"\ntopic = "/air"\ntype = "std_msgs/msg/Float64"\nfield = "data"\n',
+}
 START: Final = """[[page.widget]]
 id = "start"
 kind = "publish"
@@ -99,6 +102,9 @@ def completed(example: str) -> str:
     text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))
     if "start" in _inhibited(tables) - widgets:
         text += START
+    sources = set(re.findall(r'^source = "(\w+)"', text, re.MULTILINE))
+    own = {source["id"] for source in tables.get("source", [])}
+    text += "".join(SOURCES[name] for name in sorted(sources - own))
     locks = set(re.findall(r'^interlock = "(\w+)"', text, re.MULTILINE))
     there = {interlock["id"] for interlock in tables.get("interlock", [])}
     return text + "".join(INTERLOCKS[name] for name in sorted(locks - there))

@@ -143,8 +143,9 @@ def test_two_sources_with_one_id_and_one_that_nothing_names(tmp_path: Path) -> N
     assert 'nothing has source = "spare"' in notes
 
 
-def test_without_sources_the_key_is_unknown(tmp_path: Path) -> None:
-    with pytest.raises(PanelError, match="unknown key"):
+def test_without_sources_a_named_one_is_asked_for(tmp_path: Path) -> None:
+    words = r'no source "battery": write a \[\[source\]\] with this id'
+    with pytest.raises(PanelError, match=words):
         loaded(tmp_path, 'title = "Cell"\n' + PAGE)
 
 
