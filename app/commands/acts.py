@@ -42,7 +42,7 @@ class ActRequest(NamedTuple):
     table is about one thing. `values` are further inputs; they are written to the log. `at` is when the
     operator touched the screen (in the server's time), None if unknown. `scripted` is false for a page
     without scripts, which reloads instead of sending keepalives. `secrets` are neither logged nor kept.
-    `confirmed` is who confirmed it with a PIN, None for nobody.
+    `confirmed` is who confirmed it with a PIN, None without it.
     """
 
     act: str

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Final, Literal, NamedTuple
 
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.errors import LinkError
 from app.panel.widgets.parameter import GET
 from app.permission.servers import parameters_offered
@@ -85,9 +85,7 @@ class NodeRoundTrips:
         self._asking = spawn_logged(self._ask(asked), self._log, "measuring a round trip failed")
 
     async def stop(self) -> None:
-        if self._asking is not None:
-            self._asking.cancel()
-            await asyncio.gather(self._asking, return_exceptions=True)
+        await end_tasks((self._asking,))
 
     async def _ask(self, asked: Asked) -> None:
         context = self._context

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from app.audit.press_record import Log
 from app.commands.acts import Finish
-from app.concurrency import spawn_logged
+from app.concurrency import end_tasks, spawn_logged
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.recipe_load import RecipeLoad
@@ -46,6 +46,7 @@ class Recipes:
         self._open: set[asyncio.Task[Text | None]] = set()
         self._watching: asyncio.Task[None] | None = None
         self._stamp: Stamp | None = None
+        self._unread = ""  # why the last look failed: it is logged once, not every second
         self._fault: TextLike = ""  # why changes are not in the operator's log yet
 
     def add_listener(self, changed: Callable[[], None]) -> None:
@@ -73,8 +74,7 @@ class Recipes:
 
     async def stop(self) -> None:
         """Waits for what is being written."""
-        if self._watching is not None:
-            self._watching.cancel()
+        await end_tasks((self._watching,))
         if self._open:
             await asyncio.wait(self._open, timeout=STOPPED_WITHIN_S)
         if self._thread is not None:
@@ -135,9 +135,12 @@ class Recipes:
                 entries = {book.load.id: book.folder.every() for book in books}
                 logged = changes.logged()
                 new = [change for change in changes.read() if change.number > logged]
+                self._unread = ""
                 return _Look(changes.stamp(), entries, new, logged)
         except (RecipeDiskError, OSError) as error:
-            log.error("recipes: %s", error)
+            if f"{error}" != self._unread:
+                log.error("recipes: %s", error)
+            self._unread = f"{error}"
             return None
 
     async def _take(self, look: "_Look", changes: LineChanges, oplog: Log) -> None:

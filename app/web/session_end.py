@@ -36,7 +36,7 @@ def release_control(state: AppState, session: Session, reason: EndReason) -> Non
 
 
 def renew_confirm_locks(state: AppState) -> None:
-    """Presses that nobody, or too few users, can confirm are locked, and unlocked when they can."""
+    """Presses that no user, or too few users, can confirm are locked, and unlocked when they can."""
     panel, users = state.fleet.panel, able_users(state.access)
     provider = state.access.oidc is not None
     confirmed = [

@@ -5,7 +5,6 @@ permits it. Recordings are in memory only and end with the server. Used on the e
 """
 
 import asyncio
-import hashlib
 import secrets
 import time
 from collections import OrderedDict
@@ -48,7 +47,7 @@ class SharedRecordings:
         recording = SharedRecording(
             token=secrets.token_urlsafe(TOKEN_BYTES),
             content=content,
-            etag=f'"{hashlib.sha256(content).hexdigest()[:32]}"',
+            etag=f'"{secrets.token_hex(16)}"',
             robot=robot,
             act_id=act_id,
             at=now,

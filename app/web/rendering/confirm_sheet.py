@@ -38,7 +38,7 @@ class Subject:
 
 
 class ConfirmSheet(TypedDict):
-    """`lock`: why nobody can confirm it at this browser, "" if somebody can. `people` are those who can
+    """`lock`: why it can't be confirmed at this browser, "" if it can. `people` are those who can
     be chosen as the second person; without names (`typed`) they are typed. `by_pin`, `by_password` and
     `by_badge` are what can be entered, `typed_digits` how many digits the server has already."""
 
@@ -102,7 +102,7 @@ def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str
 
 
 def _lock(state: AppState, two: bool, who: Principal) -> TextLike:
-    """Why nobody can confirm it at this browser."""
+    """Why it can't be confirmed at this browser."""
     if not who.user or who.program:
         return say(SIGN_IN)
     return "" if two or state.access.book.user(who.user) else say(WITHOUT_PIN)

@@ -98,7 +98,7 @@ async def confirmed_act(
     request: Request, state: AppState, alarm_id: str, act: str, content: dict[str, str]
 ) -> tuple[ConfirmedBy | None, Response | None]:
     """Who has confirmed the act of a form, whose fields for it are removed; else the redirect to the
-    page that asks. (None, None) for an act that nobody confirms, or that is refused without a PIN."""
+    page that asks. (None, None) for an act that needs none, or that is refused without a PIN."""
     alarm, client = state.fleet.alarms.engine.alarms.get(alarm_id), caller(request)
     subject = _subject(alarm, act) if alarm else None
     who = client.principal(state)
@@ -137,7 +137,7 @@ def _asking(
 
 
 def _subject(alarm: AlarmInstance, act: str) -> Subject | None:
-    """What is confirmed; None for an act on this alarm that nobody confirms."""
+    """What is confirmed; None for an act on this alarm that needs no confirmation."""
     described = alarm.definition.alarm
     if act not in CONFIRMED or described.confirm_act is None:
         return None

@@ -79,7 +79,7 @@ async def confirmed_by_form(
 async def checked_entry(
     state: AppState, subject: Subject, inputs: str, form: ConfirmForm, entered: dict[str, str]
 ) -> tuple[ConfirmedBy | None, Checked]:
-    """Who confirmed it with what was entered; else why nobody did. `inputs` is their fingerprint."""
+    """Who confirmed it with what was entered; else what was wrong. `inputs` is their fingerprint."""
     who, digits = form.principal, digits_key(subject.id)
     entered["_pin"] = entered["_pin"] or state.access.typed_digits.read(who.client.id, digits)
     state.access.typed_digits.press(who.client.id, digits, "clear")

@@ -64,7 +64,7 @@ async def asked_before(
 async def confirmed_edit(
     request: Request, state: AppState, session: RobotSession, edit: Edit
 ) -> tuple[ConfirmedBy | None, Response | None]:
-    """Who has confirmed an act; else the page that asks. (None, None) for one that nobody confirms, or
+    """Who has confirmed an act; else the page that asks. (None, None) for one that needs none, or
     that is refused without a PIN."""
     client, subject = caller(request), _subject(edit)
     who = client.principal(state)
@@ -104,7 +104,7 @@ async def confirmed_edit(
 
 
 def _subject(edit: Edit) -> Subject | None:
-    """What is confirmed; None for a set whose changes nobody confirms."""
+    """What is confirmed; None for a set whose changes need none."""
     load = edit.book.load
     confirmation = load.set.confirm_edit
     if confirmation is None:
