@@ -1,5 +1,7 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000
-# make test  everything, on the real bridge, real ROS 2 nodes and a real browser
+# make test  all that needs no Rust and no ROS, with a real browser: ten minutes on a bare machine
+# make test-robot  on the real bridge, real ROS 2 nodes, brokers, proxies and other browsers
+# make test-long  real time, floods, faults, every screen, packaging: an hour; writes docs/test-report.md
 # make check  types and style
 # make format  writes the style that `make check` checks
 # make docs  the documentation as a site, in build/docs; a dead link is an error
@@ -23,7 +25,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: fonts run test check format dev docs wheel release audit faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
+.PHONY: fonts run test test-robot test-long check format dev docs wheel release audit faults screenshots soak mutants bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run .venv/bin/operator-panel
@@ -36,27 +38,36 @@ WATCHED += $(patsubst %,'--reload-include=*.%',toml json json5 html css js po ms
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 
-# All tests: WORKERS processes in parallel, then the tests of real time alone. ARGS are options of pytest:
-# `ARGS="-k robot" make test` runs these tests in one process, and builds or installs only the real parts
-# (bridge, ROS, browser) that they use. Tests without real parts need no set-up. With ARGS, Debian packages
-# are only named: `make system` installs them.
-WORKERS ?= 7
-# A few tests that failed beside the others run once more alone: a busy machine is told from a fault.
-FAILED := $(CACHE)/failed-tests
+# The tests in three tiers (tests/tiers.py): WORKERS processes in parallel, a file in each.
+# `ARGS="-k robot" make test`, with options of pytest, runs these tests of any tier in one process, and builds or
+# installs only the real parts (bridge, ROS, browser) that they use. With ARGS, Debian packages are only named:
+# `make system` installs them.
+WORKERS ?= 4
+IN_WORKERS = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # Bytecode of the tests is cached, even if PYTHONDONTWRITEBYTECODE is set, and is compiled once before
-# the workers start. Otherwise each worker would spend 4 s on it.
-test: export PYTHONDONTWRITEBYTECODE :=
-test: $(if $(ARGS),.venv/test,test-parts)
+# the workers start. Otherwise each worker would spend 20 s on it.
+test test-robot test-long: export PYTHONDONTWRITEBYTECODE :=
+# Errors are reported by the workers.
+COMPILE_TESTS = .venv/bin/pytest --collect-only -qq > /dev/null || true
 ifdef ARGS
-	@parts=$$(.venv/bin/python -m tests.needs $(ARGS)) && $(MAKE) --no-print-directory .venv/test $$parts
+test: .venv/test
+	@parts=$$(.venv/bin/python -m tests.tiers $(ARGS)) && $(MAKE) --no-print-directory .venv/test $$parts
 	.venv/bin/pytest $(ARGS)
 else
-	.venv/bin/pytest --collect-only -qq > /dev/null || true  # the workers report errors
-	.venv/bin/pytest --write-failed=$(FAILED) --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; \
-	  first=$$?; [ $$first -le 1 ] || exit $$first; \
-	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && \
-	if [ $$first -eq 1 ]; then .venv/bin/pytest --only-failed=$(FAILED) -r A; fi
+# Without the right to install packages, the tests that need no browser run, and the exit status is not 0.
+test: .venv/test
+	@sh tests/system.sh browser || echo "the tests without a browser run now"
+	$(COMPILE_TESTS)
+	.venv/bin/pytest --tier test $(IN_WORKERS)
 endif
+
+test-robot: test-parts
+	$(COMPILE_TESTS)
+	.venv/bin/pytest --tier robot $(IN_WORKERS)
+
+test-long: test-parts
+	$(COMPILE_TESTS)
+	WORKERS=$(WORKERS) .venv/bin/python -m tests.long
 
 PYTHON_FOLDERS := app tests bench deploy docs
 FRONTEND_FOLDERS := static bench docs/examples
@@ -84,12 +95,12 @@ docs: .venv-docs/ready
 
 # FORM=short: the short form, as in `make test`.
 FORM ?= long
-FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
+FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/cell/permission/test_at_random.py tests/records/test_killed.py \
 	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py \
-	tests/runtime/test_nothing_grows.py tests/commands/test_holds.py tests/permission/test_control_authority.py \
-	tests/interfaces/test_fields.py tests/interfaces/test_values.py tests/interfaces/test_cdr_on_ros.py \
-	tests/commands/test_final_check.py tests/robot/test_topics.py tests/panel/test_toml_lines.py \
-	tests/panel/test_mistakes.py tests/web/test_openapi.py tests/kiosk/test_watcher.py
+	tests/cell/session/test_nothing_grows.py tests/cell/commands/test_holds.py tests/cell/permission/test_control_authority.py \
+	tests/ros/messages/test_fields.py tests/ros/messages/test_values.py tests/ros/messages/test_cdr_on_ros.py \
+	tests/cell/commands/test_final_check.py tests/cell/robot/test_topics.py tests/panel/test_toml_lines.py \
+	tests/panel/test_mistakes.py tests/web/test_openapi.py tests/tools/kiosk/test_watcher.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
@@ -112,7 +123,9 @@ wheel: .venv/build .venv/bin/operator-panel
 	.venv/bin/python -m hatchling build --target wheel --directory dist
 
 # `make release TAG=v0.2.0` also checks that the version and the changelog match the tag.
-release: docs .venv-release/ready
+# It needs a green `make test-long` of this commit.
+release: docs .venv-release/ready .venv/test
+	.venv/bin/python -m tests.long --check
 	.venv-release/bin/hadolint deploy/Containerfile
 	.venv-release/bin/python deploy/release.py dist/release $(if $(TAG),--tag $(TAG))
 
@@ -121,9 +134,12 @@ audit: .venv-release/ready
 
 test-parts: system .venv/test .venv-ros/ready bridge
 
-.PHONY: system
+.PHONY: system browser
 system:
 	$(if $(ARGS),INSTALL=no )sh tests/system.sh
+
+browser:
+	$(if $(ARGS),INSTALL=no )sh tests/system.sh browser
 
 bridge: system
 	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge of the tests: once, 5 to 10 minutes"
@@ -181,7 +197,7 @@ $(FRONTEND)/ready: tests/frontend/package.json tests/frontend/package-lock.json
 
 FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
 
-.venv-ros/ready: tests/ros/requirements.lock | system
+.venv-ros/ready: tests/ros_nodes/requirements.lock | system
 	@$(FOR_ROS)
 	@echo "installing ROS 2 for the tests into .venv-ros: once, up to two minutes"
 	@$(PYTHON) -m venv .venv-ros
@@ -195,6 +211,7 @@ bench: .venv/test bridge $(BENCH)/kiosk/ready
 	.venv/bin/python -m build --wheel --no-isolation --outdir $(BENCH)/kiosk/dist >/dev/null
 	$(BENCH)/kiosk/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --force-reinstall $(BENCH)/kiosk/dist/*.whl
 	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--page docs/benchmark.md) $(ARGS)
+	$(if $(QUICK),,.venv/bin/python -m docs._generate)
 
 # This panel, the robot, and the rivals, each in a separate environment. See bench/README.md.
 bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,kiosk/ready robot/ready rosbridge/ready nicegui/ready pages/ready router)
@@ -204,7 +221,7 @@ $(BENCH)/kiosk/ready: deploy/requirements.lock
 	$(@D)/bin/python $(PIP_INSTALL) $<
 	touch $@
 
-$(BENCH)/robot/ready: tests/ros/requirements.lock tests/requirements.lock | system
+$(BENCH)/robot/ready: tests/ros_nodes/requirements.lock tests/requirements.lock | system
 	@$(FOR_ROS)
 	$(PYTHON) -m venv --clear $(@D)
 	$(@D)/bin/python $(PIP_INSTALL) $<
@@ -244,11 +261,11 @@ lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group release -o deploy/release.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --extra replay --extra mqtt --extra oidc --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
-	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros_nodes/requirements.in -o tests/ros_nodes/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/rosbridge_rs/requirements.in -o bench/peers/rosbridge_rs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
 	$(MAKE) --no-print-directory .venv/test
-	.venv/bin/python -m app.interfaces.make_builtin
+	.venv/bin/python -m app.ros.messages.make_builtin
 
 # The panel's fonts from npm's @fontsource packages, and the widths of their letters. The Japanese one keeps only what
 # is needed.

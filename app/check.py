@@ -2,8 +2,8 @@
 
 import sys
 
-from app.cli.check import main
-from app.cli.pipe import until_closed
+from app.tools.cli.check import main
+from app.tools.cli.parser import until_closed
 
 if __name__ == "__main__":
     sys.exit(until_closed(lambda: main(sys.argv[1:])))

@@ -1,7 +1,11 @@
 """The application: `uvicorn app.main:app`. Connects the rooms."""
+# ruff: noqa: E402
+
+import gc
+
+gc.disable()  # until the application is made: collections while it is imported take half a second
 
 import asyncio
-import gc
 import logging
 import secrets
 import sys
@@ -9,48 +13,55 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from typing import Final
 
 from fastapi import Depends, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 from uvicorn import Config as ServerConfig
 
-from app import ros_logging
-from app.access.access import Access
-from app.access.users_file import UsersFile, users_configured
-from app.commands.press_limits import PressLimits
-from app.errors import KioskError, PanelError
+from app.cell.commands.judge import PressLimits
+from app.cell.people.access import Access
+from app.cell.people.users_file import UsersFile, users_configured
+from app.cell.session.assembly import check_zenoh, data_folder, mode_of, open_fleet, open_log
+from app.cell.session.doctor_process import DoctorProcess
 from app.panel import Panel, load_panel
-from app.panel.checks.page_templates import page_parts
+from app.panel.checks.look import page_parts
 from app.panel.rules import EmbedRules
 from app.panel.widgets.kinds import KINDS
-from app.process import listen_sockets
-from app.process.sd_notify import ServiceManager
-from app.process.shutdown import graceful_shutdown
-from app.process.watchdog import Watchdog
-from app.repeated_records import RepeatedRecords
-from app.runtime.assembly import check_zenoh, data_folder, mode_of, open_fleet, open_log
-from app.runtime.doctor_process import DoctorProcess
-from app.settings import Settings, shipped_path
-from app.simulator.in_process import in_process
+from app.system import log as ros_logging
+from app.system.concurrency import keep_running, spawn_logged
+from app.system.errors import KioskError, PanelError
+from app.system.log import RepeatedRecords
+from app.system.process import listen_sockets
+from app.system.process.service import ServiceManager, Watchdog
+from app.system.process.shutdown import graceful_shutdown
+from app.system.settings import Settings, shipped_path
+from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets, require_files
-from app.web.bearer_guard import BearerGuard
-from app.web.connections import Connection
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
-from app.web.proxies import Proxies
-from app.web.rendering.page_templates import PageTemplates
-from app.web.request_body import LONGEST
+from app.web.pages.page_templates import PageTemplates
+from app.web.path_methods import method_guard
+from app.web.requests import LONGEST
 from app.web.root_path import RootPath, root_path_of
 from app.web.route_needs import route_guard
 from app.web.route_tables import add_routes
 from app.web.routes import pages
-from app.web.security import RequestGuard
-from app.web.server_log import count_repeated, limit_server_log
-from app.web.serving import check_port, check_protected, served_certificate, urls
+from app.web.security import BearerGuard, RequestGuard
+from app.web.server import (
+    Connection,
+    Proxies,
+    check_port,
+    check_protected,
+    count_repeated,
+    limit_server_log,
+    served_certificate,
+    urls,
+)
 from app.web.session_end import follow_users
 from app.web.turns import Turns
 
@@ -76,11 +87,24 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         openapi_url=None,  # routes.description has it
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
-        dependencies=[Depends(route_guard)],
+        dependencies=[Depends(method_guard), Depends(route_guard)],
     )
     _add_middleware(app, settings, panel.embed)
-    add_routes(app, settings.dev)
+    add_routes(app)
+    if settings.dev:
+        _add_gallery(app)
     return app
+
+
+def _add_gallery(app: FastAPI) -> None:
+    """The gallery is a part of the checkout only, not of the installed package."""
+    if find_spec("app.tools.gallery") is None:
+        log.info("/gallery is not in the installed package: `make dev` in a checkout has it")
+        return
+    from app.tools.gallery import page as gallery
+
+    app.include_router(gallery.router)
+    app.state.path_methods.add(gallery.router.routes)
 
 
 def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None:
@@ -109,14 +133,16 @@ async def _lifespan(
         ports: set[int] = set()
         watchdog = _watchdog(state)
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
-            works = (
-                watchdog.run(),
+            once = (
                 _log_urls(app.state.server, ports, settings.hosts),
                 pages.compiled(state.templates.environment(panel.language)),
-                count_repeated(repeated),
-                state.access.watch(),
             )
-            tasks = [asyncio.create_task(work) for work in works]
+            tasks = [
+                *(spawn_logged(work, log, "a task of the start failed") for work in once),
+                keep_running(partial(count_repeated, repeated), log, "counting records failed"),
+                keep_running(watchdog.run, log, "the watchdog failed"),
+                keep_running(state.access.watch, log, "watching the users' file failed"),
+            ]
             gc.collect()
             gc.freeze()  # nor of the panel: with 10,000 alarms it would stop it for 70 to 240 ms
             try:
@@ -164,6 +190,8 @@ async def _app_state(
             *own,
             has_alarms=panel.may_raise,
         )
+        for page in panel.pages:
+            assets.sheet([widget.kind for widget in (*page.widgets, *panel.frame.widgets)])
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
@@ -179,6 +207,7 @@ async def _app_state(
             made = PageTemplates(templates, page_parts(panel))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
             await access.reload()
+            fleet.alarms.watch_sign_ins(access)
             try:
                 yield AppState(fleet, assets, made, metrics, oplog, limits, doctor, access)
             finally:
@@ -232,4 +261,5 @@ def _app_or_exit() -> FastAPI:
 
 
 app = _app_or_exit()
+gc.enable()
 gc.freeze()  # a collection of all modules would stop the event loop for 25 to 50 ms

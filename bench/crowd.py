@@ -1,7 +1,7 @@
 """Many bare clients in one process: each keeps a stream open and records the arrival of numbered texts.
 
-Controlled by JSON lines, see `tests/ros/commands.py`. Uses plain sockets, so that hundreds of clients
-take little CPU time from the measured server.
+Controlled by JSON lines, see `tests/ros_nodes/commands.py`. Uses plain sockets, so that hundreds of
+clients take little CPU time from the measured server.
 """
 
 import base64
@@ -15,7 +15,7 @@ import threading
 import time
 from typing import Any, Final
 
-from tests.ros.commands import obey
+from tests.ros_nodes.commands import obey
 
 NUMBER: Final = re.compile(rb"#(\d{9})#")
 WAKE_S: Final = 0.05

@@ -1,8 +1,9 @@
 """The robot of all peers: one process that publishes by Zenoh, like a bridge, by ROS 2, as a node, and
 as a node on rmw_zenoh.
 
-Controlled by JSON lines, see `tests/ros/commands.py`. It runs in its own environment with rclpy and
-eclipse-zenoh. Times are CLOCK_MONOTONIC in nanoseconds, the same clock in all processes of a machine.
+Controlled by JSON lines, see `tests/ros_nodes/commands.py`. It runs in its own environment with rclpy
+and eclipse-zenoh. Times are CLOCK_MONOTONIC in nanoseconds, the same clock in all processes of a
+machine.
 """
 
 import random
@@ -12,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from bench.ways import OverRmw, OverRos, OverZenoh, Way
-from tests.ros.commands import obey
+from tests.ros_nodes.commands import obey
 
 TICK_S: Final = 0.001
 

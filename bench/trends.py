@@ -19,9 +19,9 @@ from typing import Any, Final
 
 from websockets.sync.client import connect
 
+from app.cell.history.trends import TrendFile
+from app.cell.robot.history import FieldHistory
 from app.panel.widgets.trend import history_bytes
-from app.robot.history import FieldHistory
-from app.trends.trend_file import TrendFile
 from bench.parts import Meter, family, rss_mib
 from bench.report.figures import percentile
 from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until

@@ -19,7 +19,7 @@ KANJI: Final = range(0x4E00, 0xA000)
 
 def files() -> Iterable[Path]:
     """The files whose texts the font must have."""
-    yield ROOT / "app/i18n/ja.po"
+    yield ROOT / "app/system/texts/ja.po"
     yield ROOT / "app/panel.toml"
     yield from sorted((ROOT / "docs/examples").rglob("*.toml"))
 

@@ -25,24 +25,36 @@ from tests.support.parts import ROOT
 
 # Of each room: its modules, and the tests that must notice a change.
 ROOMS: Final = {
-    "app/permission/*.py": (
-        "tests/permission/", "tests/robot/test_definitions.py",
-        "tests/commands/test_control_acts.py", "tests/commands/test_steps.py",
-        "tests/commands/test_parameters.py",
+    "app/cell/permission/*.py": (
+        "tests/cell/permission/", "tests/cell/robot/test_definitions.py",
+        "tests/cell/commands/test_control_acts.py", "tests/cell/commands/test_steps.py",
+        "tests/cell/commands/test_parameters.py",
     ),
-    "app/commands/holds/*.py": ("tests/commands/test_holds.py", "tests/commands/test_joysticks.py"),
-    "app/commands/press_*.py": (
-        "tests/commands/test_bound_presses.py", "tests/commands/test_final_check.py",
-        "tests/commands/test_presses.py", "tests/commands/test_press_limits.py",
-        "tests/commands/test_control_acts.py", "tests/commands/test_acts.py",
+    "app/cell/commands/holds.py": (
+        "tests/cell/commands/test_holds.py", "tests/cell/commands/test_joysticks.py",
     ),
-    "app/audit/verify.py": ("tests/audit/test_store.py", "tests/audit/test_files_removed.py"),
-    "app/robot/topics.py": ("tests/robot/", "tests/permission/test_interlocks.py"),
+    "app/cell/commands/presses.py": (
+        "tests/cell/commands/test_presses.py", "tests/cell/commands/test_press_limits.py",
+        "tests/cell/commands/test_calls_and_goals.py", "tests/records/test_press_record.py",
+        "tests/records/test_refusal_quota.py",
+    ),
+    "app/cell/people/*.py": ("tests/cell/people/",),
+    "app/cell/alarms/states.py": (
+        "tests/cell/alarms/test_states.py", "tests/cell/alarms/test_delays.py",
+        "tests/cell/alarms/test_engine.py", "tests/cell/alarms/test_restored.py",
+    ),
+    "app/cell/commands/judge.py": (
+        "tests/cell/commands/test_bound_presses.py", "tests/cell/commands/test_final_check.py",
+        "tests/cell/commands/test_presses.py", "tests/cell/commands/test_press_limits.py",
+        "tests/cell/commands/test_control_acts.py", "tests/cell/commands/test_acts.py",
+    ),
+    "app/records/verify.py": ("tests/records/test_store.py", "tests/records/test_files_removed.py"),
+    "app/cell/robot/topics.py": ("tests/cell/robot/", "tests/cell/permission/test_interlocks.py"),
 }  # fmt: skip
 # Fixtures with a process of their own, which reads the files.
 PROCESSES: Final = {"bridge", "demo", "kiosk", "server", "servers", "start"}
 OPTIONS: Final = (
-    "-qq", "-p", "no:cacheprovider", "--capture=no", "--real-time=without", "--hypothesis-seed=1"
+    "-qq", "-p", "no:cacheprovider", "--capture=no", "--tier", "test"
 )  # fmt: skip
 LIMIT_S: Final = 40.0  # a mutant that runs longer counts as noticed
 

@@ -12,7 +12,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.panel import load_panel
-from app.web.rendering.display_choice import CHOICES, COOKIE
+from app.web.pages.display_choice import CHOICES, COOKIE
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, SHIPPED, Server, until
 
 EXAMPLE: Final = ROOT / "docs/examples/palletizer.toml"

@@ -1,5 +1,6 @@
 #!/bin/sh
-# What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
+# What the tests need besides Python and git: installed on Debian as root, named elsewhere.
+# `system.sh browser`: for `make test`. `system.sh`: for all tests, which need Rust and namespaces too.
 # `system.sh PACKAGE` looks for that one alone. With INSTALL=no the packages are named only.
 set -eu
 FONTS=/usr/share/fonts/truetype
@@ -10,7 +11,7 @@ missing=""
 need() { # need PACKAGE COMMAND…: the package, unless the command succeeds
     package=$1
     shift
-    [ -z "$only" ] || [ "$only" = "$package" ] || return 0
+    [ -z "$only" ] || [ "$only" = browser ] || [ "$only" = "$package" ] || return 0
     "$@" >/dev/null 2>&1 || missing="$missing $package"
 }
 
@@ -22,37 +23,39 @@ has_faketime() {
     ls /usr/lib/*/faketime/libfaketimeMT.so.1 | grep -q .
 }
 
-need build-essential cc --version
-need cmake cmake --version
 need chromium chromium --version
 need chromium-headless-shell test -e /usr/bin/chromium-headless-shell
-need firefox-esr firefox-esr --version
-need webkit2gtk-driver test -e /usr/bin/WebKitWebDriver
-need xvfb test -e /usr/bin/Xvfb
-need libclang-dev has_libclang
-need faketime has_faketime
-# The kiosk's compositor, what takes its picture, types into it and reports idleness.
-need sway sway --version
-need grim test -e /usr/bin/grim
-need wtype test -e /usr/bin/wtype
-need swayidle test -e /usr/bin/swayidle
-need mosquitto test -e /usr/sbin/mosquitto
-need minisign minisign -v
-need nginx test -e /usr/sbin/nginx
-need caddy caddy version
-need systemd systemd-analyze --version
-need iproute2 ip -V
 # Pages are laid out with each of these alone, see tests/support/browser/fonts.py.
 need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"
 need fonts-noto-core test -e "$FONTS/noto/NotoSans-Regular.ttf"
 need fonts-noto-cjk test -e "${FONTS%/*}/opentype/noto/NotoSansCJK-Regular.ttc"
-need util-linux nsenter --version
-need curl curl --version
-need sqlite3 sqlite3 --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
+if [ "${1:-}" != browser ]; then
+    need build-essential cc --version
+    need cmake cmake --version
+    need firefox-esr firefox-esr --version
+    need webkit2gtk-driver test -e /usr/bin/WebKitWebDriver
+    need xvfb test -e /usr/bin/Xvfb
+    need libclang-dev has_libclang
+    need faketime has_faketime
+    # The kiosk's compositor, what takes its picture, types into it and reports idleness.
+    need sway sway --version
+    need grim test -e /usr/bin/grim
+    need wtype test -e /usr/bin/wtype
+    need swayidle test -e /usr/bin/swayidle
+    need mosquitto test -e /usr/sbin/mosquitto
+    need minisign minisign -v
+    need nginx test -e /usr/sbin/nginx
+    need caddy caddy version
+    need systemd systemd-analyze --version
+    need iproute2 ip -V
+    need util-linux nsenter --version
+    need curl curl --version
+    need sqlite3 sqlite3 --version
+fi
 [ "$only" != npm ] || need npm npm --version # for `make check` and the benchmark's rivals
-[ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust $RUST or later (cargo)" >&2; exit 1; }
-if [ -z "$only" ]; then
+if [ -z "${1:-}" ]; then
+    command -v cargo >/dev/null || { echo "missing: Rust $RUST or later (cargo)" >&2; exit 1; }
     has=$(cargo --version | cut -d" " -f2)
     [ "$(printf '%s\n' "$RUST" "$has" | sort -V | head -n 1)" = "$RUST" ] || {
         echo "the bridge of the tests needs Rust $RUST or later; this cargo is $has (rustup installs a newer one)" >&2

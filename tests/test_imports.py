@@ -1,5 +1,4 @@
-"""Imports go one way, from what knows nothing to what wires all; Zenoh has two doors. Modules are
-short."""
+"""Imports go one way, from what knows nothing to what wires all; Zenoh has two doors."""
 
 import ast
 import graphlib
@@ -14,101 +13,81 @@ from pathlib import Path
 
 import pytest
 
-from app.settings import PACKAGE
-from tests.support.parts import ROOT
+from app.system.settings import PACKAGE
 
 # The rooms, from the ground up: a room imports only from those before it.
-ROOMS = (
-    "interfaces",
-    "dialect",
-    "survey",
-    "panel",
-    "robot",
-    "permission",
-    "audit",
-    "access",
-    "certificates",
-    "trends",
-    "alarms",
-    "recipes",
-    "view",
-    "commands",
-    "recording",
-    "transport",
-    "runtime",
-    "process",
-    "kiosk",
-    "install",
-    "web",
-    "simulator",
-    "scaffold",
-    "diagnose",
-    "cli",
-)
-# What every room may import.
-COMMON = {
-    "app.bounded",
-    "app.clock",
-    "app.concurrency",
-    "app.disk_writer",
-    "app.errors",
-    "app.i18n",
-    "app.i18n.__main__",
-    "app.i18n.catalogue",
-    "app.i18n.locales",
-    "app.i18n.text",
-    "app.i18n.typed_numbers",
-    "app.i18n.values",
-    "app.icons",
-    "app.page_process",
-    "app.pictures",
-    "app.printable",
-    "app.rate_limit",
-    "app.repeated_records",
-    "app.roles",
-    "app.ros_logging",
-    "app.settings",
-    "app.toml_values",
-    "app.version",
+ROOMS = ("system", "ros", "panel", "records", "cell", "web", "tools")
+# The folders of a room, from the ground up in the same way. The definitions and the codec read each
+# other.
+FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "ros": (("messages", "cdr"), ("dialects",), ("zenoh",), ("graph",)),
+    "cell": (
+        ("robot",),
+        ("permission",),
+        ("people",),
+        ("recipes",),
+        ("alarms",),
+        ("link",),
+        ("view",),
+        ("commands",),
+        ("history",),
+        ("session",),
+    ),
+    "tools": (
+        ("cell_config", "doctor", "install", "kiosk", "simulator", "gallery"),
+        ("scaffold",),
+        ("cli",),
+    ),
 }
-WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room
+# Names that commands and other programs use; these may import every room.
+WIRING = {
+    "app.check",
+    "app.cli",
+    "app.i18n",
+    "app.kiosk",
+    "app.kiosk.waiting_page",
+    "app.log",
+    "app.main",
+    "app.simulator",
+}
 SPEAK_ZENOH = {
-    "app.transport.token_query",
-    "app.transport.zenoh_answers",
-    "app.transport.zenoh_config",
-    "app.transport.zenoh_opening",
-    "app.transport.zenoh_publishers",
-    "app.transport.zenoh_session",
-    "app.simulator.zenoh_action",
-    "app.simulator.zenoh_peer",
-    "app.simulator.zenoh_wire",
+    "app.ros.zenoh.session",
+    "app.ros.zenoh.answers",
+    "app.ros.zenoh.config",
+    "app.tools.simulator.zenoh",
 }
 # The dialect and the peer of each kind of robot, and who else may know them.
 OF_A_KIND: dict[tuple[str, ...], set[str]] = {
-    ("app.dialect.bridge_", "app.transport.bridge_"): {
-        "app.cli.bridge_config",
-        "app.dialect.auto_dialect",
-        "app.runtime.robot_access",
-        "app.simulator.zenoh_peer",
-        "app.transport.auto_peer",
-        "app.transport.rmw_zenoh_router",  # a panel may look whether a bridge is there
-        "app.simulator.zenoh_wire",
+    (
+        *("app.ros.dialects.bridge_", "app.ros.graph.bridge_"),
+        *("app.cell.link.bridge", "app.tools.cell_config.bridge_"),
+    ): {
+        "app.tools.cli.bridge_config",
+        "app.ros.dialects.auto_dialect",
+        "app.cell.link.robot_access",
+        "app.tools.simulator.zenoh",
+        "app.cell.link.auto_peer",
+        "app.tools.cell_config.rmw_zenoh_router",
     },
-    ("app.dialect.rmw_zenoh_", "app.transport.rmw_zenoh_"): {
-        "app.cli.router_config",
-        "app.dialect.auto_dialect",
-        "app.runtime.robot_access",
-        "app.simulator.zenoh_wire",
-        "app.transport.auto_peer",
+    (
+        *("app.ros.dialects.rmw_zenoh", "app.ros.graph.rmw_zenoh_"),
+        *("app.cell.link.rmw_zenoh", "app.tools.cell_config.rmw_zenoh_"),
+    ): {
+        "app.tools.cli.router_config",
+        "app.ros.dialects.auto_dialect",
+        "app.cell.link.robot_access",
+        "app.tools.simulator.zenoh",
+        "app.cell.link.auto_peer",
     },
 }
 KNOWN_TO_THE_SIMULATOR = (
-    "app.simulator",
-    "app.interfaces",
-    "app.dialect",
+    "app.tools.simulator",
+    "app.ros.messages",
+    "app.ros.cdr",
+    "app.ros.dialects",
     "app.panel",  # descriptions: what a robot has to have
-    "app.errors",
-    "app.i18n",
+    "app.system.errors",
+    "app.system.texts",
 )
 
 
@@ -157,29 +136,49 @@ def of_zenoh(module: str) -> bool:
 def room_of(module: str) -> str:
     """The room of a module; "" for those beside the rooms."""
     name = module.removeprefix("app.").partition(".")[0]
-    return name if name in ROOMS else ""
+    return name if name in ROOMS and module not in WIRING else ""
 
 
-def test_every_module_is_in_a_room_or_is_common_or_wires() -> None:
-    beside = {module for module in set(MODULES) - {"app"} if not room_of(module)}
-    assert beside | WIRING == COMMON | WIRING
+def is_in(module: str, *folders: str) -> bool:
+    """Whether a module is in one of the folders, such as "ros/dialects"."""
+    return f"{module.removeprefix('app.').replace('.', '/')}/".startswith(
+        tuple(f"{name}/" for name in folders)
+    )
+
+
+def test_every_module_is_in_a_room_or_wires() -> None:
+    assert {module for module in set(MODULES) - {"app"} if not room_of(module)} == WIRING
 
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_a_room_imports_only_from_those_before_it(room: str) -> None:
-    before = {*ROOMS[: ROOMS.index(room) + 1], ""}
+    before = ROOMS[: ROOMS.index(room) + 1]
     back = sorted(
         f"{module} imports {name}"
         for module in MODULES
-        if room_of(module) == room and module not in WIRING
+        if room_of(module) == room
         for name in of_project(module)
-        if room_of(name) not in before or name in WIRING
+        if room_of(name) not in before
     )
     assert back == []
 
 
-def test_common_modules_import_no_room() -> None:
-    assert {name for module in COMMON for name in of_project(module)} <= COMMON
+@pytest.mark.parametrize("room", FOLDERS)
+def test_a_folder_of_a_room_imports_only_from_those_before_it(room: str) -> None:
+    names = {name for floor in FOLDERS[room] for name in floor}
+    inside = {path.name for path in (PACKAGE / room).iterdir() if (path / "__init__.py").exists()}
+    assert names == inside
+    before: list[str] = []
+    for floor in FOLDERS[room]:
+        before += [f"{room}/{name}" for name in floor]
+        back = sorted(
+            f"{module} imports {name}"
+            for module in MODULES
+            if is_in(module, *before)
+            for name in of_project(module)
+            if room_of(name) == room and not is_in(name, *before)
+        )
+        assert back == []
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
@@ -202,13 +201,13 @@ def test_only_the_wiring_and_the_simulator_know_that_there_is_a_kind(modules: tu
 def test_nothing_asks_which_dialect_it_is() -> None:
     """Beside the tables, only a dialect, a transport and the simulator know what depends on it."""
     asks = re.compile(r"dialect\s*(==|!=|in|is)\s*[\"'(]")
-    rooms = ("dialect", "transport", "simulator")
+    folders = ("ros/dialects", "ros/graph", "ros/zenoh", "cell/link", "tools/cell_config")
     asking = {m for m, path in MODULES.items() if asks.search(path.read_text())}
-    assert {module for module in asking if room_of(module) not in rooms} == set()
+    assert {module for module in asking if not is_in(module, *folders, "tools/simulator")} == set()
 
 
 def test_the_simulator_knows_nothing_of_the_server() -> None:
-    own = [m for m in MODULES if room_of(m) == "simulator" and m not in WIRING]
+    own = [module for module in MODULES if is_in(module, "tools/simulator")]
     known = {name for module in own for name in of_project(module)}
     assert {name for name in known if not name.startswith(KNOWN_TO_THE_SIMULATOR)} == set()
 
@@ -217,8 +216,8 @@ def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) ->
     env = {**os.environ, "KIOSK_DATA": str(tmp_path)}
     code = "import sys, app.main; print(*sys.modules)"
     read = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
-    of_faults = {"app.panel.faults.shape", "app.panel.faults.toml_lines", "app.panel.preview"}
-    of_demos = {"app.simulator.panel_robot", "app.simulator.zenoh_peer"}
+    of_faults = {"app.panel.file.shape", "app.panel.file.toml_lines", "app.panel.file.preview"}
+    of_demos = {"app.tools.simulator.panel_robot", "app.tools.simulator.zenoh"}
     assert {"mcap", "prometheus_client", *of_faults, *of_demos} & set(read.split()) == set()
 
 
@@ -226,9 +225,9 @@ def test_only_replay_imports_the_extra_packages() -> None:
     """`make_builtin` is not in the wheel."""
     lacking = ("rosbags", "numpy", "apsw", "ruamel")
     need = {m for m in MODULES for name in imported()[m] if name.partition(".")[0] in lacking}
-    assert need == {"app.simulator.bag.files", "app.interfaces.make_builtin"}
+    assert need == {"app.tools.simulator.bag", "app.ros.messages.make_builtin"}
     needed_by = {m for m in MODULES if need & of_project(m)} - need
-    assert needed_by == {"app.simulator.bag.recording"}
+    assert needed_by == {"app.tools.cli.simulate"}
 
 
 def test_objects_of_the_start_are_frozen_for_the_garbage_collector(tmp_path: Path) -> None:
@@ -241,19 +240,19 @@ def test_objects_of_the_start_are_frozen_for_the_garbage_collector(tmp_path: Pat
 
 
 def test_the_interfaces_know_nothing_but_errors() -> None:
-    own = {module for module in MODULES if room_of(module) == "interfaces"}
-    assert {name for module in own for name in of_project(module)} - own <= {"app.errors"}
+    own = {module for module in MODULES if is_in(module, "ros/messages", "ros/cdr")}
+    assert {name for module in own for name in of_project(module)} - own <= {"app.system.errors"}
 
 
 @pytest.mark.parametrize(
     "module",
     [
-        "app.permission.interlocks",
-        "app.permission.control_authority",
-        "app.view.view",
-        "app.commands.presses",
-        "app.view.publisher",
-        "app.runtime.robot_session",
+        "app.cell.permission.interlocks",
+        "app.cell.permission.control",
+        "app.cell.view.view",
+        "app.cell.commands.presses",
+        "app.cell.view.publisher",
+        "app.cell.session.session",
     ],
 )
 def test_deciding_modules_import_no_http(module: str) -> None:
@@ -262,18 +261,4 @@ def test_deciding_modules_import_no_http(module: str) -> None:
 
 
 def test_the_runner_of_acts_knows_none_of_their_tables() -> None:
-    assert {name for name in of_project("app.commands.acts") if "control" in name} == set()
-
-
-MOST_LINES = {"app": ("*.py", 300), "static": ("*.js", 200)}
-
-
-@pytest.mark.parametrize("folder", MOST_LINES)
-def test_modules_are_short(folder: str) -> None:
-    pattern, most = MOST_LINES[folder]
-    lengths = {
-        str(path.relative_to(ROOT)): len(path.read_text().splitlines())
-        for path in (ROOT / folder).rglob(pattern)
-    }
-    assert lengths
-    assert {path: length for path, length in lengths.items() if length > most} == {}
+    assert {name for name in of_project("app.cell.commands.acts") if "control" in name} == set()

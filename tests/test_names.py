@@ -12,7 +12,7 @@ from tests.support.parts import ROOT
 FOLDERS = ("app", "tests", "bench", "docs", "deploy")
 PRONOUNS = {"one", "of", "what", "it", "given", "found"}
 # A column of the operator's log, in files of all versions.
-COLUMNS = ["app/audit/entry.py: of"]
+COLUMNS = ["app/records/entry.py: of"]
 
 
 def names_in(tree: ast.Module) -> Iterator[str]:

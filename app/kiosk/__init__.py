@@ -1,4 +1,1 @@
-"""The kiosk's screen: starts the compositor and the browser, looks at the page, restarts what hangs.
-
-It reads nothing but Python's own library: it runs beside the server for as long as the machine does.
-"""
+"""The name by which a watcher that runs since before an update makes its waiting page."""

@@ -1,8 +1,8 @@
 """The panel file: parses TOML into frozen, checked descriptions."""
 
-from app.panel.interlock import Interlock
+from app.panel.condition import Interlock
+from app.panel.file.load import CheckedPanel, check_panel, load_panel
 from app.panel.layout import Page
-from app.panel.load import Checked, check_panel, load_panel
 from app.panel.model import Panel
 from app.panel.widgets.displays import Indicator, LampState, Readout
 from app.panel.widgets.families import Display, Input
@@ -12,7 +12,7 @@ from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.publish import Publish
 
 __all__ = [
-    "Checked",
+    "CheckedPanel",
     "Display",
     "Hold",
     "Indicator",

@@ -1,19 +1,19 @@
-"""The descriptions of alarms: `[[alarm]]` and `[alarms]` of a panel file."""
+"""The descriptions of alarms: `[[alarm]]`, `[alarms]` and `[alarms.mqtt]` of a panel file."""
 
 import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from app.i18n import PanelText
-from app.interfaces.validation import format_value
-from app.panel.alarm_mqtt import MqttRules
 from app.panel.base import (
     Description,
+    FieldPath,
     File,
     Id,
+    MessageField,
     NodeName,
     Seconds,
     TopicName,
@@ -22,13 +22,112 @@ from app.panel.base import (
     panel_text,
 )
 from app.panel.condition import Condition
-from app.panel.field_paths import FieldPath, MessageField
-from app.panel.inhibits import InhibitedNames
-from app.panel.number_format import Factor
+from app.panel.numbers import FORMAT, Factor
 from app.panel.widgets.displays import StateValue
 from app.panel.widgets.families import TopicSource
 from app.panel.widgets.numbers import Unit
 from app.panel.widgets.table import MAX_ENTRIES, READ_BY_DEFAULT, ListPath
+from app.ros.messages.validation import format_value
+from app.system.texts import PanelText
+
+# `[alarms.mqtt]`: where alarms are published by MQTT.
+
+PORT, TLS_PORT = 1883, 8883
+PREFIX: Final = re.compile(r"[^/+#$\s\0][^+#\s\0]*")
+
+
+def _check_prefix(prefix: str) -> str:
+    if not PREFIX.fullmatch(prefix) or prefix.endswith("/"):
+        raise ValueError(f'{format_value(prefix)} is not a topic of MQTT, like "plant1/cell2/alarms"')
+    return prefix
+
+
+def _check_path(path: str) -> str:
+    if not PurePosixPath(path).is_absolute():
+        raise ValueError(f"{format_value(path)} is not the whole path of a file, from / on")
+    return path
+
+
+Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
+
+
+class MqttRules(Description):
+    """The broker at `host`, and what the topics begin with. The password of `username` is in an
+    environment variable of the server, or else in a file there, never in the panel file."""
+
+    host: Annotated[str, Field(min_length=1, max_length=253)]
+    prefix: Annotated[str, Field(max_length=200), AfterValidator(_check_prefix)]
+    port: Annotated[int, Field(ge=1, le=65_535)] | None = None
+    tls: bool = False
+    ca: File | None = None
+    username: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    password_env: Variable | None = None
+    password_file: Annotated[str, AfterValidator(_check_path)] | None = None
+    client_id: Annotated[str, Field(min_length=1, max_length=23)] | None = None
+
+    @model_validator(mode="after")
+    def _check_together(self) -> Self:
+        if self.username is None and (self.password_env or self.password_file):
+            raise ValueError("has a password without a username")
+        if self.ca is not None and not self.tls:
+            raise ValueError("has a ca, which is for tls = true")
+        return self
+
+    @property
+    def used_port(self) -> int:
+        return self.port or (TLS_PORT if self.tls else PORT)
+
+
+# The controls that an alarm locks, also those of other robots: `inhibits` of `[[alarm]]`.
+
+EVERY_ROBOT: Final = "*"
+NAME: Final = re.compile(r"(?:(?P<robot>\*|[a-z][a-z0-9_]{0,63})/)?(?P<control>[a-z][a-z0-9_]{0,63})")
+
+
+class InhibitedName(NamedTuple):
+    """A name of `inhibits`. `robot` is "" where none is written, and "*" for each."""
+
+    robot: str
+    control: str
+
+
+def _check_name(name: str) -> str:
+    if not NAME.fullmatch(name):
+        example = 'write "start", or with a robot\'s id "right/start" or "*/start"'
+        raise ValueError(f"{format_value(name)} is not the id of a control: {example}")
+    return name
+
+
+def _check_unique(names: tuple[str, ...]) -> tuple[str, ...]:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise ValueError(f"names {format_value(name)} twice")
+    return names
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+InhibitedNames = Annotated[tuple[Name, ...], Field(strict=False), AfterValidator(_check_unique)]
+
+
+def inhibited_name(name: str) -> InhibitedName:
+    match = NAME.fullmatch(name)
+    assert match is not None  # the file is checked
+    return InhibitedName(match["robot"] or "", match["control"])
+
+
+def inhibited_controls(
+    names: tuple[str, ...], robot: str, robots: tuple[str, ...], widget_robots: Mapping[str, str]
+) -> Iterator[tuple[str, str]]:
+    """(robot, control) of what an alarm of `robot` ("" for the only one) locks by these names, among
+    `robots`. A control that is of one robot is of it for the alarms of every robot."""
+    for name in names:
+        named, control = inhibited_name(name)
+        own = widget_robots.get(control)
+        if named == EVERY_ROBOT and own is None:
+            yield from ((each, control) for each in robots or ("",))
+        else:
+            yield own or named or robot, control
+
 
 Priority = Annotated[int, Field(ge=1, le=4)]
 Delay = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
@@ -114,9 +213,10 @@ class SuppressingCondition(Condition):
 class Alarm(Description):
     """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
     publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
-    the value times `scale`. `state` is the machine's state while it is active. `ack_command` is the
-    control that is pressed when it is acknowledged, with its name or code in `ack_input`. `needs`: the
-    role or group that acts on it need; `confirm_act`: who confirms them with a PIN."""
+    `value * scale + offset`, and `format` writes it. `state` is the machine's state while it is active.
+    `ack_command` is the control that is pressed when it is acknowledged, with its name or code in
+    `ack_input`. `needs`: the role or group that acts on it need; `confirm_act`: who confirms them with
+    a PIN."""
 
     id: Id
     robot: Id | None = None
@@ -145,6 +245,8 @@ class Alarm(Description):
     field: FieldPath = "data"
     unit: Unit = ""
     scale: Factor = 1.0
+    offset: Factor = 0.0
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
     low_low: Limit | None = None

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from app.panel.alarm import Alarm
-from app.panel.inhibits import inhibited_controls
+from app.panel.alarm import Alarm, inhibited_controls
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.robot_panels import widget_robots

@@ -19,12 +19,23 @@ from pydantic import (
     WrapValidator,
 )
 
-from app.i18n import ENGLISH, PanelText, TextLike, render, say
-from app.icons import icons
-from app.interfaces.names import ACTION_TYPE, GLOBAL, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
-from app.interfaces.validation import format_value
-from app.panel.faults.wording import closest_name
-from app.pictures import picture_files
+from app.panel.file.wording import closest_name
+from app.ros.messages import field_call
+from app.ros.messages.field_path import Key, path_steps
+from app.ros.messages.names import (
+    ACTION_TYPE,
+    GLOBAL,
+    MESSAGE_TYPE,
+    NAMESPACE,
+    SERVICE_TYPE,
+    TOPIC,
+    Qos,
+)
+from app.ros.messages.validation import format_value
+from app.system.errors import InterfaceError
+from app.system.icons import icons
+from app.system.pictures import picture_files
+from app.system.texts import ENGLISH, PanelText, TextLike, render, say
 
 
 class FileContext(NamedTuple):
@@ -165,11 +176,16 @@ def is_inside(file: Path, *folders: Path) -> bool:
 
 def _parse_interlocks(value: Any) -> tuple[str, ...]:
     """The ids, from one id or a list of them."""
-    named = [value] if isinstance(value, str) else value
+    named = [value] if isinstance(value, str | dict) else value
     if not isinstance(named, list | tuple):
         raise ValueError(f"must be the id of an interlock, or a list of ids, not {format_value(value)}")
     if not named:
         raise ValueError("is an empty list: name an interlock, or leave the key out")
+    if any(isinstance(name, dict) for name in named):
+        raise ValueError(
+            "must be an id, or a list of ids: write the table by itself, such as [[interlock]] with an "
+            'id, and name the id here, such as "door_closed"'
+        )
     for i, name in enumerate(named):
         if not isinstance(name, str) or not re.fullmatch(ID, name):
             raise ValueError(f'{format_value(name)} is not an id: a-z, 0-9 and "_", a letter first')
@@ -294,3 +310,32 @@ def _check_icon(name: str) -> str:
 
 
 Icon = Annotated[str, AfterValidator(_check_icon)]
+
+
+# The types of keys that name a field of a message.
+
+
+def _check_field_path(path: str) -> str:
+    try:
+        if field_call(path) is None:
+            path_steps(path)
+    except InterfaceError as error:
+        raise ValueError(str(error)) from None
+    return path
+
+
+def _check_message_field(path: str) -> str:
+    if field_call(_check_field_path(path)) is not None:
+        raise ValueError(f'"{path}" is a function of fields: here it must be a field')
+    return path
+
+
+def _check_written_field(path: str) -> str:
+    if any(isinstance(step, Key) for step in path_steps(_check_message_field(path))):
+        raise ValueError(f'"{path}" is filled in: an element is given by its number, as in data[2]')
+    return path
+
+
+FieldPath = Annotated[str, AfterValidator(_check_field_path)]  # or a function of fields
+MessageField = Annotated[str, AfterValidator(_check_message_field)]
+WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys

@@ -1,22 +1,32 @@
-"""The description of a condition: a field of a topic, and the values of it that meet the condition.
-
-With `scale` and `offset` the comparisons are of `value * scale + offset`, in the unit that is shown. On
-load they become comparisons of the field's own value, so that they are exact.
-"""
+"""The descriptions of a condition, which is a field of a topic with the values that meet it, and of an
+interlock."""
 
 from collections.abc import Mapping
-from fractions import Fraction
-from functools import cached_property
-from typing import Annotated, Any, ClassVar, Final, Self
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
-from app.i18n import PanelText, TextLike
-from app.interfaces.validation import format_value
-from app.panel.base import Description, Id, Label, Seconds, TopicName, TopicQos, Type
-from app.panel.field_paths import FieldPath
-from app.panel.number_format import FORMAT, Factor
+from app.panel.base import (
+    Description,
+    FieldPath,
+    Id,
+    Label,
+    Seconds,
+    TopicName,
+    TopicQos,
+    Type,
+    panel_text,
+)
+from app.panel.numbers import FORMAT, Factor, is_scaled, sent_number
 from app.panel.widgets.numbers import Unit
+from app.ros.messages.validation import format_value
+from app.system.texts import PanelText, TextLike
+
+# The description of a condition: a field of a topic, and the values of it that meet the condition.
+#
+# With `scale` and `offset` the comparisons are of `value * scale + offset`, in the unit that is shown.
+# On load they become comparisons of the field's own value, so that they are exact.
 
 VALUE: Final = "{value}"  # in `own_sentence`: the value that does not meet the condition
 COMPARISONS: Final = ("equals", "not_equals", "min", "max", "one_of")
@@ -70,6 +80,11 @@ class Condition(Description):
     @property
     def name(self) -> TextLike:
         """What sentences call it."""
+        return self.subject
+
+    @property
+    def subject(self) -> TextLike:
+        """What sentences call the value: operators know its label, engineers the topic."""
         return self.label or self.topic
 
     @property
@@ -86,16 +101,7 @@ class Condition(Description):
     @property
     def is_scaled(self) -> bool:
         """Whether what is shown is another number than that of the field."""
-        return (self.scale, self.offset) != (1.0, 0.0)
-
-    def shown(self, value: float) -> float:
-        """The number that is shown for the field's value."""
-        return value * self.scale + self.offset if self.is_scaled else value
-
-    def unscaled(self, compared: float) -> float:
-        """The field's value for which this number is shown."""
-        exact = (Fraction(repr(compared)) - Fraction(repr(self.offset))) / Fraction(repr(self.scale))
-        return int(exact) if exact.denominator == 1 else float(exact)
+        return is_scaled(self)
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -118,8 +124,9 @@ class Condition(Description):
         With a negative scale the least value that is shown is the field's greatest."""
         if not self.is_scaled:
             return self
+        unscaled = partial(sent_number, self.scale, self.offset)
         raw: dict[str, Any] = {
-            key: tuple(map(self.unscaled, value)) if key == "one_of" else self.unscaled(value)
+            key: tuple(map(unscaled, value)) if key == "one_of" else unscaled(value)
             for key, value in self.comparisons.items()
         }
         if self.scale < 0:
@@ -135,3 +142,46 @@ class NamedCondition(Condition):
 
     id: Id
     robot: Id | None = None
+
+
+# The description of an interlock: a condition that permits commands.
+
+if TYPE_CHECKING:
+    HelpText = str | PanelText
+    Picture = str | PanelText
+else:
+    HelpText = panel_text(400)
+    Picture = panel_text(255)
+
+
+class Help(Description):
+    """What to do while an interlock locks: `text` has a step a line, and `picture` is a file of the
+    folder of pictures."""
+
+    text: HelpText | None = None
+    picture: Picture | None = None
+
+
+class Interlock(NamedCondition):
+    """A condition that permits the commands which name it, and locks them while it is not met.
+    `locked` is its own sentence then."""
+
+    noun: ClassVar[str] = "an interlock"
+
+    require_publisher: bool = False
+    publishers: Literal["any", "one"] = "any"
+    locked: Label | None = None
+    help: Help = Help()
+
+    @property
+    def own_sentence(self) -> str | PanelText | None:
+        return self.locked
+
+    @property
+    def name(self) -> TextLike:
+        return self.label or self.id
+
+    @property
+    def advice(self) -> TextLike:
+        """What to do while it is not met, a step a line; "" if the panel file does not say."""
+        return self.help.text or self.action or ""

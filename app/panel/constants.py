@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from itertools import takewhile
 from typing import Any, Final, Protocol, TypeVar
 
-from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field_name, parent_path
-from app.interfaces.validation import fitting_constants, format_value, unknown_constant
 from app.panel.condition import Condition
-from app.panel.number_range import to_float32
+from app.panel.numbers import to_float32
 from app.panel.values import NegatedText
+from app.ros.messages import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field_name, parent_path
+from app.ros.messages.validation import fitting_constants, format_value, unknown_constant
 
 Resolved = TypeVar("Resolved", bound=Condition)
 

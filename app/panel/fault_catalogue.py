@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final, NamedTuple, TextIO
 
-from app.i18n import PanelText
+from app.system.texts import PanelText
 
 TEXTS: Final = ("text", "cause", "consequence", "action")
 MAX_ROWS: Final = 100_000

@@ -6,16 +6,19 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from app.interfaces.validation import format_value
 from app.panel.base import Description, File, Icon, Id, Label, Span
 from app.panel.widgets.families import BaseWidget, EntryWidget
 from app.panel.widgets.kinds import KINDS, Widget
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.tiles import BUTTONS
+from app.ros.messages.validation import format_value
 
 COLUMNS: Final = 12  # of a page, and of a group that does not say
 SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
-FRAME_ONLY: Final = "-frame"  # no page has this id: what shows the frame around something else
+# No page has these ids: what shows the frame of one robot, or of all, around something else.
+FRAME_ONLY: Final = "-frame"
+FRAME_OF_ALL: Final = "-frame-of-all"
+FRAMES: Final = (FRAME_ONLY, FRAME_OF_ALL)
 Placed = Iterator[tuple[str, BaseWidget]]
 
 Theme = Literal["light", "dark", "contrast"]

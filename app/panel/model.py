@@ -1,22 +1,19 @@
 """A panel: its keys, and what follows from them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from app.errors import NotFound
-from app.i18n.catalogue import files
+from app.panel.alarm import Alarm, inhibited_name
 from app.panel.base import TopicQos
-from app.panel.condition import Condition, NamedCondition
-from app.panel.interlock import Interlock
-from app.panel.layout import FRAME_ONLY, Page
+from app.panel.condition import Condition, Interlock, NamedCondition
+from app.panel.keys import SUMS, PanelKeys
+from app.panel.keys import RobotEntry as RobotEntry
+from app.panel.layout import FRAMES, Page
 from app.panel.needs import PanelNeeds, needs_of
-from app.panel.panel_keys import PanelKeys
-from app.panel.robot_entry import SUMS
-from app.panel.robot_entry import RobotEntry as RobotEntry
 from app.panel.texts import panel_texts
-from app.panel.uniform_buttons import UniformButtons, uniform_buttons
+from app.panel.widgets.displays import LogView
 from app.panel.widgets.families import (
     BaseWidget,
     Command,
@@ -26,16 +23,45 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.listed_parameter import listed_parameter
-from app.panel.widgets.log_view import LogView
-from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, EVENTS_QOS, Parameter
+from app.panel.widgets.parameter import (
+    EVENT_TYPE,
+    EVENTS,
+    EVENTS_QOS,
+    SERVICES,
+    SET_ATOMICALLY,
+    Parameter,
+    listed_parameter,
+)
 from app.panel.widgets.parts import parts_of
-from app.panel.widgets.publish import Confirm
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.recipe_load import RecipeLoad, loads_of
-from app.panel.widgets.service_action import Action
+from app.panel.widgets.robot_options import ListingService
+from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
-from app.pictures import picture_files, shipped_pictures
+from app.system.errors import NotFound
+from app.system.pictures import picture_files, shipped_pictures
+from app.system.texts.catalogue import files
+
+# Buttons that are judged as one.
+
+UniformButtons = dict[tuple[tuple[str, ...], bool], tuple[PublishPress, ...]]
+
+
+def uniform_buttons(commands: Iterable[Command], alarms: Iterable[Alarm]) -> UniformButtons:
+    """Buttons that publish, that no alarm locks and that no person confirms, by their interlocks and
+    whether they stop: many are judged as one, as these and the graph decide their lock, which is all
+    that is shown."""
+    inhibited = {inhibited_name(name).control for alarm in alarms for name in alarm.inhibits}
+    groups: UniformButtons = {}
+    for widget in commands:
+        if not isinstance(widget, PublishPress) or widget.shows_more:
+            continue
+        if widget.id not in inhibited and not widget.confirmation:
+            key = widget.interlocks, widget.role == "stop"
+            groups[key] = (*groups.get(key, ()), widget)
+    return groups
+
 
 Kind = TypeVar("Kind", bound=BaseWidget)
 
@@ -121,7 +147,8 @@ class Panel(PanelKeys):
             )
             for page in self.pages
         }
-        return pages | {FRAME_ONLY: frozenset(frame) | {load.id for load in self.recipe_loads}}
+        own = frozenset(frame) | {load.id for load in self.recipe_loads}
+        return pages | dict.fromkeys(FRAMES, own)
 
     @property
     def has_alarms(self) -> bool:
@@ -229,11 +256,38 @@ class Panel(PanelKeys):
         """Action → type of all actions that the panel may send goals to."""
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
+    @cached_property
+    def listed_selects(self) -> tuple[SelectInput, ...]:
+        """The selects whose options the robot lists."""
+        selects = (w for w in self.widgets() if isinstance(w, SelectInput))
+        return tuple(select for select in selects if select.options_from is not None)
+
+    def option_services(self) -> dict[ListingService, float]:
+        """The services that list options of selects, and every how many seconds each is called."""
+        services: dict[ListingService, float] = {}
+        for source in (select.options_from for select in self.listed_selects):
+            if source is not None and (service := source.listing) is not None:
+                services[service] = min(source.every_s, services.get(service, source.every_s))
+        return services
+
+    def called_services(self) -> dict[str, str]:
+        """Service → type of all services that the panel calls by itself or at a press."""
+        listing = {service.name: service.type for service in self.option_services()}
+        return listing | {w.service: w.type for w in self.senders() if isinstance(w, Call)}
+
+    def services(self) -> dict[str, str]:
+        """Service → type of all services that the panel calls, with those of parameters. What a
+        session, its node and a robot's configuration declare is made from this list."""
+        nodes = dict.fromkeys(widget.node for widget in self.parameters())
+        of_nodes = {f"{node}/{name}": kind for node in nodes for name, kind in SERVICES}
+        name, kind = SET_ATOMICALLY
+        of_loads = {f"{load.set.node}/{name}": kind for load in self.recipe_loads if load.parameters}
+        return self.called_services() | of_nodes | of_loads
+
     def parameters(self) -> Iterator[Parameter]:
         yield from (w for w in self.widgets() if isinstance(w, Parameter))
         yield from (parameter for load in self.recipe_loads for parameter in load.reads)
-        selects = (w for w in self.widgets() if isinstance(w, SelectInput))
-        yield from filter(None, map(listed_parameter, selects))
+        yield from filter(None, map(listed_parameter, self.listed_selects))
 
     def logs(self) -> dict[str, int]:
         """Topic → number of lines to keep, of all logs that the panel shows."""

@@ -11,9 +11,9 @@ from typing import Final
 
 from app.panel.alarm import Alarm
 from app.panel.layout import Page
+from app.panel.roles import OPERATOR
 from app.panel.widgets.families import BaseWidget, Command
 from app.panel.widgets.templated import is_stop
-from app.roles import OPERATOR
 
 Needs = frozenset[str]
 NOTHING: Final[Needs] = frozenset()

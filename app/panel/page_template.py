@@ -1,4 +1,4 @@
-"""A page's own template, compiled and rendered in a process with limits (`app.page_process`).
+"""A page's own template, compiled and rendered in a process with limits (`app.system.page_process`).
 
 It knows nothing of the robot: what it makes in a language is the same in every request, but for the
 widgets in it. So it runs once, when the panel is loaded, and a page puts its widgets in between.
@@ -19,17 +19,17 @@ from typing import Final
 
 from markupsafe import Markup
 
-from app.i18n import ENGLISH, render
-from app.icons import icons
-from app.page_process import NAME, SECONDS, Answer, Request
-from app.panel.faults.wording import closest_name, list_names
+from app.panel.file.wording import closest_name, list_names
 from app.panel.layout import Page
-from app.settings import PACKAGE
+from app.system.icons import icons
+from app.system.page_process import NAME, SECONDS, Answer, PageRequest
+from app.system.settings import PACKAGE
+from app.system.texts import ENGLISH, render
 
-COMMAND: Final = (sys.executable, "-P", "-c", "from app.page_process import run; run()")
+COMMAND: Final = (sys.executable, "-P", "-c", "from app.system.page_process import run; run()")
 WITHIN_S: Final = 30.0  # on a machine that is busy; its own time is limited by itself
 MOST_BYTES: Final = 1_000_000
-KEPT: Final = 64  # templates of a panel that are not run again
+MAX_TEMPLATES: Final = 64  # templates of a panel that are not run again
 _FRAME: Final = re.compile(rf'File "{NAME}", line (\d+)')
 ENDED: Final = f"it takes more than {SECONDS:g} s in one expression"
 
@@ -89,7 +89,7 @@ def run_template(
     return _run(text, titles, tuple(widget.id for widget in page.widgets), tuple(sorted(pictures)))
 
 
-@lru_cache(KEPT)
+@lru_cache(MAX_TEMPLATES)
 def _run(
     source: str,
     titles: tuple[tuple[str, str], ...],
@@ -97,7 +97,7 @@ def _run(
     pictures: tuple[str, ...],
 ) -> TemplateFault | PageParts:
     mark = f"[{secrets.token_hex(16)}:"
-    request: Request = {
+    request: PageRequest = {
         "source": source,
         "titles": dict(titles),
         "widgets": list(widgets),
@@ -133,7 +133,7 @@ def _ended(done: subprocess.CompletedProcess[bytes]) -> TemplateFault:
     return TemplateFault(before[-1] if before else 0, ENDED)
 
 
-def _answered(answer: Answer, mark: str, request: Request) -> TemplateFault | PageParts:
+def _answered(answer: Answer, mark: str, request: PageRequest) -> TemplateFault | PageParts:
     if "rendered" not in answer:
         return _fault(answer, request)
     parts_by_language = {}
@@ -149,7 +149,7 @@ def _answered(answer: Answer, mark: str, request: Request) -> TemplateFault | Pa
     return PageParts(parts_by_language)
 
 
-def _fault(answer: Answer, request: Request) -> TemplateFault:
+def _fault(answer: Answer, request: PageRequest) -> TemplateFault:
     line, name = answer.get("line", 0), answer.get("name", "")
     if twice := answer.get("twice"):
         return TemplateFault(line, f'the widget "{twice}" is placed twice')

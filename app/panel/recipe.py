@@ -5,10 +5,13 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.panel.base import (
+    AnyText,
     Description,
+    FieldPath,
     Id,
     Interlocks,
     Label,
+    MessageField,
     NodeName,
     ParameterName,
     Seconds,
@@ -17,8 +20,7 @@ from app.panel.base import (
     Type,
     non_empty,
 )
-from app.panel.field_paths import FieldPath, MessageField
-from app.panel.widgets.confirmed import ConfirmPress
+from app.panel.widgets.key_parts import ConfirmPress
 
 MAX_FIELDS: Final = 60
 
@@ -61,8 +63,15 @@ class RecipeSet(Description):
     message: dict[str, Any] | None = None
     request: dict[str, Any] | None = None
     success: MessageField | None = None
+    answer: AnyText = ""
     parameters: Names = Field(default_factory=dict)
     parameter_types: Kinds = Field(default_factory=dict)
     timeout_s: Seconds = 5.0
     confirm_s: Seconds = 3.0
     readback: RecipeReadback | None = None
+
+    @property
+    def readback_topics(self) -> tuple[str, ...]:
+        """The topics by which the robot reports what is loaded."""
+        topic = self.readback.topic if self.readback else None
+        return () if topic is None else (topic,)

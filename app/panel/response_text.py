@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from app.errors import FieldError
-from app.i18n import TextLike
-from app.i18n.values import each_language
 from app.panel.constants import NUMBERS
-from app.panel.number_format import FORMAT
+from app.panel.numbers import FORMAT, formatted
+from app.system.errors import FieldError
+from app.system.texts import TextLike
+from app.system.texts.text import each_language
 
 DIGITS: Final = 4  # significant digits of a number without a format
 SMALLEST: Final = 1e-4  # nearer to 0 it is written with an exponent
@@ -42,7 +42,7 @@ class ResponseField(NamedTuple):
             return str(scaled)
         if not math.isfinite(scaled):
             return "NaN" if math.isnan(scaled) else "Infinity" if scaled > 0 else "-Infinity"
-        return format(scaled, self.style) if self.style is not None else _rounded(float(scaled))
+        return formatted(scaled, self.style) if self.style is not None else _rounded(float(scaled))
 
     def fault(self, kind: str) -> str:
         """Why a field of this type can't be written so, "" if it can."""
@@ -56,7 +56,9 @@ class ResponseField(NamedTuple):
 
 def _rounded(value: float) -> str:
     """A number in four significant digits, and no fewer digits before the point than it has."""
-    if value == 0 or abs(value) < SMALLEST or abs(value) >= 1e15:
+    if value == 0:
+        return "0"
+    if abs(value) < SMALLEST or abs(value) >= 1e15:
         return f"{value:.{DIGITS}g}"
     places = max(0, DIGITS - 1 - math.floor(math.log10(abs(value))))
     text = f"{value:.{places}f}"

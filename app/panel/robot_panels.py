@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping
 
 from app.panel.layout import Group, Page
 from app.panel.model import Panel
+from app.panel.widgets.displays import Static
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, EntryWidget, Input
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.static import Static
 
 
 def widget_robots(panel: Panel) -> Mapping[str, str]:

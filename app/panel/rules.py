@@ -1,14 +1,70 @@
-"""The tables `[access]`, `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]` and `[record]`
-of a panel file."""
+"""The tables `[access]`, `[access.oidc]`, `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]`,
+`[record]`, `[screen]` and `[state]` of a panel file."""
 
-from typing import Annotated, Final, Literal
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Annotated, Any, Final, Literal, Self
+from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Id, Note, Seconds, TopicName
-from app.panel.oidc import OidcRules
-from app.pictures import PICTURE
-from app.roles import ENGINEER, ROLES
+from app.panel.base import Description, Id, Label, Note, Seconds, TopicName, non_empty
+from app.panel.checks.types import field_faults
+from app.panel.constants import parent_type
+from app.panel.roles import ENGINEER, ROLES
+from app.panel.widgets.displays import LampState, resolve_state_value, state_faults
+from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
+from app.ros.messages import Interfaces
+from app.system.errors import Fault
+from app.system.pictures import PICTURE
+from app.system.texts import say
+
+# The table `[access.oidc]` of a panel file: sign-in by the plant's own provider (OpenID Connect).
+
+Group = Annotated[str, Field(min_length=1, max_length=200)]
+Groups = Annotated[tuple[Group, ...], Field(strict=False, max_length=50)]
+Claim = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.:/-]{1,100}$")]
+Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
+AcrValue = Annotated[str, Field(pattern=r"^[!-~]{1,200}$")]
+LOOPBACK: Final = ("localhost", "127.0.0.1", "::1")
+
+
+def is_protected(url: str) -> bool:
+    """Whether no one on the network can read or forge what this address answers."""
+    parts = urlsplit(url)
+    return parts.scheme == "https" or (parts.scheme == "http" and parts.hostname in LOOPBACK)
+
+
+def _check_issuer(issuer: str) -> str:
+    parts = urlsplit(issuer)
+    if not is_protected(issuer) or not parts.hostname or parts.query or parts.fragment:
+        raise ValueError(f'"{issuer}" is not an issuer: an https:// address such as "https://id.plant"')
+    return issuer
+
+
+def _check_path(path: str) -> str:
+    if not path.startswith("/"):
+        raise ValueError(f'"{path}" is not a whole path: it begins with "/"')
+    return path
+
+
+class OidcRules(Description):
+    """The provider, and which of its groups have which role here. The secret of the client is in an
+    environment variable of the server, or else in a file there, never in the panel file."""
+
+    issuer: Annotated[str, Field(max_length=300), AfterValidator(_check_issuer)]
+    client_id: Annotated[str, Field(min_length=1, max_length=200)]
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+    secret_env: Variable | None = None
+    secret_file: Annotated[str, AfterValidator(_check_path)] | None = None
+    user_claim: Claim = "preferred_username"
+    groups_claim: Claim = "groups"
+    acr_values: Annotated[tuple[AcrValue, ...], Field(strict=False, max_length=20)] = ()
+    max_age_s: Annotated[int, Field(gt=0, le=86_400)] | None = None
+    viewer: Groups = ()
+    operator: Groups = ()
+    maintenance: Groups = ()
+    engineer: Groups = ()
 
 
 def _not_a_role(group: str) -> str:
@@ -18,9 +74,10 @@ def _not_a_role(group: str) -> str:
 
 
 class AccessRules(Description):
-    """Who may use the panel. `open`: without users, everybody may do everything. A user is signed out
+    """Who may use the panel. `open`: without users, everyone may do everything. A user is signed out
     after `idle_s` seconds without a touch; 0: never. `groups` are the panel's own, beside the roles.
-    Signed-in users and programs on other machines have at most the role `remote`."""
+    Signed-in users and programs on other machines have at most the role `remote`. `pin`: PINs are taken
+    at the kiosk's own machine only, or anywhere."""
 
     open: bool = True
     idle_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 600.0
@@ -28,6 +85,7 @@ class AccessRules(Description):
         tuple[Annotated[Id, AfterValidator(_not_a_role)], ...], Field(strict=False, max_length=20)
     ] = ()
     remote: Literal["viewer", "operator", "maintenance", "engineer"] = ENGINEER
+    pin: Literal["local", "anywhere"] = "local"
     oidc: OidcRules | None = None
 
 
@@ -93,3 +151,86 @@ class RecordRules(Description):
     after_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
     max_mb: Annotated[float, Field(ge=16, le=1_000_000, allow_inf_nan=False)] = 512.0
     topics: Annotated[tuple[TopicName, ...] | None, Field(strict=False)] = None
+
+
+# The table `[screen]` of a panel file: how the touch screen behaves between presses.
+
+Keyboard = Literal["auto", "on", "off"]
+
+CLEANING_S: Final = 30  # how long the screen is locked to be cleaned
+
+
+class ScreenRules(Description):
+    """After `dim_after_s` seconds without a touch the page gets dark; 0: never. `kiosk`: where a finger
+    is the main pointer, the browser's own gestures are off. `sounds`: a refused press sounds, unless it
+    is turned off in the browser."""
+
+    dim_after_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
+    kiosk: bool = True
+    sounds: bool = False
+
+
+# The table `[state]` of a panel file: what the machine is doing, in one word, as the robot says it.
+
+STATE_ID: Final = "machine_state"
+MAX_DETAILS: Final = 2
+
+
+class StateDetail(TopicField):
+    """What stands beside the state, such as the mode or the order: a field, after its `label`. `words`
+    are what is shown for its values."""
+
+    label: Label | None = None
+    words: Mapping[str, Label] = Field(default_factory=dict)
+
+
+class StateRules(TopicField):
+    """The states that the robot reports, with the word and the shape of each; a state that it does not
+    report now is shown as not known."""
+
+    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
+    details: Annotated[tuple[StateDetail, ...], Field(strict=False, max_length=MAX_DETAILS)] = Field(
+        (), alias="detail"
+    )
+
+    @cached_property
+    def display(self) -> "MachineState":
+        """The display in the frame of every page."""
+        keys: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
+        fixed: dict[str, Any] = {"id": STATE_ID, "kind": "state", "label": say("machine_state")}
+        return MachineState.model_construct(None, **fixed, **keys)
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        """The same with values in place of constants' names."""
+        states = [
+            state.model_copy(update={"value": self.value_of(state.value, interfaces)})
+            for state in self.states
+        ]
+        return self.model_copy(update={"states": tuple(states)})
+
+    def value_of(self, value: bool | int | str, interfaces: Interfaces) -> Any:
+        """The value of a state in the message: that of a constant by its name."""
+        kind = interfaces.field_type(self.type, self.field)
+        return resolve_state_value(value, kind, interfaces.constants(parent_type(self, interfaces)))
+
+
+class MachineState(Display):
+    """The state as a display: it is not in a page, but in the frame."""
+
+    kind: Literal["state"]
+    states: tuple[LampState, ...]
+    details: tuple[StateDetail, ...] = ()
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield from super().sources()
+        for number, detail in enumerate(self.details):
+            yield detail.source(f"detail[{number}]")
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        yield from super().faults(place, checking)
+        for number, detail in enumerate(self.details):
+            at = f"{place}.detail[{number}]"
+            yield from field_faults(at, detail.type, detail.field, checking.interfaces)
+
+    def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
+        yield from state_faults(place, self, field_type, interfaces, "the machine's state")

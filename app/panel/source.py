@@ -4,9 +4,8 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, Field
 
-from app.panel.base import Description, Id, Seconds, TopicName, TopicQos, Type, non_empty
-from app.panel.field_paths import FieldPath
-from app.panel.number_format import Factor
+from app.panel.base import Description, FieldPath, Id, Seconds, TopicName, TopicQos, Type, non_empty
+from app.panel.numbers import Factor
 from app.panel.recipe import RecipeSet
 from app.panel.widgets.displays import FORMAT_OR_TIME, LampState
 from app.panel.widgets.families import PublishCommand

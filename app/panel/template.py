@@ -8,9 +8,9 @@ from functools import lru_cache
 from string import Formatter
 from typing import Any, Final
 
-from app.errors import FieldError
 from app.panel.values import negated
 from app.panel.widgets.families import Command
+from app.system.errors import FieldError
 
 NOW: Final = "now"  # reserved: the time of sending, of the type TIME
 TIME: Final = "builtin_interfaces/msg/Time"

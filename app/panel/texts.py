@@ -1,11 +1,19 @@
 """The texts of a panel in several languages, wherever they are in its descriptions."""
 
+import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 from pydantic import BaseModel
 
-from app.i18n import PanelText
+from app.system.texts import PanelText
+
+_QUOTED: Final = re.compile(r"[/\[]")
+
+
+def key_in_place(key: str) -> str:
+    """A key as places of the panel file have it: a topic or a path is quoted, as TOML writes it."""
+    return f'"{key}"' if _QUOTED.search(key) else key
 
 
 def panel_texts(value: Any, place: str = "") -> Iterator[tuple[str, PanelText]]:
@@ -17,7 +25,7 @@ def panel_texts(value: Any, place: str = "") -> Iterator[tuple[str, PanelText]]:
             yield from panel_texts(element, f"{place}[{i}]")
     elif isinstance(value, Mapping):
         for key, element in value.items():
-            yield from panel_texts(element, f"{place}.{key}")
+            yield from panel_texts(element, f"{place}.{key_in_place(str(key))}")
     elif isinstance(value, BaseModel):
         for name, about in type(value).model_fields.items():
             key = about.alias or name

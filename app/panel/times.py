@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from app.errors import Fault
 from app.panel.constants import NUMBERS
+from app.system.errors import Fault
 
 TIME: Final = "builtin_interfaces/msg/Time"
 DURATION: Final = "builtin_interfaces/msg/Duration"

@@ -6,15 +6,15 @@ from typing import Annotated, Any, Final
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from app.alarms.event_names import EVENT_NAMES
-from app.alarms.history import MAX_PAGE, NEWEST, HistoryFilter
-from app.clock import iso_time
-from app.commands.act_receipt import ActReceipt
-from app.commands.alarm_acts import ALARM_ACTS
-from app.commands.press import PRESS_ID
-from app.commands.receipts import Receipt
-from app.web.receipt_answer import ReceiptAnswer
-from app.web.rendering.alarm_choice import AlarmChoice, Show, Sort
+from app.cell.alarms.history import EVENT_NAMES, MAX_PAGE, NEWEST, HistoryFilter
+from app.cell.commands.acts import ActReceipt
+from app.cell.commands.alarm_acts import ALARM_ACTS
+from app.cell.commands.press import PRESS_ID
+from app.cell.commands.receipts import Receipt
+from app.system.clock import iso_time
+from app.web.answers import ReceiptAnswer
+from app.web.pages.alarms import AlarmChoice, Show, Sort
+from app.web.requests import Moment
 
 MANY: Final = sys.maxsize
 MAX_ACKNOWLEDGED: Final = 500  # alarms in one request
@@ -36,8 +36,8 @@ class AlarmQuery(BaseModel):
     history: bool = False
     before: Annotated[int, Field(ge=1, lt=2**62)] | None = None
     limit: Annotated[int, Field(ge=1, le=MAX_PAGE)] = 100
-    since: AwareDatetime | None = None
-    until: AwareDatetime | None = None
+    since: Moment | None = None
+    until: Moment | None = None
     text: Annotated[str, Field(max_length=100)] = ""
     priority: Annotated[int, Field(ge=0, le=4)] = 0
     robot: Annotated[str, Field(max_length=64)] = ""
@@ -79,9 +79,9 @@ class AlarmActBody(BaseModel):
 
     occurrence: Occurrence | None = None
     reason: Annotated[str, Field(max_length=200)] = ""
-    until: AwareDatetime | None = None
+    until: Moment | None = None
     for_s: Annotated[float, Field(gt=0, le=86_400)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(max_length=40)] = ""
 
@@ -107,7 +107,7 @@ class AcknowledgeBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     alarms: Annotated[dict[str, Occurrence], Field(max_length=MAX_ACKNOWLEDGED)]
-    at: AwareDatetime | None = None
+    at: Moment | None = None
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(max_length=40)] = ""
 

@@ -6,15 +6,14 @@ import time
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from app.alarms.instance import AlarmInstance
-from app.commands.ack_commands import press_id_of, press_of, sentence_of
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.receipts import Receipt
-from app.i18n import Text, TextLike, say
-from app.permission.confirmations import ConfirmedBy
-from app.permission.principal import Principal
-from app.runtime.robot_session import RobotSession
+from app.cell.alarms.states import AlarmInstance
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.alarm_acts import press_id_of, press_of, sentence_of
+from app.cell.commands.receipts import Receipt
+from app.cell.permission.roles import ConfirmedBy
+from app.cell.session.session import RobotSession
+from app.records.principal import Principal
+from app.system.texts import Text, TextLike, say
 from app.web.alarm_answers import AlarmActBody
 from app.web.app_state import AppState
 

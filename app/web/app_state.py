@@ -7,30 +7,30 @@ from typing import Annotated
 from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
 
-from app.access.access import Access
-from app.access.confirmer import Confirmer
-from app.audit import NullLog, OperatorLog
-from app.audit.press_record import PressLog
-from app.commands.acts import ActContext, ActRunner
-from app.commands.press_limits import PressLimits
-from app.commands.receipts import Receipt
-from app.commands.user_acts import USER_ACTS
-from app.concurrency import InFlight
-from app.i18n import TextLike
-from app.permission.clients import Clients
-from app.runtime.doctor_process import DoctorProcess
-from app.runtime.fleet import Fleet
-from app.runtime.robot_session import RobotSession
+from app.cell.commands.acts import ActContext, ActRunner
+from app.cell.commands.judge import PressLimits
+from app.cell.commands.receipts import Receipt
+from app.cell.commands.user_acts import USER_ACTS
+from app.cell.people.access import Access
+from app.cell.people.confirmer import Confirmer
+from app.cell.session.doctor_process import DoctorProcess
+from app.cell.session.fleet import Fleet
+from app.cell.session.session import RobotSession
+from app.records import NullLog, OperatorLog
+from app.records.press_record import PressLog
+from app.records.principal import Clients
+from app.system.concurrency import BuiltOnce, InFlight
+from app.system.texts import TextLike
 from app.web.assets import Assets
-from app.web.metrics import Metrics
-from app.web.page_trips import PageTrips
-from app.web.rendering.page_templates import PageTemplates
-from app.web.shared_recordings import SharedRecordings
+from app.web.downloads import SharedRecordings
+from app.web.metrics import Metrics, PageTrips
+from app.web.pages.page_templates import PageTemplates
 
 
 @dataclass(slots=True)
 class AppState:
-    """The state that requests need."""
+    """The state that requests need. `description` is that of all paths, as JSON and packed, if it was
+    requested."""
 
     fleet: Fleet
     assets: Assets
@@ -44,6 +44,7 @@ class AppState:
     page_trips: PageTrips = field(default_factory=PageTrips)
     in_flight: InFlight = field(default_factory=InFlight)
     shared: SharedRecordings = field(default_factory=SharedRecordings)
+    description: BuiltOnce[tuple[bytes, bytes]] | None = None
     user_acts: ActRunner[Access] = field(init=False)
     confirmer: Confirmer = field(init=False)
 

@@ -7,8 +7,8 @@ from typing import Final
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import KioskError
-from app.web.serving import bounded
+from app.system.errors import KioskError
+from app.web.server import bounded
 
 KEY: Final = "panel.send"
 

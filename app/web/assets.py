@@ -1,28 +1,35 @@
 """The static files, in memory and packed, under a name that changes with their content.
 
 The stylesheet is the layers of `static/css` in their order, with what families of the panel's widgets
-need and its millimetres: one request instead of five; what only the log's page, the gallery or a keypad
-that opens needs is a file of its own.
+need and its millimetres, and on a page with kinds of widgets that have a stylesheet, with that: one
+request for all. What only the log's page, the gallery or a keypad that opens needs is a file by itself.
 Scripts keep their names, so that modules find each other, and their lines. Pages with a kind of widgets
-load its own stylesheet and script, if its row in the table of kinds has them. Comments, what lines
-are indented by and what only sets styles apart stay here.
+load its script, if its row in the table of kinds has one. Comments, what lines are indented by and what
+only sets styles apart stay here.
 """
 
+import base64
 import gzip
 import hashlib
+import posixpath
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Final
 
-from app.errors import KindError
-from app.panel.font import Font, font_format
+from markupsafe import Markup
+
+from app.panel.keys import Font, font_format
 from app.panel.rules import BrandRules
 from app.panel.widgets.kinds import KINDS
+from app.system.errors import KindError
+from app.system.settings import shipped_path
 
+SHEET: Final = "kiosk"
 LAYERS: Final = (
-    "guard", "tokens", "base", "grid", "layout", "frame", "widgets", "ask", "keys", "floor",
+    "guard", "tokens", "base", "grid", "layout", "states", "header", "menu", "control", "frame",
+    "widgets", "ask", "keys", "floor",
 )  # fmt: skip
 SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds of widgets
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
@@ -30,6 +37,10 @@ OWN_PAGES: Final = (
     "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "diagnostics", "recipes", "help",
     "overview", "signin", "users", "confirm",
 )  # fmt: skip
+# What stylesheets of pages have in common, by the page: it comes before its own.
+COMMON: Final = {
+    "signin": ("forms", "pad"), "users": ("forms",), "recipes": ("forms",), "confirm": ("pad",),
+}  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
@@ -42,6 +53,7 @@ LEFT_OUT: Final = {
         re.MULTILINE,
     ),
 }
+IMPORT: Final = re.compile(r'^(?:import|export)\b[^"();=]*"(\.{1,2}/[^"]+)"', re.MULTILINE)
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 FONTS: Final = "fonts"
 FONT_WEIGHTS: Final = {"regular": "400", "bold": "600 700"}
@@ -79,11 +91,48 @@ class Assets:
     files: dict[str, Asset]
     revision: str
     own_fonts: tuple[str, ...] = ()  # the names of the files of the panel's fonts
-    # The kinds of widgets that have a script of their own, and those that have a stylesheet.
-    scripts: ClassVar[frozenset[str]] = frozenset(name for name, kind in KINDS.items() if kind.script)
+    imports: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # script → those it imports
+    layers: Asset = Asset(b"", "text/css", b"")  # the stylesheet without the panel's styles
+    panel_styles: tuple[Path, ...] = ()
+    # The kinds of widgets that have a script, with its name, and those that have a stylesheet.
+    scripts: ClassVar[Mapping[str, str]] = {
+        name: name if kind.script is True else kind.script
+        for name, kind in KINDS.items()
+        if kind.script
+    }
     styles: ClassVar[frozenset[str]] = frozenset(
         name for name, kind in KINDS.items() if "own" in kind.styles
     )
+
+    def sheet(self, kinds: Collection[str]) -> str:
+        """The name of the stylesheet of a page with these kinds of widgets, without ".css"."""
+        own = [kind for kind in KINDS if kind in kinds and kind in self.styles]
+        name = "-".join([SHEET, *own])
+        if f"{name}.css" not in self.files:
+            parts = [self.layers, *(self.files[f"kinds/{kind}.css"] for kind in own)]
+            content = b"\n".join(part.content for part in parts)
+            joined = Asset(content, self.layers.media_type, gzip.compress(content, mtime=0))
+            self.files[f"{name}.css"] = _with_styles(joined, self.panel_styles)
+        return name
+
+    def modules(self, scripts: Iterable[str], kinds: Iterable[str] = ()) -> list[str]:
+        """These scripts, without ".js", those of kinds of widgets, and all that they import, each
+        once."""
+        of_kinds = (f"kinds/{self.scripts[kind]}" for kind in kinds if kind in self.scripts)
+        every = dict.fromkeys(f"{script}.js" for script in (*scripts, *of_kinds))
+        waiting = [*every]
+        for script in waiting:
+            further = [name for name in self.imports.get(script, ()) if name not in every]
+            every |= dict.fromkeys(further)
+            waiting += further
+        return [script.removesuffix(".js") for script in every]
+
+
+def _imported(script: str, content: bytes) -> tuple[str, ...]:
+    """The names of the scripts that a script imports as it starts."""
+    folder = posixpath.dirname(script)
+    names = IMPORT.findall(content.decode())
+    return tuple(posixpath.normpath(posixpath.join(folder, name)) for name in names)
 
 
 def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
@@ -151,13 +200,14 @@ def load_assets(
     millimetre = f":root{{{own}}}\n".encode()
     named_fonts = "".join(font_styles(own_fonts)).encode()
     sheet = asset(b"".join([*layers, named_fonts, millimetre]), ".css")
-    files = {"kiosk.css": _with_styles(sheet, styles)}
+    files = {f"{SHEET}.css": _with_styles(sheet, styles)}
     of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}
     apart = {name: static / "css" / f"{name}.css" for name in (*OWN_PAGES, LATER)}
     if (gallery := static / "css" / f"{GALLERY}.css").exists():
         apart[GALLERY] = gallery
     for name, file in (apart | of_kinds).items():
-        files[f"{name}.css"] = asset(file.read_bytes(), ".css")
+        parts = [*(static / "css" / f"{part}.css" for part in COMMON.get(name, ())), file]
+        files[f"{name}.css"] = asset(b"".join(part.read_bytes() for part in parts), ".css")
     scripts = static / "js"
     for script in sorted(scripts.rglob("*.js")):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
@@ -175,7 +225,10 @@ def load_assets(
         digest.update(name.encode() + b"\0" + sent.content + b"\0")
     for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
-    return Assets(files, digest.hexdigest()[:12], tuple(of_panel))
+    imports = {
+        name: _imported(name, sent.content) for name, sent in files.items() if name.endswith(".js")
+    }
+    return Assets(files, digest.hexdigest()[:12], tuple(of_panel), imports, sheet, tuple(styles))
 
 
 def require_files(static: Path, templates: Path) -> None:
@@ -185,10 +238,27 @@ def require_files(static: Path, templates: Path) -> None:
         parts = {
             "template": (True, templates / f"widgets/{name}.html"),
             "stylesheet": ("own" in kind.styles, static / f"css/kinds/{name}.css"),
-            "script": (kind.script, static / f"js/kinds/{name}.js"),
+            "script": (bool(kind.script), static / f"js/kinds/{Assets.scripts.get(name, name)}.js"),
         }
         for part, (is_named, file) in parts.items():
             if is_named and not file.is_file():
                 raise KindError(name, part, f"add {file}")
             if file.is_file() and not is_named:
                 raise KindError(name, part, f"name it in the row of KINDS, or remove {file}")
+
+
+# The script in each page that runs before its modules: it has no file that could be missing.
+
+
+def _script() -> str:
+    """The script of `static/js/guard.js` as it is sent."""
+    return asset((shipped_path("static") / "js/guard.js").read_bytes(), ".js").content.decode()
+
+
+def script_hash(script: str) -> str:
+    """The source of a Content-Security-Policy that permits this inline script alone."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+PAGE_GUARD: Final = Markup(_script())
+PAGE_GUARD_HASH: Final = script_hash(PAGE_GUARD)

@@ -1,37 +1,59 @@
 """Answers for errors: a page for a browser, JSON for a program."""
 
+import logging
 import traceback
 from collections.abc import Callable
 from typing import Any, Final
 
 from fastapi import Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
+from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from app.errors import KioskError, RoleNeeded, TooMany, TooSlow
-from app.i18n import TextLike, render, say
-from app.printable import printable
+from app.system.errors import KioskError, RoleNeeded, TooMany, TooSlow
+from app.system.printable import printable
+from app.system.texts import TextLike, render, say
 from app.web.app_state import site_of
 from app.web.language import language_of
-from app.web.rendering.display_choice import display_of
+from app.web.pages.context import FramedPage, framed_page
+from app.web.path_methods import methods_of
+from app.web.security import SECURITY_HEADERS
+
+log = logging.getLogger("kiosk.web")
 
 TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 
 
 def error_answer(request: Request, status: int, message: TextLike, sign_in: bool = False) -> Response:
-    """An error for whom it is: a page for who reads pages, JSON for programs. `sign_in`: the page leads
-    to the sign-in."""
+    """An error for whom it is: a page for who reads pages, in the frame with Stop, JSON for programs.
+    `sign_in`: the page leads to the sign-in."""
     site, language = site_of(request), language_of(request)
     if "text/html" not in request.headers.get("accept", ""):
         return JSONResponse({"error": render(message, language)}, status_code=status)
-    panel = site.fleet.panel
-    display = display_of(request, panel)
-    context = {"site": site, "panel": panel, "display": display, "status": status, "message": message}
+    context = {"message": message, "status": status}
     context["sign_in"] = say("signin_sign_in") if sign_in else ""
-    html = site.templates.render("error.html", language, **context)
-    return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
+    robot = request.path_params.get("robot", "")
+    page = FramedPage(
+        "error.html",
+        say("page_failed_title"),
+        robot if robot in {entry.id for entry in site.fleet.panel.robots} else "",
+        own_path="/",
+        status=status,
+    )
+    try:
+        return framed_page(request, site, page, context)
+    except Exception:
+        log.exception("the page of an error can't be shown")
+        return PlainTextResponse(render(message, language), status)
+
+
+async def on_unexpected(request: Request, error: Exception) -> Response:
+    """A fault of this program, which the server's log has. No other layer sees this answer."""
+    answer = error_answer(request, 500, say("page_failed"))
+    for name, value in SECURITY_HEADERS.items():
+        answer.headers.setdefault(name, value)
+    return answer
 
 
 async def on_kiosk_error(request: Request, error: Exception) -> Response:
@@ -67,8 +89,8 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     message = say(code, path=printable(request.url.path)[:200])
     answer = error_answer(request, error.status_code, message)
     answer.headers.update(error.headers or {})
-    if answer.headers.get("allow") == "GET":
-        answer.headers["allow"] = "GET, HEAD"
+    if error.status_code == 405 and (methods := methods_of(request)):
+        answer.headers["allow"] = ", ".join(sorted(methods))  # the router names the first route's only
     return answer
 
 
@@ -83,4 +105,5 @@ HANDLERS: Final[dict[int | type[Exception], Callable[..., Any]]] = {
     HTTPException: on_http_error,
     ClientDisconnect: on_gone,
     RequestValidationError: on_invalid,
+    Exception: on_unexpected,
 }

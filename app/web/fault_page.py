@@ -12,7 +12,7 @@ from typing import Final
 from fastapi import FastAPI, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 
-from app.printable import printable
+from app.system.printable import printable
 from app.web.error_pages import TRY_AGAIN
 from app.web.security import RequestGuard
 

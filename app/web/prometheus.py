@@ -1,5 +1,6 @@
 """The counts in Prometheus's text format, gathered when it asks."""
 
+import time
 from collections import Counter
 from collections.abc import Iterator
 from itertools import product
@@ -13,11 +14,11 @@ from prometheus_client.core import (
 )
 from prometheus_client.registry import Collector
 
-from app.alarms.rows import LISTED_STATES
-from app.alarms.shown import PRIORITIES
-from app.runtime.alarm_mqtt import AlarmMqtt
-from app.runtime.alarms import Alarms
-from app.runtime.fleet import Fleet
+from app.cell.alarms.shown import LISTED_STATES, PRIORITIES
+from app.cell.permission.robot_options import options_now
+from app.cell.session.alarm_mqtt import AlarmMqtt
+from app.cell.session.alarms import Alarms
+from app.cell.session.fleet import Fleet
 from app.web.metrics import Metrics
 
 
@@ -99,6 +100,11 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
     unreadable = CounterMetricFamily(
         "kiosk_undecodable", "Samples looked at that were not their type", labels=["robot", "key"]
     )
+    listed = GaugeMetricFamily(
+        "kiosk_options_known",
+        "1 while the robot's list of options is known",
+        labels=["robot", "select"],
+    )
     for session in fleet.sessions:
         robot, name = session.robot, session.entry.id if session.entry else ""
         up.add_metric([name], int(robot.link_up))
@@ -106,4 +112,8 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
         ready.add_metric([name], int(session.link_verdict.permitted))
         for key, count in robot.traffic.undecodable.items():
             unreadable.add_metric([name, key], count)
-    yield from (up, bridges, ready, unreadable)
+        for select in session.panel.listed_selects:
+            if select.options_from is not None:
+                now = options_now(select, select.options_from, robot, time.monotonic())
+                listed.add_metric([name, select.id], int(now.verdict.permitted))
+    yield from (up, bridges, ready, unreadable, listed)

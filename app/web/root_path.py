@@ -9,8 +9,8 @@ from typing import Final
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn import Config as ServerConfig
 
-from app.errors import SettingsError
-from app.settings import Settings, parse_root_path
+from app.system.errors import SettingsError
+from app.system.settings import Settings, parse_root_path
 
 # How the panel's own paths begin.
 OWN_PATHS: Final = frozenset(

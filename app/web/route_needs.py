@@ -9,20 +9,20 @@ from typing import Final
 
 from starlette.requests import HTTPConnection
 
-from app.errors import RoleNeeded
-from app.i18n import say
+from app.cell.permission.roles import role_name, unmet
 from app.panel.layout import Page
-from app.permission.principal import Principal
-from app.permission.role_locks import role_name, unmet
-from app.roles import ANYBODY, ENGINEER, MAINTENANCE, OPERATOR
+from app.panel.roles import ANYBODY, ENGINEER, MAINTENANCE, OPERATOR
+from app.records.principal import Principal
+from app.system.errors import RoleNeeded
+from app.system.texts import say
 from app.web.app_state import AppState, site_of
-from app.web.client_cookie import caller
+from app.web.client import caller
 
 LOCAL_ONLY: Final = "local"  # an operator, or anybody on the server's own machine
 ROBOT: Final = "/robots/{robot}"  # stands before the paths of one of several robots
 
 ROUTE_NEEDS: Final[Mapping[str, str]] = {
-    # What everybody sees.
+    # What everyone sees.
     "/": ANYBODY,
     "/pages/{page}": ANYBODY,
     "/events": ANYBODY,
@@ -59,6 +59,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/control/{act}": ANYBODY,
     "/diagnostics/{act}": ANYBODY,
     "/recipes/{set}/{act}": ANYBODY,
+    "/recipes/{set}/import": ANYBODY,
     # What has been, and what the robot is asked.
     "/widgets/{widget}/read": OPERATOR,
     "/alarms/history": OPERATOR,

@@ -1,15 +1,14 @@
-"""All routes of the application."""
+"""All routes of the application but the gallery, which `main` adds in development."""
 
-import logging
-from importlib.util import find_spec
 from typing import Final
 
 from fastapi import Depends, FastAPI
 
 from app.web.app_state import named_robot
-from app.web.openapi_parts import errors
+from app.web.path_methods import PathMethods
+from app.web.requests import errors
+from app.web.route_needs import ROBOT
 from app.web.routes import (
-    alarm_confirm,
     alarm_history,
     alarm_report,
     alarms,
@@ -22,52 +21,40 @@ from app.web.routes import (
     frames,
     health,
     help,
-    hold_socket,
+    holds,
     lock_help,
-    log_lines,
-    oidc,
     pages,
     parameters,
-    press_socket,
     presses,
-    recipe_confirm,
     recipes,
     recordings,
-    session,
-    signin,
+    sign_in,
     static,
-    trends,
     users,
+    widget_data,
 )
 from app.web.routes import audit_log as log_routes
-
-log = logging.getLogger("kiosk")
 
 # With several robots, their paths stand below that of each.
 ROBOT_ROUTES: Final = (
     pages,
     events,
     presses,
-    press_socket,
     confirm,
     control,
-    hold_socket,
+    holds,
     parameters,
     frames,
-    log_lines,
+    widget_data,
     lock_help,
-    trends,
-    recipe_confirm,
     recipes,
 )
-ALARM_ROUTES: Final = (alarms, alarm_confirm, alarm_history, alarm_report)
+ALARM_ROUTES: Final = (alarms, alarm_history, alarm_report)
 OTHER_ROUTES: Final = (
     diagnostics,
     recordings,
     help,
-    session,
-    signin,
-    oidc,
+    sign_in,
     users,
     static,
     health,
@@ -76,24 +63,16 @@ OTHER_ROUTES: Final = (
 )
 
 
-def add_routes(app: FastAPI, dev: bool) -> None:
+def add_routes(app: FastAPI) -> None:
     """FastAPI builds a router's routes when the first request comes to it. Those of several robots are
     last: no page of a panel with one robot requests them. The others are built by the first health
     check, so that the first page does not wait for it."""
+    methods = app.state.path_methods = PathMethods()
     for routes in (*ROBOT_ROUTES, *ALARM_ROUTES, *OTHER_ROUTES):
         app.include_router(routes.router)
-    if dev:
-        _add_gallery(app)
+        methods.add(routes.router.routes)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
+    methods.add(log_routes.router.routes)
     for routes in ROBOT_ROUTES:
-        app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-
-
-def _add_gallery(app: FastAPI) -> None:
-    """The gallery is a part of the checkout only, not of the installed package."""
-    if find_spec("app.web.routes.gallery") is None:
-        log.info("/gallery is not in the installed package: `make dev` in a checkout has it")
-        return
-    from app.web.routes import gallery
-
-    app.include_router(gallery.router)
+        app.include_router(routes.router, prefix=ROBOT, dependencies=[Depends(named_robot)])
+        methods.add(routes.router.routes, ROBOT)

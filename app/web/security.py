@@ -11,13 +11,17 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import HTTPConnection
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.panel.rules import EmbedRules
-from app.printable import printable
-from app.web.embedding import from_frame, only_shows
-from app.web.page_guard import PAGE_GUARD_HASH
+from app.system.printable import printable
+from app.system.texts import render, say
+from app.web.app_state import AppState
+from app.web.assets import PAGE_GUARD_HASH
+from app.web.client import bearer_of, from_frame, only_shows
+from app.web.language import language_of
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
@@ -29,6 +33,10 @@ POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
 SECURE: Final = frozenset({"https", "wss"})
 HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:\d{1,5})?")
+PROXY: Final = (
+    ", but the panel was reached by HTTP: a proxy with TLS sends X-Forwarded-Proto, and KIOSK_PROXIES "
+    "names it"
+)
 NO_FRAMES: Final = EmbedRules()
 OWN_SITE: Final = frozenset({"same-origin", "none"})
 
@@ -94,9 +102,11 @@ class RequestGuard:
         for site in headers.getlist("sec-fetch-site"):
             if site not in OWN_SITE:
                 return f"a page of another site ({site}) asked for this"
+        scheme = "https" if scope["scheme"] in SECURE else "http"
         for origin in headers.getlist("origin"):
-            if _host_of(origin) != host:
-                return f'a page of "{origin}" asked for this'
+            if (parts := _parts_of(origin)) != (scheme, host):
+                hint = PROXY if parts == ("https", host) else ""
+                return f'a page of "{origin}" asked for this{hint}'
         if moves(scope) and only_shows(self._embed, from_frame(scope)):
             return "a page in a frame asked for this: open the panel itself"
         return None
@@ -135,14 +145,45 @@ async def refuse(answer: Response, scope: Scope, receive: Receive, send: Send) -
     await answer(scope, receive, secured(send))
 
 
-def _host_of(origin: str) -> str | None:
+def _parts_of(origin: str) -> tuple[str, str] | None:
+    """The scheme and the host of an origin."""
     try:
-        return urlsplit(origin).netloc.lower()
+        parts = urlsplit(origin)
     except ValueError:
         return None
+    return parts.scheme, parts.netloc.lower()
 
 
 def _without_port(host: str) -> str | None:
     """`localhost:8000` → `localhost`; an IPv6 address keeps its brackets; None if it is no host."""
     match = HOST.fullmatch(host)
     return match["name"] if match else None
+
+
+# Refuses the requests of programs whose token is not known or makes too many, before anything else
+# reads them. Pure ASGI, for WebSockets too.
+
+CHALLENGE: Final = {"www-authenticate": 'Bearer realm="operator-panel", error="invalid_token"'}
+AGAIN: Final = {"retry-after": "1"}
+
+
+class BearerGuard:
+    """Lets requests without a token through, and all of a panel without users."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] in ("http", "websocket"):
+            connection = HTTPConnection(scope)
+            bearer = bearer_of(connection.headers.get("authorization", ""))
+            state: AppState | None = getattr(scope["app"].state, "app_state", None)
+            if bearer and state is not None and state.access.configured:
+                known = state.access.knows(bearer)
+                if not known or not state.access.admit_token(bearer):
+                    sentence = say("token_too_often" if known else "token_unknown")
+                    content = {"error": render(sentence, language_of(connection))}
+                    status, headers = (429, AGAIN) if known else (401, CHALLENGE)
+                    await refuse(JSONResponse(content, status, headers), scope, receive, send)
+                    return
+        await self._app(scope, receive, send)

@@ -3,17 +3,16 @@
 import logging
 from functools import partial
 
-from app.access.access import EndReason
-from app.access.confirmer import able_users
-from app.access.sessions import Session
-from app.commands.alarm_acts import confirm_key
-from app.commands.recipe_acts import edit_key
-from app.panel.widgets.confirmed import confirmation_of
-from app.permission.confirmations import confirm_lock
-from app.permission.principal import Principal
-from app.permission.role_locks import hardest, role_name
-from app.permission.verdict import Verdict
-from app.roles import MAINTENANCE, OPERATOR
+from app.cell.commands.alarm_acts import confirm_key
+from app.cell.commands.recipe_acts import edit_key
+from app.cell.people.access import EndReason
+from app.cell.people.confirmer import able_users
+from app.cell.people.sessions import Session
+from app.cell.permission.roles import confirm_lock, role_name, strictest
+from app.cell.permission.verdict import Verdict
+from app.panel.roles import MAINTENANCE, OPERATOR
+from app.panel.widgets.key_parts import confirmation_of
+from app.records.principal import Principal
 from app.web.app_state import AppState
 
 log = logging.getLogger("kiosk.access")
@@ -26,7 +25,7 @@ def renew_audiences(state: AppState) -> None:
 
 
 def release_control(state: AppState, session: Session, reason: EndReason) -> None:
-    """A browser where nobody is signed in has no control; a hand-over passes it to the next user."""
+    """A browser where no one is signed in has no control; a hand-over passes it to the next user."""
     if reason == "hand_over":
         return
     who = Principal(session.client)
@@ -50,7 +49,7 @@ def renew_confirm_locks(state: AppState) -> None:
         confirmed.append((edit_key(table.id), table.confirm_edit or "", frozenset({MAINTENANCE})))
     locks: dict[str, Verdict] = {}
     for name, confirmation, needs in confirmed:
-        role = role_name(hardest(needs)) if needs else ""
+        role = role_name(strictest(needs)) if needs else ""
         if confirmation and (lock := confirm_lock(confirmation, needs, users, role, provider)):
             locks[name] = lock
     if locks == state.fleet.confirm_locks.verdicts:
@@ -75,7 +74,7 @@ def follow_users(state: AppState) -> None:
     """Has control released and the browsers' views renewed when users sign in or out."""
     if not state.access.configured:
         may = "may do everything" if state.access.rules.open else "may only watch"
-        log.info('no users: everybody at this panel %s. "operator-panel users add" adds users', may)
+        log.info('no users: everyone at this panel %s. "operator-panel users add" adds users', may)
     renew_confirm_locks(state)
     state.access.on_change(partial(renew_confirm_locks, state))
     state.access.on_end(partial(release_control, state))

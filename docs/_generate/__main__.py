@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from bench.report.pages import comparison_table, last_results, readme_section
 from docs._generate.findings import findings_tables
 from docs._generate.icon_names import icon_list
 from docs._generate.keys import key_tables
@@ -32,6 +33,8 @@ def files() -> Iterator[tuple[Path, str]]:
         "reference/settings.md": {"settings": settings_table()},
         "reference/sentences.md": {"sentences": sentences_table()},
         "how-to/doctor.md": findings_tables(),
+        "comparison.md": {"figures": comparison_table(last_results())},
+        "../README.md": {"figures": readme_section(last_results())},
         "architecture.md": {"paths": paths_table(), "models": models_table()},
     }
     for name, parts in pages.items():

@@ -1,8 +1,8 @@
-"""The tables of findings in docs/how-to/doctor.md, made from app/diagnose/wording.py."""
+"""The tables of findings in docs/how-to/doctor.md, made from app/tools/doctor/wording.py."""
 
 import re
 
-from app.diagnose.findings import KINDS, SEVERITIES
+from app.tools.doctor.findings import KINDS, SEVERITIES
 
 
 def findings_tables() -> dict[str, str]:
@@ -12,7 +12,7 @@ def findings_tables() -> dict[str, str]:
 
 def _table(severity: str) -> str:
     rows = [
-        (f"`{code}`", _shown(kind.sentence), _shown(kind.do))
+        (f"`{code}`", _italic_names(kind.sentence), _italic_names(kind.do))
         for code, kind in KINDS.items()
         if kind.severity == severity
     ]
@@ -20,7 +20,7 @@ def _table(severity: str) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _shown(sentence: str) -> str:
+def _italic_names(sentence: str) -> str:
     """With `…` for the name that it is about, and names of the other parameters in italics."""
     text = sentence.replace("{about}", "…").replace("{hint}", "")
     return re.sub(r"\{(\w+)\}", lambda match: f"*{match[1].replace('_', ' ')}*", text)

@@ -1,23 +1,22 @@
 """The tables of keys in docs/reference/panel-file.md, made from the schema of the panel file."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+from app.panel.base import TEXTS
+from app.system.toml_values import key_text
 from docs._generate.schema import REF, ROOT, SAME, WIDGET, WORDS, Schema, of_kind, panel_schema
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
 EXACT: Final = 2**53  # the limit of every number in a browser: it is described once, not at each key
-NOUNS: Final = {"string": "text", "number": "number", "integer": "whole number", "object": "table"}
-LIMITS: Final = {
-    "minimum": "{} or more",
-    "exclusiveMinimum": "more than {}",
-    "maximum": "{} or less",
-    "exclusiveMaximum": "less than {}",
-    "minLength": "{} or more characters",
-    "maxLength": "{} characters or less",
-}
+COMMON: Final = 2  # a key that so many tables describe in the same words is described once
+COMMON_KEYS: Final = "common keys"
+NOUNS: Final = {"string": "text", "number": "number", "integer": "integer", "object": "table"}
+LEAST: Final = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("minLength", "≥"))
+MOST: Final = (("maximum", "≤"), ("exclusiveMaximum", "<"), ("maxLength", "≤"))
 
 
 def key_tables() -> dict[str, str]:
@@ -26,7 +25,15 @@ def key_tables() -> dict[str, str]:
     tables = {ROOT: schema, **schema["definitions"]}
     del tables[WIDGET]
     examples = examples_of(tables)
-    return {f"keys {name}": _table(name, table, examples) for name, table in tables.items()}
+    rows = {name: _rows(name, table, examples) for name, table in tables.items()}
+    count = Counter(row.said for table in rows.values() for row in table)
+    often = {said[0]: said for said, number in reversed(count.most_common()) if number >= COMMON}
+    common = {*often.values()}  # of each key what most tables say
+    first = {row.said: row for table in reversed(rows.values()) for row in table if row.said in common}
+    return {
+        f"keys {COMMON_KEYS}": _lines(sorted(first.values(), key=lambda row: row.key)),
+        **{f"keys {name}": _with_common(table, common) for name, table in rows.items()},
+    }
 
 
 def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
@@ -59,16 +66,47 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
     return needs | grow | label | source | robot | examples | own
 
 
-def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:
-    lines = [["Key", "Value", "Default", "Example", "What it means"], ["---"] * 5]
+class Row(NamedTuple):
+    """A key of a table, as its page has it."""
+
+    key: str
+    value: str
+    default: str
+    example: str
+    meaning: str
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What is said of the key, without the example."""
+        return self.key, self.value, self.default, self.meaning
+
+
+def _with_common(rows: Sequence[Row], common: Collection[tuple[str, ...]]) -> str:
+    """The table's own keys, then the names of those that are described once for all."""
+    names = [f"`{row.key}`" for row in rows if row.said in common]
+    own = [row for row in rows if row.said not in common]
+    parts = [_lines(own)] if own else []
+    if names:
+        parts.append(f"[Common keys](#common-keys): {', '.join(names)}.")
+    return "\n\n".join(parts)
+
+
+def _lines(rows: Sequence[Row]) -> str:
+    cells = [["Key", "Value", "Default", "Example", "What it means"], ["---"] * 5]
+    cells += [[f"`{row.key}`", *row[1:]] for row in rows]
+    return "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in cells
+    )
+
+
+def _rows(name: str, table: Schema, examples: Mapping[str, Any]) -> list[Row]:
+    rows = []
     for key, prop in sorted(table["properties"].items(), key=lambda row: row[0] != "id"):
         needed = key in table.get("required", ())
         default = "**required**" if needed else _code(prop["default"]) if "default" in prop else "–"
         example = "–" if _is_table(prop) else _code(examples[f"{name}.{key}"])
-        lines.append([f"`{key}`", words(prop), default, example, prop["description"]])
-    return "\n".join(
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
-    )
+        rows.append(Row(key, words(prop), default, example, prop["description"]))
+    return rows
 
 
 def _is_table(prop: Schema) -> bool:
@@ -91,21 +129,24 @@ def words(prop: Schema) -> str:
     if "$ref" in prop:
         return f"[table](#{_anchor(prop['$ref'])})"
     if "anyOf" in prop:
-        return " or ".join(map(words, prop["anyOf"]))
+        choices = list(map(words, prop["anyOf"]))
+        if choices[1:] == [TEXTS] and choices[0].startswith("text"):
+            return choices[0].replace("text", "[texts](#values)", 1)
+        return " or ".join(choices)
     if _by_name(prop):
         return f"[tables](#{_anchor(prop['additionalProperties']['$ref'])}), by name"
     match prop.get("type"):
         case None:
             return "any value"
         case "boolean":
-            return "`true` or `false`"
+            return "boolean"
         case "array" if "$ref" in prop["items"]:
             return f"[list of tables](#{_anchor(prop['items']['$ref'])})"
         case "array":
             return f"list: {words(prop['items'])}"
         case kind:
             noun = prop.get("title", NOUNS[kind])
-            return ", ".join([noun, *_limits(prop)])
+            return f"{noun} {', '.join(_limits(prop))}".rstrip()
 
 
 def _anchor(ref: str) -> str:
@@ -113,10 +154,14 @@ def _anchor(ref: str) -> str:
 
 
 def _limits(prop: Schema) -> Iterator[str]:
-    for limit, words in LIMITS.items():
-        value = prop.get(limit)
-        if value is not None and abs(value) != EXACT and (limit, value) != ("minLength", 1):
-            yield words.format(toml(value))
+    """The range of a number, or of a text's length."""
+    if "minimum" in prop and "maximum" in prop and abs(prop["minimum"]) != EXACT != prop["maximum"]:
+        yield f"{toml(prop['minimum'])} … {toml(prop['maximum'])}"
+        return
+    for name, sign in (*LEAST, *MOST):
+        limit = prop.get(name)
+        if limit is not None and abs(limit) != EXACT and (name, limit) != ("minLength", 1):
+            yield f"{sign} {toml(limit)}"
 
 
 def _code(value: Any) -> str:
@@ -134,5 +179,7 @@ def toml(value: Any) -> str:
         case list():
             return f"[{', '.join(map(toml, value))}]"
         case dict():
-            return f"{{ {', '.join(f'{key} = {toml(item)}' for key, item in value.items())} }}"
+            return (
+                f"{{ {', '.join(f'{key_text(key)} = {toml(item)}' for key, item in value.items())} }}"
+            )
     return f"{value}"

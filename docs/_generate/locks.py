@@ -11,8 +11,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
-from app.i18n import ENGLISH, sentences
-from app.i18n.locales import own_name
+from app.system.texts import ENGLISH, sentences
+from app.system.texts.locales import own_name
 
 SENTENCES: Final = sentences(ENGLISH)
 FILE: Final = Path(__file__).with_name("locks.toml")

@@ -13,10 +13,10 @@ from typing import Any, Final, get_args
 
 from pydantic import BaseModel
 
-from app import i18n
-from app.i18n import BETWEEN, ENGLISH, sentences
-from app.panel.panel_keys import PanelKeys
-from app.panel.same_widgets import SameWidget
+from app.panel.file.same_widgets import SameWidget
+from app.panel.keys import PanelKeys
+from app.system import texts as i18n
+from app.system.texts import BETWEEN, ENGLISH, sentences
 from docs._generate.locks import shown
 from docs._generate.schema import ROOT, SAME, of_kind
 
@@ -24,17 +24,17 @@ SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
 METHODS: Final = ("get", "post", "head", "put", "delete", "websocket")
 CATALOGUE: Final = Path(inspect.getfile(i18n)).parent
-GALLERY: Final = PROJECT / "app/web/gallery"
+GALLERY: Final = PROJECT / "app/tools/gallery"
 
 
 @cache
 def modules() -> dict[Path, ast.Module]:
-    """Every module of `app/` but the catalogue of sentences, and the gallery, which shows examples."""
+    """Every module of `app/` but the catalogue of sentences and the examples of the gallery."""
     paths = sorted((PROJECT / "app").rglob("*.py"))
     return {
         path: ast.parse(path.read_text(encoding="utf-8"))
         for path in paths
-        if not {CATALOGUE, GALLERY} & {*path.parents}
+        if CATALOGUE not in path.parents and (GALLERY not in path.parents or path.name == "page.py")
     }
 
 
@@ -134,7 +134,7 @@ def _texts() -> dict[Path, frozenset[str]]:
 
 @cache
 def _said() -> dict[Path, frozenset[str]]:
-    """The codes that each module names; "lamp_*" for those that it puts together."""
+    """The codes that each module names; "finding_*" for those that it puts together."""
     return {path: frozenset(_codes(module_nodes)) for path, module_nodes in nodes().items()}
 
 

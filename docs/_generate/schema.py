@@ -9,13 +9,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
 from app.panel import Panel
-from app.panel.load import NOT_WRITTEN
-from app.panel.same_widgets import SameWidget
+from app.panel.file.load import NOT_WRITTEN
+from app.panel.file.same_widgets import SameWidget
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.trend import DURATION
+from app.ros.messages.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
 
 Schema = dict[str, Any]
 
@@ -66,6 +66,7 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "inhibits": ("id of a control", ""),
     "robot": ("id of a robot", ""),
     "panel.robot": ("", ""),
+    "panel.texts": ("table of texts by code or text of the robot", ""),
     "same": ("id of a widget", ""),
     "diagnostics": ("pattern of names", ""),
     "success": ("field path", ""),

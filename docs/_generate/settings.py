@@ -1,8 +1,8 @@
-"""The table of `KIOSK_…` variables in docs/reference/settings.md, made from app/settings.py."""
+"""The table of `KIOSK_…` variables in docs/reference/settings.md, made from app/system/settings.py."""
 
 from typing import Final
 
-from app.settings import LOG_LEVELS, PREFIX, VARIABLES
+from app.system.settings import LOG_LEVELS, PREFIX, VARIABLES
 
 ABOUT: Final = {
     "PANEL": ("The panel file.", "`app/panel.toml`, the shipped one"),

@@ -1,5 +1,5 @@
 // The sheet of a row of alarms: shelve it for a time and with a reason, take it out of service, and back.
-import { followLock, isLocked, markLock, sendAct } from "./alarm-acts.js";
+import { followLock, isLocked, markLock, sendAct } from "./alarm-line.js";
 import { followRows, rowOf } from "./alarm-rows.js";
 import { placeBeside } from "./beside.js";
 import { closest, find, setText } from "./show.js";
@@ -11,7 +11,7 @@ let item = null; // the row whose sheet is open
 let id = ""; // of its alarm
 let isBusy = false;
 
-/** @param {import("./source.js").Source} source */
+/** @param {PageSource} source */
 export function equip(source) {
   addEventListener("click", (event) => {
     const button = closest(event.target, "button.more-acts");
@@ -69,7 +69,7 @@ function showAlarm({ text, priority, out_of_service, shelf }) {
   }
 }
 
-/** @param {string} name @param {Event} event @param {import("./source.js").Source} source */
+/** @param {string} name @param {Event} event @param {PageSource} source */
 async function act(name, event, source) {
   if (!name || isBusy) return;
   isBusy = true;

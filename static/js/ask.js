@@ -1,21 +1,12 @@
 // The question before a press: a sheet beside its button, with the action and its values. Its "yes" is the press.
-import { openAsking } from "./asking.js";
+import { openAsking } from "./beside.js";
 import { entries, isCheckbox, isNumber, numbers } from "./entries.js";
-import { closest, find, needsPerson, setText } from "./show.js";
+import { closest, find, setText } from "./show.js";
 
 const NOT_NOW_MS = 15_000; // without an answer the question goes
 
-// `onYes` gets, of a press that a person confirms, the confirmation of these inputs too.
-/** @param {HTMLElement} root @param {(event: Event, proof?: { confirmation: string }) => void} onYes @param {HTMLButtonElement} pressed @param {Record<string, Data>} inputs */
-export function confirm(root, onYes, pressed, inputs) {
-  if (needsPerson(root)) {
-    import("./confirm-person.js").then(
-      ({ confirmByPerson }) =>
-        confirmByPerson(root, inputs, (event, { confirmation }) => onYes(event, { confirmation }), pressed),
-      pageGuard.fail,
-    );
-    return;
-  }
+/** @param {HTMLElement} root @param {(event: Event) => void} onYes */
+export function confirm(root, onYes) {
   const dialog = find(root, "dialog.ask");
   if (dialog.matches(":popover-open")) return; // a second tap of a button in the frame, which stays live
   fillValues(dialog);

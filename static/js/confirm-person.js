@@ -1,14 +1,15 @@
 // A person confirms a press with a PIN, password or badge, in a sheet beside its button. The server checks it and answers
 // with the confirmation of this one press; what was entered is kept nowhere.
 import { fillValues } from "./ask.js";
-import { openAsking } from "./asking.js";
+import { openAsking } from "./beside.js";
+import { APART_MS, SHORTEST } from "./touches.js";
 import { post } from "./press.js";
 import { closest, find, setText } from "./show.js";
 
 const NOT_NOW_MS = 60_000; // without a touch the sheet goes
 const TIMEOUT_MS = 10_000;
-const SCANNED_MS = 35; // between two characters of a badge reader, which types faster than a person
-const SHORTEST_BADGE = 4;
+const CHECK_TIMEOUT_MS = 60_000; // a hash takes its time on a busy machine
+const SLOW_MS = 1500; // a check that takes longer says so
 const MOST_DIGITS = 12;
 
 /** @typedef {{ confirmation: string, valid_s: number, reason: string }} Proof */
@@ -45,10 +46,14 @@ export async function confirmByPerson(root, inputs, onYes, pressed) {
     if (digit !== "enter") return typed(form, digit);
     if (!yes || yes.disabled) return;
     busy(true);
+    const said = form.querySelector(".said");
+    setText(said, "");
+    const slow = setTimeout(() => setText(said, said?.dataset.checking), SLOW_MS);
     const answer = await check(address, { inputs, ...entered(form) });
+    clearTimeout(slow);
     busy(false);
     if (!dialog.matches(":popover-open")) return;
-    setText(form.querySelector(".said"), answer.error);
+    setText(said, answer.error);
     asking.place();
     if (!answer.confirmation) return;
     asking.close();
@@ -76,7 +81,7 @@ async function sheetOf(address) {
 /** @param {string} address @param {object} body @returns {Promise<Data>} */
 async function check(address, body) {
   try {
-    return await (await post(address, body, TIMEOUT_MS)).json();
+    return await (await post(address, body, CHECK_TIMEOUT_MS)).json();
   } catch {
     return { error: pageGuard.page.sentences.lost };
   }
@@ -109,15 +114,16 @@ function typed(form, digit) {
   delete form.dataset.scanned;
 }
 
-// A badge reader types into the field that has the focus, faster than a person.
+// A badge reader types into the field that has the focus. Its keys are those of `touches.js`; here is what comes without
+// keys, as from an input method.
 /** @param {HTMLFormElement} form */
 function followTyping(form) {
   let last = 0;
   let quick = 0;
   form.querySelector("input[name=_pin]")?.addEventListener("input", () => {
     const now = performance.now();
-    quick = now - last < SCANNED_MS ? quick + 1 : 0;
+    quick = now - last < APART_MS ? quick + 1 : 0;
     last = now;
-    form.toggleAttribute("data-scanned", quick >= SHORTEST_BADGE - 1);
+    form.toggleAttribute("data-scanned", quick >= SHORTEST);
   });
 }

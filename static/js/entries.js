@@ -99,23 +99,14 @@ function hasKept() {
   }
 }
 
-// The page starts.
-export function followEntries() {
+// The page starts. `keep` is called once there is something to keep, or to enter again.
+/** @param {() => void} keep */
+export function followEntries(keep) {
   addEventListener("input", ({ target }) => {
     changed.add(target);
     if (target instanceof Element && target.matches("[data-entry]")) touched.add(target);
   });
   if (document.querySelector("[data-recipes]")) return; // these values are those of a recipe
-  const keep = () => import("./kept-entries.js").catch(() => {});
   if (hasKept()) keep();
   else addEventListener("input", keep, { once: true });
-}
-
-// The keypad and the keyboard, where the screen is touched.
-/** @param {string} keyboard */
-export function loadTouchEntry(keyboard) {
-  const coarse = matchMedia("(pointer: coarse)");
-  const open = () => void import("./entry/touch-entry.js").catch(pageGuard.fail);
-  if (keyboard === "on" || coarse.matches) open();
-  else coarse.addEventListener("change", open, { once: true });
 }

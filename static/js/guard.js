@@ -1,7 +1,8 @@
 // Is in the page itself, before anything is shown, in every browser: ES5 only. Says that a browser is too old, else
 // starts the modules. A page of which a module is missing or throws is locked, and loads again later.
 (function () {
-  var STARTS_WITHIN_MS = 10000;
+  var ARRIVES_WITHIN_MS = 10000; // the next file of a page that starts; twice as long after each reload
+  var LONGEST_WAIT_MS = 120000;
   var LONGEST_PAUSE_S = 30; // between two reloads
   var SETTLED_MS = 60000; // a page that works for so long forgets its reloads
   var RELOADS = "reloads";
@@ -54,9 +55,21 @@
     script.onerror = fail;
     script.src = main;
     document.head.appendChild(script);
-    setTimeout(function () {
-      if (!started) fail("the page did not start");
-    }, STARTS_WITHIN_MS);
+    awaitStart();
+  }
+
+  // Waits for the start while files arrive: a slow machine takes minutes for them.
+  function awaitStart() {
+    var wait = ARRIVES_WITHIN_MS * Math.pow(2, Number(recall(RELOADS)) || 0);
+    var arrived = performance.getEntriesByType("resource").length;
+    setTimeout(
+      function () {
+        if (started) return;
+        if (performance.getEntriesByType("resource").length > arrived) awaitStart();
+        else fail("the page did not start");
+      },
+      Math.min(wait, LONGEST_WAIT_MS)
+    );
   }
 
   function onStarted() {

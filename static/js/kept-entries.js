@@ -2,7 +2,8 @@
 // for one start of the server and one panel file. It only fills inputs; nothing is pressed again.
 import { changed, entries, isCheckbox, isNumber, isTouched, keptName, numbers } from "./entries.js";
 
-if (document.querySelector("[data-step]")) await import("./inputs.js"); // sliders are there after it
+// Sliders are there after it.
+if (document.querySelector("[data-step]")) (await import("./number-inputs.js")).equipInputs();
 
 const { revision, seen } = pageGuard.page;
 const STAMP = `${revision} ${seen.slice(0, seen.lastIndexOf("-"))}`; // the server's files and its start

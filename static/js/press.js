@@ -1,7 +1,7 @@
 // A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
 import { enteredValues, forgetRobotValue } from "./entries.js";
 import { closest, find, hooksOf, isEquipped, needsPerson, showReceipt } from "./show.js";
-import { feelTouches, StopKeys } from "./stop-keys.js";
+import { feelTouches, StopKeys } from "./touches.js";
 
 const RESPONSE_TIMEOUT_MS = 5000;
 // A second tap within this time is the same press.
@@ -29,8 +29,18 @@ export function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-/** @param {HTMLElement | undefined} root whether there is a question before its presses: its script comes at a touch */
-const asks = (root) => root !== undefined && (root.querySelector("dialog.ask") !== null || needsPerson(root));
+// The robots that a press stops, where its button is for several.
+/** @param {string} url */
+function robotsOf(url) {
+  const robots = new URL(url, location.href).searchParams.get("robots");
+  return robots ? { robots } : {};
+}
+
+// Asks before a press. `answered` gets the event of the "yes", and of a press that a person confirms the confirmation.
+/** @typedef {(root: HTMLElement, answered: (yes: Event, proof?: { confirmation: string }) => void, button: HTMLButtonElement, inputs: Record<string, Data>) => void} Ask */
+
+/** @param {HTMLElement} root whether there is a question before its presses: its script comes at a touch */
+const asks = (root) => root.querySelector("dialog.ask") !== null || needsPerson(root);
 
 export class Presser {
   /** @type {import("./press-socket.js").PressSocket | null} */
@@ -38,8 +48,10 @@ export class Presser {
   #untouchedTimer = 0;
   /** @type {Map<string, HTMLElement>} */
   #widgets;
-  /** @type {import("./source.js").Source} */
+  /** @type {PageSource} */
   #source;
+  /** @type {(root: HTMLElement) => Promise<Ask>} */
+  #loadAsk;
   /** @type {Set<string>} */
   #pending = new Set(); // URLs of presses without a response yet
   /** @type {HTMLButtonElement | null} */
@@ -52,8 +64,10 @@ export class Presser {
   #buttons = new Map(); // submit button → its widget
   #stops = new StopKeys((button, event) => this.#pressed(event, button));
 
-  /** @param {Map<string, HTMLElement>} widgets @param {import("./source.js").Source} source */
-  constructor(widgets, source) {
+  // `loadAsk` brings the script of the question before a press of this widget.
+  /** @param {Map<string, HTMLElement>} widgets @param {PageSource} source @param {(root: HTMLElement) => Promise<Ask>} loadAsk */
+  constructor(widgets, source, loadAsk) {
+    this.#loadAsk = loadAsk;
     this.#widgets = widgets;
     this.#source = source;
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
@@ -80,7 +94,8 @@ export class Presser {
     this.#downValue = this.#downButton?.value ?? "";
     this.#seen = this.#source.seen; // the view at this moment
     this.#open();
-    if (asks(this.#buttons.get(this.#downButton))) import("./ask.js").catch(() => {}); // the click asks
+    const root = this.#buttons.get(this.#downButton);
+    if (root && asks(root)) this.#loadAsk(root).catch(() => {}); // the click asks
   }
 
   /** @param {MouseEvent} event */
@@ -124,8 +139,8 @@ export class Presser {
     const answered = (yes, proof) => this.#press(root, button, inputs, { ...this.#moment(yes), ...proof });
     if (isCancel || !asks(root)) this.#press(root, button, inputs, click);
     else
-      import("./ask.js").then(
-        ({ confirm }) => confirm(root, answered, button, inputs),
+      this.#loadAsk(root).then(
+        (ask) => ask(root, answered, button, inputs),
         (error) => showReceipt(this.#widgets.values(), root, this.#unsent(error)),
       );
   }
@@ -168,7 +183,8 @@ export class Presser {
     try {
       const timeoutMs = RESPONSE_TIMEOUT_MS + 1000 * Number(root.dataset.answerS ?? 0);
       const socket = this.#socket?.free && !button.matches(".cancel") ? this.#socket : null;
-      const receipt = this.#send(root.dataset.widget, socket, url, { inputs, id: this.#id, ...click }, timeoutMs);
+      const press = { inputs, id: this.#id, ...click };
+      const receipt = this.#send({ widget: root.dataset.widget, ...robotsOf(url) }, socket, url, press, timeoutMs);
       // The press is sent; what can wait follows.
       this.#id = newId();
       forgetRobotValue(root);
@@ -183,11 +199,11 @@ export class Presser {
   }
 
   // Sent once, never repeated: without a response the outcome is unknown.
-  /** @param {string | undefined} widget @param {import("./press-socket.js").PressSocket | null} socket @param {string} url @param {Press} press @param {number} timeoutMs @returns {Promise<Receipt>} */
-  async #send(widget, socket, url, press, timeoutMs) {
+  /** @param {{ widget?: string, robots?: string }} address @param {import("./press-socket.js").PressSocket | null} socket @param {string} url @param {Press} press @param {number} timeoutMs @returns {Promise<Receipt>} */
+  async #send(address, socket, url, press, timeoutMs) {
     let response = null;
     try {
-      response = socket?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs).then(read);
+      response = socket?.send({ ...address, ...press }, timeoutMs) ?? post(url, press, timeoutMs).then(read);
       const { status, error, ...receipt } = await response;
       if (receipt.outcome) return receipt;
       if (status < 500 && error) return { outcome: "refused", reason: error };

@@ -85,12 +85,25 @@ function showLoad(root, wanted) {
   }
 }
 
+// As spreadsheets write it: UTF-8, UTF-16 with a byte order mark, or Windows-1252. app/cell/recipes/recipe.py has the same.
+/** @param {ArrayBuffer} content */
+function decoded(content) {
+  const [first, second] = new Uint8Array(content);
+  if (first === 0xff && second === 0xfe) return new TextDecoder("utf-16le").decode(content);
+  if (first === 0xfe && second === 0xff) return new TextDecoder("utf-16be").decode(content);
+  try {
+    return new TextDecoder("utf-8", { fatal: true }).decode(content);
+  } catch {
+    return new TextDecoder("windows-1252").decode(content);
+  }
+}
+
 // A file that is chosen is put into the text below it, which is what is sent.
 for (const input of document.querySelectorAll("input[data-into]")) {
   input.hidden = false;
   input.addEventListener("change", async () => {
     const text = find(document, "textarea#csv");
     const file = input.files?.[0];
-    if (file) text.value = await file.text();
+    if (file) text.value = decoded(await file.arrayBuffer());
   });
 }

@@ -29,9 +29,8 @@ function warn(soon) {
   if (soon === note.hidden) note.hidden = !soon;
 }
 
-if (document.querySelector("form[data-confirm-act]")) import("./confirm-act.js").catch(pageGuard.fail);
-if (document.querySelector("main.sign-in")) import("./signin.js").catch(pageGuard.fail);
-else followTabs();
+if (document.querySelector("form[data-confirm-act], main.sign-in")) import("./signin.js").catch(pageGuard.fail);
+if (!document.querySelector("main.sign-in")) followTabs();
 // Another tab of this browser may have signed in: the server ends the streams that began before.
 function followTabs() {
   const reconnected = () => "cut" in document.body.dataset || void report();

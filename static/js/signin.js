@@ -1,7 +1,12 @@
-// The page of sign-in: the pad types into the field of the PIN, and the sign-in is sent without a new page.
+// The pads of the pages of sign-in and of the confirmation of an act on an alarm: they type into the field of the PIN, and
+// the sign-in is sent, without a new page.
 import { closest, find } from "./show.js";
 
-const main = find(document, "main.sign-in");
+const SLOW_MS = 1500; // a check that takes longer says so
+let checks = false;
+const MOST_DIGITS = 12;
+const main = document.querySelector("main.sign-in");
+const confirmation = document.querySelector("form[data-confirm-act]");
 
 /** @param {SubmitEvent} event */
 async function submitted(event) {
@@ -9,33 +14,46 @@ async function submitted(event) {
   if (!(form instanceof HTMLFormElement) || form.action.endsWith("/end")) return;
   event.preventDefault();
   const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "";
-  if (form.dataset.way === "pin" && digit !== "enter" && digit !== "") return typed(form, digit);
+  if (form.dataset.way === "pin" && digit !== "enter" && digit !== "")
+    return typed(find(form, "input[name=pin]"), digit);
+  if (checks) return;
   const inputs = [...form.elements].filter((input) => input instanceof HTMLInputElement);
   const fields = inputs.map((input) => [input.name, input.value]);
   for (const input of form.querySelectorAll("input")) if (input.type === "password") input.value = "";
   const said = find(document, "p.said");
+  checks = true;
+  said.textContent = "";
+  const slow = setTimeout(() => (said.textContent = said.dataset.checking ?? ""), SLOW_MS);
+  const error = await signIn(Object.fromEntries(fields));
+  clearTimeout(slow);
+  checks = false;
+  said.textContent = error;
+  if (!error) location.assign(`${main?.dataset.next}`);
+}
+
+// Signs in, and returns why not.
+/** @param {object} body @returns {Promise<string>} */
+async function signIn(body) {
   try {
-    const answer = await fetch(`${main.dataset.signin}`, {
+    const answer = await fetch(`${main?.dataset.signin}`, {
       method: "POST",
       headers: { "content-type": "application/json" },
-      body: JSON.stringify(Object.fromEntries(fields)),
+      body: JSON.stringify(body),
     });
-    if (answer.ok) location.assign(`${main.dataset.next}`);
-    else said.textContent = String((await answer.json()).error);
+    return answer.ok ? "" : String((await answer.json()).error);
   } catch {
-    said.textContent = pageGuard.page.sentences.lost;
+    return pageGuard.page.sentences.lost;
   }
 }
 
-/** @param {HTMLFormElement} form @param {string} digit */
-function typed(form, digit) {
-  const input = find(form, "input[name=pin]");
+/** @param {HTMLInputElement} input @param {string} digit */
+function typed(input, digit) {
   const edited = { clear: "", delete: input.value.slice(0, -1) };
-  input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, 12);
+  input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, MOST_DIGITS);
 }
 
 // The name that is typed goes with its user to the other way to sign in.
-main.addEventListener("click", ({ target }) => {
+main?.addEventListener("click", ({ target }) => {
   const link = closest(target, ".secret > a");
   const name = document.querySelector("input#user");
   if (!(link instanceof HTMLAnchorElement) || !(name instanceof HTMLInputElement)) return;
@@ -43,4 +61,11 @@ main.addEventListener("click", ({ target }) => {
   address.searchParams.set("user", name.value);
   link.href = address.href;
 });
-main.addEventListener("submit", (event) => void submitted(event));
+main?.addEventListener("submit", (event) => void submitted(event));
+
+confirmation?.addEventListener("submit", (event) => {
+  const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "enter";
+  if (digit === "enter") return;
+  event.preventDefault();
+  typed(find(confirmation, "input[name=_pin]"), digit);
+});

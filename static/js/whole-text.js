@@ -1,8 +1,33 @@
-// The sheet that shows the full text of a key beside it: with why it is locked and what to do, from the server. An open
-// sheet follows its key.
+// The sheet that shows the full text of a key beside it: with why it is locked and what to do, from the server.
 import { placeBeside, uncoverPage } from "./beside.js";
-import { isLocked, TEXTS } from "./full-text.js";
-import { closest, find, setText } from "./show.js";
+import { closest, find, isLocked, KEY_TEXTS, setText } from "./show.js";
+
+// Why a button is locked and what to do, as the server has it now: a part of a page.
+const TIMEOUT_MS = 1500;
+
+// Null where it can't be got, or where the server does not lock the button.
+/** @param {string | undefined} widget @returns {Promise<HTMLElement | null>} */
+async function lockHelp(widget) {
+  const request = new AbortController();
+  const timer = setTimeout(() => request.abort(), TIMEOUT_MS);
+  try {
+    if (pageGuard.isBroken || "cut" in document.body.dataset) return null;
+    const { base, embed } = pageGuard.page;
+    const response = await fetch(`${base}/widgets/${widget}/lock${embed}`, {
+      cache: "no-store",
+      signal: request.signal,
+    });
+    if (response.status !== 200) return null;
+    const part = new DOMParser().parseFromString(await response.text(), "text/html").querySelector("div");
+    return part && document.importNode(part, true);
+  } catch {
+    return null;
+  } finally {
+    clearTimeout(timer);
+  }
+}
+
+// The sheet. While it is open it follows its key.
 
 const FIRST_MS = 200; // so long the sheet waits for the server before it opens with the text that the page has
 const AGAIN_MS = 1000; // between two looks at the server while it is open
@@ -20,7 +45,7 @@ const isOpen = () => sheet.matches(":popover-open");
 function visibleTexts(key) {
   const locked = isLocked(key);
   const reasons = key.querySelector(".reasons")?.textContent;
-  const shown = [...key.querySelectorAll(TEXTS)].filter((text) => {
+  const shown = [...key.querySelectorAll(KEY_TEXTS)].filter((text) => {
     if (text.matches(".why")) return locked && !reasons;
     return !text.matches(".reasons") || locked;
   });
@@ -70,7 +95,6 @@ export async function open(key, byKeyboard) {
 async function refresh(key) {
   clearTimeout(timer);
   const look = ++looks;
-  const { lockHelp } = await import("./lock-help.js");
   const help = await lockHelp(closest(key, "[data-widget]")?.dataset.widget);
   if (look !== looks || key !== shown || !isLocked(key)) return;
   if (help) show(help.dataset.title, [], help);

@@ -6,5 +6,5 @@ cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
 client = cyclone.client
 own_client = cyclone.own_client
-robots = cyclone.robots
+cyclone_robots = cyclone.cyclone_robots
 robot = cyclone.robot

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.command import main
+from app.tools.cli.command import main
 from tests.support import cyclone
 from tests.support.cyclone import Client, CycloneRobot
 from tests.support.panel_text import ADD, CELL, COUNT, LOCKED_START, SPEED
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
-robots = cyclone.robots
+cyclone_robots = cyclone.cyclone_robots
 
 FIBONACCI = COUNT.replace("/count", "/fibonacci")
 SPEED_OF_ROBOT = SPEED.replace("/arm", "/cyclone_robot")
@@ -42,11 +42,11 @@ def test_generated_config_forwards_the_panels_topics_only(
     bridge: Bridge,
     panel: Path,
     tmp_path: Path,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
     servers: Callable[[Server], Server],
 ) -> None:
     node = RosNode(bridge.domain)
-    robots(bridge.domain).fibonacci(step_s=30)
+    cyclone_robots(bridge.domain).fibonacci(step_s=30)
     client = Client(bridge.endpoint)
     try:
         node.advertise("/operation_enabled", "std_msgs/msg/Bool")

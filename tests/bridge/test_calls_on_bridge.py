@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from app.dialect.peer_traits import BRIDGE_TRAITS
+from app.ros.dialects.peer_traits import BRIDGE_TRAITS
 from tests.support.browser.pages import widget
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
 from tests.support.panel_text import ADD
 from tests.support.parts import Bridge, Server, Stream, http_client, until
 from tests.support.servers import live_server
+
+pytestmark = pytest.mark.promise("receipt")
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
 
@@ -209,7 +211,7 @@ def heard_after_s(kiosk: Server, robot: CycloneRobot, words: str) -> float:
     return time.monotonic() - began
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_calls_that_wait_hold_up_no_press(
     cyclone_bridge: Bridge,
     robot: CycloneRobot,
@@ -269,13 +271,13 @@ def press_alone(kiosk: Server, widget: str) -> httpx.Response:
 def test_a_robot_that_has_just_come_gets_the_first_call(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
 ) -> None:
     until(lambda: "does not offer" in (own_kiosk.widget("add")["reason"] or ""), "joined, and no robot")
     for number in range(3):
         with own_kiosk.stream() as stream:
             stream.next("snapshot")
-            robot = robots(own_cyclone_bridge.domain)
+            robot = cyclone_robots(own_cyclone_bridge.domain)
             reasons = list(reasons_of("add", stream))
         receipt = press(own_kiosk, "add", id=f"first-{number}")
         assert receipt.json()["outcome"] == "succeeded", receipt.json()
@@ -300,9 +302,9 @@ def test_lost_bridge_while_waiting_leaves_the_result_unknown(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     own_client: Client,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
 ) -> None:
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     served(robot, own_client)
     until(lambda: own_kiosk.widget("long")["enabled"], "offered")
     robot.answer_slow(seconds=None)
@@ -431,9 +433,9 @@ def test_another_clients_goal_is_not_shown_as_ours(
 def test_node_that_ends_during_a_goal_leaves_the_result_unknown_and_the_widget_usable(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
 ) -> None:
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     until(lambda: own_kiosk.widget("count")["enabled"], "offered")
     robot.fibonacci(step_s=30)
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
@@ -441,7 +443,7 @@ def test_node_that_ends_during_a_goal_leaves_the_result_unknown_and_the_widget_u
     until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
     assert "stopped offering /fibonacci" in own_kiosk.widget("count")["result"]
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     until(lambda: "no longer knows this goal" in own_kiosk.widget("count")["result"], "asked for again")
     until(lambda: own_kiosk.widget("count")["enabled"], "offered again")
     robot.fibonacci(step_s=30)
@@ -453,9 +455,9 @@ def test_node_that_ends_during_a_goal_leaves_the_result_unknown_and_the_widget_u
 def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
     own_kiosk: Server,
     own_cyclone_bridge: Bridge,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
 ) -> None:
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     until(lambda: own_kiosk.widget("count")["enabled"], "offered")
     robot.fibonacci(step_s=30, answer_goals=False)
     with ThreadPoolExecutor(1) as pool:
@@ -487,9 +489,9 @@ def locked_until_found(kiosk: Server) -> None:
 
 
 def test_cut_off_goal_locks_its_button_until_the_goal_is_reported(
-    own_kiosk: Server, own_cyclone_bridge: Bridge, robots: Callable[..., CycloneRobot]
+    own_kiosk: Server, own_cyclone_bridge: Bridge, cyclone_robots: Callable[..., CycloneRobot]
 ) -> None:
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     until(lambda: own_kiosk.widget("count")["enabled"], "offered")
     robot.fibonacci(step_s=30)
     assert press(own_kiosk, "count").json()["outcome"] == "accepted"

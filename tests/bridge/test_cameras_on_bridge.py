@@ -11,10 +11,12 @@ import zenoh
 from playwright.sync_api import Page, expect
 from websockets.sync.client import ClientConnection, connect
 
-from app.simulator.values.clock_picture import SIZE, grey_pixels, png
+from app.tools.simulator.known_types import SIZE, grey_pixels, png
 from tests.support.browser.pages import HIDE, widget
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
+
+pytestmark = pytest.mark.long("detail")
 
 PANEL = """
 title = "Robot cell 1"
@@ -98,6 +100,7 @@ def ask(socket: ClientConnection) -> dict[str, Any]:
     return about
 
 
+@pytest.mark.long(None)
 def test_both_kinds_of_pictures_are_drawn(kiosk: Server, page: Page) -> None:
     page.goto(kiosk.url)
     for name, size in (("packed", list(SIZE)), ("raw", [20, 10])):
@@ -127,6 +130,7 @@ def test_a_camera_that_no_page_shows_is_not_subscribed_to(
     until(lambda: not is_read(session, "/test_packed"), "no node reads it")
 
 
+@pytest.mark.long(None)
 def test_a_slow_browser_gets_the_newest_and_delays_no_other(kiosk: Server) -> None:
     with looking(kiosk, "packed") as slow, looking(kiosk, "packed") as quick:
         first = ask(slow)
@@ -158,6 +162,7 @@ def test_the_page_of_diagnostics_has_the_rate_of_a_camera_that_is_looked_at(kios
     assert 0 < known["rate_hz"] < 20
 
 
+@pytest.mark.long(None)
 def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNode, page: Page) -> None:
     page.goto(kiosk.url)
     expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)

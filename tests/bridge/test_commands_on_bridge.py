@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from app.interfaces.definitions import Definitions
-from app.interfaces.parsing import parse_definition
-from app.interfaces.type_hash import _describe_structure, type_hash
 from app.panel import check_panel
+from app.ros.messages.definitions import Definitions
+from app.ros.messages.derived import _describe_structure, type_hash
+from app.ros.messages.parsing import parse_definition
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, until
@@ -102,6 +102,7 @@ def test_echo_shows_the_last_value_of_a_latched_topic(cyclone_bridge: Bridge, io
     assert output_of(cyclone_bridge, "echo", "/operation_enabled", "--once") == "data: true\n---\n"
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize(
     ("options", "text"),
     [
@@ -139,6 +140,7 @@ def test_hz_of_a_silent_topic_has_no_rate(cyclone_bridge: Bridge, io: RosNode) -
     assert "no rate: 0 message(s) in 1.5 s" in done.stdout
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -209,9 +211,9 @@ def test_ctrl_c_ends_the_command_silently(cyclone_bridge: Bridge, io: RosNode) -
 
 
 def test_a_type_is_decoded_by_the_definition_that_its_node_gives(
-    cyclone_bridge: Bridge, robots: Any, client: Any
+    cyclone_bridge: Bridge, cyclone_robots: Any, client: Any
 ) -> None:
-    robot: CycloneRobot = robots(cyclone_bridge.domain)
+    robot: CycloneRobot = cyclone_robots(cyclone_bridge.domain)
     whole = Definitions()
     for name, text in (("Gripper", "float64 width\nJaw[] jaws"), ("Jaw", "string name\nfloat32 force")):
         whole |= parse_definition(text, "gripper_msgs", "msg", name, Path("x.msg"))
@@ -230,9 +232,9 @@ def test_a_type_is_decoded_by_the_definition_that_its_node_gives(
 
 
 def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
-    cyclone_bridge: Bridge, io: RosNode, robots: Any, tmp_path: Path
+    cyclone_bridge: Bridge, io: RosNode, cyclone_robots: Any, tmp_path: Path
 ) -> None:
-    robot: CycloneRobot = robots(cyclone_bridge.domain)
+    robot: CycloneRobot = cyclone_robots(cyclone_bridge.domain)
     until(lambda: not robot.unmatched(), "the bridge found the services")
     until(
         lambda: "cyclone_robot/get_parameters" in str(client_tokens(cyclone_bridge)),
@@ -328,6 +330,7 @@ def shown_commands() -> list[list[str]]:
     return [words[1:] for words in lines if words[0] == "operator-panel" and words[1] != "run"]
 
 
+@pytest.mark.long("documents")
 def test_each_command_of_the_page_works(domain: int, tmp_path: Path) -> None:
     bridge = Bridge(domain + 1)
     bridge.start()

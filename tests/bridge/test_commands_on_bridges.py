@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.diagnose.setups import panel_of, readout
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, until
 from tests.support.processes import command
 from tests.support.processes.command import COMMAND
+from tests.tools.doctor.setups import panel_of, readout
 
 BOOL = "std_msgs/msg/Bool"
 

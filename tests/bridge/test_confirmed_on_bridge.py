@@ -12,6 +12,8 @@ from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 from tests.support.users import Browsers, log_rows
 
+pytestmark = pytest.mark.promise("users")
+
 LIVE = PANEL.replace('mode = "demo"', 'mode = "live"').partition("[demo.")[0]
 
 

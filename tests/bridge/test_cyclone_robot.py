@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy
+import pytest
 import zenoh.ext
 
 from tests.support import cyclone
@@ -22,6 +23,8 @@ from tests.support.cyclone import (
     response,
 )
 from tests.support.parts import ENOUGH_S, Bridge, until
+
+pytestmark = pytest.mark.promise("dialects")
 
 Robots = Callable[..., CycloneRobot]
 
@@ -432,9 +435,9 @@ LEASE_S = 6.0
 
 
 def test_a_killed_robot_times_out_until_its_lease_ends_and_comes_back(
-    robots: Robots, cyclone_bridge: Bridge, client: Client
+    cyclone_robots: Robots, cyclone_bridge: Bridge, client: Client
 ) -> None:
-    robot = robots(cyclone_bridge.domain, lease_s=LEASE_S)
+    robot = cyclone_robots(cyclone_bridge.domain, lease_s=LEASE_S)
     cyclone.served(robot, client)
     robot.kill()
     assert errors(client.get("reset", EMPTY_REQUEST, timeout_s=0.3)) == {"Timeout"}
@@ -450,10 +453,10 @@ def test_a_killed_robot_times_out_until_its_lease_ends_and_comes_back(
 
 
 def test_a_robot_killed_and_started_at_once_is_lost_when_the_old_lease_ends(
-    robots: Robots, cyclone_bridge: Bridge, client: Client
+    cyclone_robots: Robots, cyclone_bridge: Bridge, client: Client
 ) -> None:
     """A fault of the bridge's: the panel has to say so, and a start after a leave helps."""
-    robot = robots(cyclone_bridge.domain, lease_s=LEASE_S)
+    robot = cyclone_robots(cyclone_bridge.domain, lease_s=LEASE_S)
     cyclone.served(robot, client)
     robot.kill()
     robot.start()
@@ -474,12 +477,12 @@ def test_a_robot_that_left_and_came_back_at_once_is_served(robot: CycloneRobot, 
 
 
 def test_without_a_token_of_the_client_a_second_life_brings_each_message_twice(
-    robots: Robots, own_cyclone_bridge: Bridge, own_client: Client
+    cyclone_robots: Robots, own_cyclone_bridge: Bridge, own_client: Client
 ) -> None:
     """Another fault of the bridge's, which `Client.join` keeps away from the other tests."""
     client, copies = own_client, []
     for life in (1, 2):
-        robot = robots(own_cyclone_bridge.domain)
+        robot = cyclone_robots(own_cyclone_bridge.domain)
         cyclone.served(robot, client)
         with client.hearing("parameter_events", "rcl_interfaces/msg/ParameterEvent") as events:
             heard(robot, "/parameter_events")
@@ -501,9 +504,9 @@ def limits(events: list[Any]) -> list[int]:
 
 
 def test_the_robot_is_found_by_a_bridge_that_comes_back(
-    robots: Robots, own_cyclone_bridge: Bridge, own_client: Client
+    cyclone_robots: Robots, own_cyclone_bridge: Bridge, own_client: Client
 ) -> None:
-    robot, client = robots(own_cyclone_bridge.domain), own_client
+    robot, client = cyclone_robots(own_cyclone_bridge.domain), own_client
     cyclone.served(robot, client)
     own_cyclone_bridge.kill()
     until(lambda: not client.tokens(), "the bridge is gone")

@@ -87,9 +87,11 @@ CALLS = {"enable": "/set_enabled", "reset": "/reset", "count": "/fibonacci"}
 
 
 @pytest.fixture
-def robot(cyclone_bridge: Bridge, robots: Callable[..., CycloneRobot]) -> Callable[..., CycloneRobot]:
+def robot(
+    cyclone_bridge: Bridge, cyclone_robots: Callable[..., CycloneRobot]
+) -> Callable[..., CycloneRobot]:
     """Starts a robot on Cyclone DDS behind the bridge."""
-    return partial(robots, cyclone_bridge.domain)
+    return partial(cyclone_robots, cyclone_bridge.domain)
 
 
 @pytest.fixture
@@ -160,13 +162,16 @@ def test_a_topic_of_another_definition_is_not_read_and_not_written(
 
 
 def test_a_second_publisher_of_another_definition_counts_too(
-    cyclone_bridge: Bridge, fast_node: RosNode, robots: Callable[..., CycloneRobot], tmp_path: Path
+    cyclone_bridge: Bridge,
+    fast_node: RosNode,
+    cyclone_robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
 ) -> None:
     """The bridge announces only the first publisher of a topic."""
     fast_node.advertise("/words", STRING)
     with live_server(cyclone_bridge, tmp_path, HEAD + PAGE) as kiosk:
         publish_until(fast_node, "/words", {"data": "same"}, lambda: shows(kiosk, "same"))
-        other = robots(cyclone_bridge.domain)
+        other = cyclone_robots(cyclone_bridge.domain)
         other.advertise(topic="/words", type=STRING, hash=f"RIHS01_{'0' * 64}")
         until(partial(differs, kiosk, "words"), "the second publisher is known")
         fast_node.publish("/words", {"data": "of either"})

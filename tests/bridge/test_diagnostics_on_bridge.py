@@ -11,8 +11,8 @@ from typing import Any, Final
 import pytest
 import zenoh
 
-from app.i18n import render, say
-from app.runtime.live_look import LINGER_S
+from app.cell.session.looks import LINGER_S
+from app.system.texts import render, say
 from tests.bridge.test_cameras_on_bridge import is_read
 from tests.support.parts import Bridge, RosNode, Server, free_port, live, until
 from tests.support.servers import live_server, panel_file
@@ -183,6 +183,7 @@ def test_a_look_into_a_topic_of_the_panel_changes_nothing_of_its_own(
     until(lambda: topic(cell, "/test_air")["count"] > count, "the panel still reads it")
 
 
+@pytest.mark.long("detail")
 def test_a_finding_about_a_link_is_the_links_own_sentence(tmp_path: Path) -> None:
     with (
         zenoh_router() as endpoint,

@@ -12,9 +12,9 @@ from typing import Final
 
 import pytest
 
-from tests.diagnose.setups import STRING, panel_of, readout
 from tests.faults.net import Namespace
 from tests.support.parts import BRIDGE, ROOT, Process, RosNode, until, zenoh_file
+from tests.tools.doctor.setups import STRING, panel_of, readout
 
 PORT: Final = 7447  # in a network of its own
 ENDPOINT: Final = f"tcp/127.0.0.1:{PORT}"
@@ -84,7 +84,7 @@ def test_the_documented_setting_reaches_nodes_on_fast_dds(domain: int) -> None:
         bridge.end()
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 @pytest.mark.usefixtures("robot")
 def test_doctor_names_the_setting_that_the_discovery_range_lacks(domain: int, tmp_path: Path) -> None:
     bridge = started(domain, "")

@@ -8,20 +8,20 @@ from typing import Any
 
 import pytest
 
-from app.cli.interfaces import main as add_interfaces
-from app.dialect.endpoint import OwnEndpoint
-from app.errors import LinkError
-from app.interfaces import Interfaces, load_interfaces
-from app.interfaces.definitions import Definitions
-from app.interfaces.names import Qos
-from app.interfaces.parsing import parse_definition
-from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
-from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
-from app.survey.model import GraphSnapshot, Node
-from app.survey.node_services import NodeParameter, NodeServices
-from app.transport.bridge_peer import BRIDGE
-from app.transport.robot_observer import CONNECT_S, RobotObserver
-from app.transport.zenoh_config import Config, config_to
+from app.cell.link.bridge import BRIDGE
+from app.cell.link.observer import CONNECT_S, RobotObserver
+from app.ros.dialects.dialect import PanelEndpoint
+from app.ros.graph.model import GraphSnapshot, Node
+from app.ros.graph.node_services import NodeParameter, NodeServices
+from app.ros.messages import Interfaces, load_interfaces
+from app.ros.messages.definitions import Definitions
+from app.ros.messages.derived import _describe_structure, referenced_structures, type_hash
+from app.ros.messages.names import Qos
+from app.ros.messages.parsing import parse_definition
+from app.ros.messages.type_descriptions import SERVICE_TYPE_NAME, definitions_of
+from app.ros.zenoh.config import Config, config_to
+from app.system.errors import LinkError
+from app.tools.cli.interfaces import main as add_interfaces
 from tests.support.cyclone import NODE, CycloneRobot
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, free_port, live, until
 
@@ -263,7 +263,7 @@ def test_listener_keeps_a_route_only_if_requested(
 
     async def listen() -> tuple[bytes, tuple[str, ...]]:
         async with observing(config_to(own_bridge.endpoint)) as observer:
-            own = OwnEndpoint("MS", topic.key, BOOL, Qos(transient_local=True))
+            own = PanelEndpoint("MS", topic.key, BOOL, Qos(transient_local=True))
             async for _, sample in observer.listen([own], hold=hold):
                 async with observing(config_to(own_bridge.endpoint)) as other:
                     (robot_graph,) = (await other.observe()).robots

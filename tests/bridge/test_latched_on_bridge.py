@@ -9,6 +9,8 @@ import pytest
 from tests.support.parts import Bridge, RosNode, Server, has_heard, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.promise("offline")
+
 STRING = "std_msgs/msg/String"
 PANEL = """
 title = "Cell"

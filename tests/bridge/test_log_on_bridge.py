@@ -10,6 +10,8 @@ from tests.support.browser.pages import HIDE, widget
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 PANEL = """
 title = "Robot cell 1"
 
@@ -58,6 +60,7 @@ def rows(page: Page) -> Locator:
     return widget(page, "robot").locator(".line")
 
 
+@pytest.mark.long(None)
 def test_lines_come_with_their_level_and_are_chosen(kiosk: Server, node: RosNode, page: Page) -> None:
     page.goto(kiosk.url)
     say(node, "the gripper is slow", 30, "gripper")

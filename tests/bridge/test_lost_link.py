@@ -1,5 +1,5 @@
-"""A bridge, or the router of nodes on rmw_zenoh, is killed while a hold, a trend, a camera and a
-recording run, and started again."""
+"""A bridge, or the router of nodes on rmw_zenoh, is killed while a hold, a trend, a camera, a recording
+and the alarms of a list run, and started again."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -7,15 +7,17 @@ from typing import Final, NamedTuple
 
 import pytest
 
-from app.simulator.values.clock_picture import grey_pixels, png
+from app.tools.simulator.known_types import grey_pixels, png
 from tests.bridge.test_cameras_on_bridge import PACKED, ask, looking
 from tests.bridge.test_recording_on_bridge import files, record, records
+from tests.cell.history.test_on_server import columns
 from tests.support.holds import PANEL as JOG
 from tests.support.holds import PATIENT, TOPIC, permit
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.parts import Bridge, RosNode, Server, live, publish_until, until
 from tests.support.rmw import RmwNode, Router
-from tests.trends.test_on_server import columns
 from tests.web.test_hold_socket import held
+
+pytestmark = pytest.mark.promise("hold")
 
 POINT: Final = "geometry_msgs/msg/Point"
 SPEED: Final = "std_msgs/msg/Float64"
@@ -37,6 +39,28 @@ kind = "camera"
 label = "Eye"
 topic = "/eye"
 type = "{PACKED}"
+"""
+ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
+FAULTS: Final = f"""
+title = "Cell"
+mode = "live"
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "go"
+kind = "publish"
+label = "Go"
+topic = "/go"
+type = "std_msgs/msg/Bool"
+message = {{ data = true }}
+[[alarm]]
+id = "faults"
+topic = "/faults"
+type = "{ARRAY}"
+priority = 2
+inhibits = ["go"]
+list = {{ field = "status", code = "name", text = "message" }}
 """
 
 
@@ -99,3 +123,26 @@ def test_a_lost_link_ends_a_hold_and_the_rest_goes_on_after_it(
     until(lambda: files(tmp_path), "the recording is finished")
     by_topic = records(files(tmp_path)[0])
     assert {"/speed", "/web_ui/presses"} <= by_topic.keys()
+
+
+def test_an_alarm_that_ends_during_a_cut_is_ended_by_the_next_list(
+    way: Way, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    panel.write_text(FAULTS)
+    kiosk = servers(live(way.link.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    until(kiosk.ready, "ready")
+
+    def states() -> dict[str, str]:
+        return {a["id"]: a["state"] for a in kiosk.http.get("/alarms").json()["alarms"]}
+
+    way.node.advertise("/faults", ARRAY)
+    hot, belt = ({"level": 2, "name": name, "message": "Hot"} for name in ("E1", "E2"))
+    publish_until(way.node, "/faults", {"status": [hot, belt]}, lambda: len(states()) == 2)
+    assert not kiosk.widget("go")["enabled"]
+    way.link.kill()
+    until(lambda: set(states().values()) == {"unknown"}, "neither is known")
+    way.link.start()
+    publish_until(way.node, "/faults", {"status": []}, lambda: "unknown" not in states().values())
+    assert set(states().values()) == {"returned"}
+    until(lambda: kiosk.widget("go")["enabled"], "nothing inhibits it")

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.cli.command import main
+from app.tools.cli.command import main
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, RosNode, Server, live, publish_until, until
 
@@ -93,8 +93,10 @@ def started(domain: int, tmp_path: Path) -> Iterator[Started]:
         part.end()
 
 
-def line(text: str) -> dict[str, Any]:
-    return {"stamp": {"sec": 7}, "level": 20, "name": "controller", "msg": text}
+def line(text: str, namespace: str = "") -> dict[str, Any]:
+    """A line of the node `controller`, whose logger has the name of its namespace."""
+    name = ".".join([*namespace.split("/")[1:], "controller"])
+    return {"stamp": {"sec": 7}, "level": 20, "name": name, "msg": text}
 
 
 def lines(kiosk: Server, search: str) -> list[Any]:
@@ -116,13 +118,16 @@ def heard(node: RosNode, word: str) -> bool:
     ids=["nodes in the namespace", "the bridge adds it"],
 )
 def test_the_log_and_parameter_events_are_where_the_bridge_has_them(
-    started: Started, robots: Callable[..., CycloneRobot], options: tuple[str, ...], namespace: str
+    started: Started,
+    cyclone_robots: Callable[..., CycloneRobot],
+    options: tuple[str, ...],
+    namespace: str,
 ) -> None:
     bridge, node, kiosk = started(OF_ROBOT, *options, namespace=namespace)
     topic = f"{namespace}/speed"
     publish_until(node, topic, {"data": 1.5}, lambda: shows(kiosk, "speed", "1.5"))
-    publish_until(node, "/rosout", line("hello"), lambda: lines(kiosk, "hello"))
-    robot = robots(bridge.domain, namespace=namespace)
+    publish_until(node, "/rosout", line("hello", namespace), lambda: lines(kiosk, "hello"))
+    robot = cyclone_robots(bridge.domain, namespace=namespace)
     until(lambda: kiosk.widget("limit")["enabled"], "the parameters are read")
     until(lambda: robot.subscribers(topic="/parameter_events"), "its events are heard")
     calls = len(robot.requests(f"{namespace}/cyclone_robot/get_parameters"))

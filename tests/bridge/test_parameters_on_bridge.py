@@ -12,6 +12,8 @@ from tests.support.cyclone import Client, CycloneRobot, served
 from tests.support.parts import Bridge, Server, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.promise("dialects")
+
 FORM = {"content-type": "application/x-www-form-urlencoded"}
 WIDGET = """
 [[page.widget]]
@@ -236,11 +238,11 @@ def test_returning_node_is_read_again(kiosk: Server, robot: CycloneRobot) -> Non
 def test_lost_bridge_while_setting_leaves_the_result_unknown(
     own_cyclone_bridge: Bridge,
     own_client: Client,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
     tmp_path: Path,
     servers: Callable[[Server], Server],
 ) -> None:
-    robot = robots(own_cyclone_bridge.domain)
+    robot = cyclone_robots(own_cyclone_bridge.domain)
     served(robot, own_client)
     kiosk = servers(live_server(own_cyclone_bridge, tmp_path, PANEL))
     until(lambda: kiosk.widget("name")["enabled"], "offered")

@@ -10,6 +10,8 @@ from tests.faults.publishers import KINDS, Kind, Publishers
 from tests.support.form import several
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
+pytestmark = pytest.mark.promise("press")
+
 TRIALS = several(1, 50)  # of each of two kinds
 ONCE = KINDS[0]
 AT_ONCE = next(kind for kind in KINDS if not kind.matched and kind.durability == "volatile")
@@ -95,6 +97,6 @@ def test_a_latched_value_that_the_bridge_finds_late_does_not_count_as_fresh(
     until(lambda: kiosk.widget("seen")["text"] == "true", "it is sent again")
     until(kiosk.ready, "the bridge answers")
     assert not kiosk.widget("go")["enabled"]
-    assert kiosk.widget("go")["reason"] == "Locked: waiting for /operation_enabled."
+    assert kiosk.widget("go")["reason"] == "Locked: /operation_enabled is not known yet."
     own_node.every("/operation_enabled", {"data": True}, 0.2)
     until(lambda: kiosk.widget("go")["enabled"], "a periodic one is believed")

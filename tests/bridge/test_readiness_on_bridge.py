@@ -66,7 +66,7 @@ def some_time_passes(kiosk: Server) -> None:
             stream.next("beat")
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:

@@ -13,6 +13,8 @@ from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.promise("recipes")
+
 PANEL: Final = """
 title = "Cyclone cell"
 mode = "live"
@@ -77,17 +79,35 @@ def test_a_recipe_is_set_in_one_request_and_read_back(cell: Server, robot: Cyclo
     assert (receipt["outcome"], receipt["code"]) == ("confirmed", "recipe_loaded"), receipt
     values = robot.parameters()
     assert [values[name] for name in ("speed", "limit", "enabled")] == [1.2, 40, False]
-    assert robot.parameter_requests(service="set_parameters") == 1
+    assert sets(robot) == (1, 0)
     assert marked(cell)
 
 
-def test_what_the_node_does_not_take_is_named_and_nothing_is_claimed(
-    cell: Server, robot: CycloneRobot
-) -> None:
+def sets(robot: CycloneRobot) -> tuple[int, int]:
+    """The requests that set all values or none, and those that set each on its own."""
+    services = ("set_parameters_atomically", "set_parameters")
+    atomic, single = (robot.parameter_requests(service=service) for service in services)
+    return atomic, single
+
+
+def test_a_node_that_refuses_one_value_keeps_all_old_ones(cell: Server, robot: CycloneRobot) -> None:
+    make(cell, "Slow", SLOW)
+    before = robot.parameters()
+    robot.refuse_value(name="limit", value=40)  # the second of three
+    receipt = load(cell, "slow@1")
+    assert (receipt["outcome"], receipt["code"]) == ("rejected", "recipe_kept"), receipt
+    assert "parameter 'limit' can't be 40 now" in receipt["reason"]
+    assert robot.parameters() == before
+    assert sets(robot) == (1, 0)
+    assert not marked(cell)
+
+
+def test_a_value_beyond_the_range_of_the_node_sends_nothing(cell: Server, robot: CycloneRobot) -> None:
     make(cell, "Slow", {**SLOW, "limit": 150})  # the node takes 100 at most
     receipt = load(cell, "slow@1")
-    assert (receipt["outcome"], receipt["code"]) == ("rejected", "recipe_fields_refused"), receipt
+    assert receipt["outcome"] == "refused", receipt
     assert "Limit" in receipt["reason"]
+    assert sets(robot) == (0, 0)
     assert robot.parameters()["limit"] == 10
     assert not marked(cell)
 
@@ -133,6 +153,7 @@ fields = ["enabled"]
 service = "/set_enabled"
 type = "std_srvs/srv/SetBool"
 request = { data = "{enabled}" }
+answer = "the node says {success}"
 """
 READ_BACK: Final = """
 [recipe.readback]
@@ -238,6 +259,7 @@ def enabling(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Ite
 def test_a_recipe_is_loaded_by_a_service_and_read_back(enabling: Server, robot: CycloneRobot) -> None:
     receipt = called(enabling, robot, reported=True)
     assert (receipt["outcome"], receipt["code"]) == ("confirmed", "recipe_loaded"), receipt
+    assert "the node says True" in receipt["reason"]
 
 
 def test_a_value_that_is_reported_otherwise_after_the_call_is_named(

@@ -11,11 +11,13 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 
-from tests.interfaces.test_cdr_on_ros import RosCodec
+from tests.ros.messages.test_cdr_on_ros import RosCodec
 from tests.support.holds import PANEL, PATIENT
 from tests.support.parts import REFERENCE, Bridge, RosNode, Server, live, until
 from tests.support.servers import demo_server
 from tests.web.test_hold_socket import held, opened
+
+pytestmark = pytest.mark.promise("history")
 
 LOG = "rcl_interfaces/msg/Log"
 RECORD = "[record]\nbefore_s = 10\nafter_s = {after_s}\n"

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.audit import Entry, Filter
-from app.audit.queries import rows
-from app.audit.verify import verify
-from app.commands.actions.goal import goal_id
+from app.cell.commands.goals import goal_id
+from app.records import Entry, Filter
+from app.records.database import rows
+from app.records.verify import verify
 from tests.bridge.test_calls_on_bridge import PANEL, cancel, press
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, Server, live, until
@@ -64,6 +64,7 @@ def entries_of(folder: Path, press_id: str) -> list[Entry]:
 BROKEN_OFF = [("pressed", ""), ("closed", "accepted"), ("corrected", "unknown")]
 
 
+@pytest.mark.long("detail")
 @pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
 def test_after_a_restart_a_goal_is_followed_to_its_end(
     start: Start, robot: CycloneRobot, tmp_path: Path, by: signal.Signals
@@ -107,6 +108,7 @@ def test_after_a_kill_a_goal_can_be_canceled(
     until(lambda: logged(tmp_path)[-1] == ("corrected", "canceled"), "logged")
 
 
+@pytest.mark.long("detail")
 def test_goal_is_still_followed_after_a_second_kill(
     start: Start, robot: CycloneRobot, tmp_path: Path
 ) -> None:
@@ -177,9 +179,10 @@ def test_an_end_before_the_robots_answer_leaves_a_goal_that_is_found(
     until(lambda: logged(tmp_path) == ended, "and logged")
 
 
+@pytest.mark.long("detail")
 def test_a_goal_is_in_doubt_until_the_robot_is_there(
     own_cyclone_bridge: Bridge,
-    robots: Callable[..., CycloneRobot],
+    cyclone_robots: Callable[..., CycloneRobot],
     servers: Callable[[Server], Server],
     tmp_path: Path,
 ) -> None:
@@ -188,7 +191,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
         bridge = own_cyclone_bridge.endpoint
         return servers(live(bridge, tmp_path, KIOSK_DATA=data, KIOSK_PANEL=panel))
 
-    first = robots(own_cyclone_bridge.domain)
+    first = cyclone_robots(own_cyclone_bridge.domain)
     first.fibonacci(step_s=30)
     with_a_goal(start).end(signal.SIGKILL)
     first.end()
@@ -198,7 +201,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
     assert "may still be running" in shown["result"]
     assert (shown["goal"], shown["busy"], shown["stoppable"]) == ("UNKNOWN", True, False)
     assert cancel(again, press="goal-1").json()["code"] == "cancel_may_not_have_arrived"
-    robots(own_cyclone_bridge.domain)
+    cyclone_robots(own_cyclone_bridge.domain)
     until(lambda: again.widget("count")["enabled"], "offered, and the robot does not know it")
     assert "no longer knows this goal" in again.widget("count")["result"]
 

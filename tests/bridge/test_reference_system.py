@@ -12,9 +12,11 @@ import pytest
 import zenoh
 
 from tests.support.form import several
-from tests.support.parts import SHIPPED, Bridge, RosNode, Server, arrives, has_heard, live, until
+from tests.support.parts import REFERENCE, Bridge, RosNode, Server, arrives, has_heard, live, until
 from tests.support.rmw import RmwNode, Router
 from tests.support.samples import TEXTS
+
+pytestmark = pytest.mark.promise("locks")
 
 STARTS = several(6, 100)
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
@@ -78,7 +80,7 @@ def own_robot(dialect: str, own_way: Bridge, request: pytest.FixtureRequest) -> 
 @pytest.fixture
 def server(way: Bridge, robot: RosNode, tmp_path: Path) -> Iterator[Server]:
     """A server for one test, on the shared bridge."""
-    mine = live(way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED))
+    mine = live(way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE))
     yield mine
     mine.end()
 
@@ -98,6 +100,7 @@ def test_a_node_sees_web_ui(shared_server: Server, robot: RosNode) -> None:
     until(lambda: "/web_ui" in robot.nodes(), "/web_ui in the list of nodes")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_press_reaches_the_robot_with_its_text_intact(
     shared_server: Server, robot: RosNode, text: str
@@ -112,7 +115,7 @@ def test_a_press_reaches_the_robot_with_its_text_intact(
 @contextmanager
 def known(way: Bridge, robot: RosNode, folder: Path) -> Iterator[Server]:
     """A kiosk on a bridge that knows what the node listens to."""
-    mine = live(way.endpoint, folder, KIOSK_PANEL=str(SHIPPED))
+    mine = live(way.endpoint, folder, KIOSK_PANEL=str(REFERENCE))
     try:
         until(mine.ready, "ready")
         until(partial(arrives, mine, robot), "the bridge knows what the node listens to", every_s=0.1)
@@ -155,12 +158,12 @@ def test_unknown_permission_locks_and_says_what_is_missing(server: Server) -> No
     until(server.ready, "ready")
     shown = server.widget("operation1")
     assert shown["enabled"] is False
-    assert "waiting for /operation_enabled" in shown["reason"]
+    assert "is not known yet" in shown["reason"]
     assert server.widget("operation")["enabled"] is True  # it has no interlock
     refused = server.press("operation1", "too soon")
     assert refused.status_code == 409
     assert refused.json()["outcome"] == "refused"
-    assert "waiting for /operation_enabled" in refused.json()["reason"]
+    assert "is not known yet" in refused.json()["reason"]
 
 
 def test_a_value_published_once_counts_after_its_publisher_is_gone(
@@ -211,7 +214,7 @@ def test_a_transient_local_value_arrives_in_either_order_of_start(
 
     if robot_first:
         robot_speaks()
-    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
+    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE)))
     until(kiosk.ready, "ready")
     if not robot_first:
         robot_speaks()
@@ -227,7 +230,7 @@ def test_the_first_press_after_each_start_is_received(
         pass
     before = len(own_robot.heard("/operation"))
     for number, text in enumerate(texts):
-        kiosk = live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED))
+        kiosk = live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE))
         try:
             until(kiosk.ready, "ready", every_s=0.001)
             assert kiosk.press("operation", text).json()["outcome"] == "published"
@@ -240,12 +243,12 @@ def test_the_first_press_after_each_start_is_received(
 def test_a_press_without_a_subscriber_is_unknown_and_says_so(
     own_way: Bridge, own_robot: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
+    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE)))
     until(kiosk.ready, "ready")
     answer = kiosk.press("operation", "anybody?")
     assert answer.status_code == 200
     assert answer.json()["outcome"] == "unknown"
-    assert "no node is known to subscribe" in answer.json()["reason"]
+    assert "no node is known to receive it" in answer.json()["reason"]
 
 
 def test_logs_are_in_ros_format_and_on_rosout(server: Server, robot: RosNode) -> None:
@@ -291,7 +294,7 @@ def test_typed_text_and_uvicorn_lines_are_not_on_rosout(server: Server, robot: R
 def test_debug_is_hidden_unless_asked_for(
     way: Bridge, robot: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    quiet = servers(live(way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
+    quiet = servers(live(way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE)))
     loud = servers(live(way.endpoint, tmp_path, KIOSK_LOG_LEVEL="debug"))
     for kiosk in (quiet, loud):
         kiosk.http.get("/")
@@ -313,7 +316,7 @@ def test_type_that_differs_on_the_robot_locks_and_is_named(
 
     if robot_first:
         robot_joins()
-    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
+    kiosk = servers(live(own_way.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE)))
     until(kiosk.answers, "answers")
     if not robot_first:
         until(kiosk.ready, "ready: a bridge's routes have the kiosk's types")
@@ -336,7 +339,7 @@ def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Serv
     try:
         robot.subscribe("/operation", "std_msgs/msg/String")
         panel = tmp_path / "panel.toml"
-        text = SHIPPED.read_text()
+        text = REFERENCE.read_text()
         panel.write_text(text.replace('namespace = ""', 'namespace = "/robot1"'))
         kiosk = servers(live(named.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
         until(kiosk.ready, "ready")
@@ -357,7 +360,7 @@ def test_a_route_that_another_program_made_with_a_wrong_type_locks(
         token = other.liveliness().declare_token(key)
         routes = "@/*/ros2/route/topic/sub/operation"
         until(lambda: list(other.get(routes, timeout=1)), "the wrong route is there")
-        kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(SHIPPED)))
+        kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(REFERENCE)))
         until(
             lambda: "std_msgs/msg/Bool on the robot" in (kiosk.widget("operation")["reason"] or ""),
             "locked for the route's type",

@@ -34,6 +34,15 @@ kind = "select"
 label = "Frame"
 options_from = {{ node = "{NODE}", parameter = "frames" }}
 [[page.widget]]
+id = "described"
+kind = "select"
+label = "Described"
+[page.widget.options_from]
+service = "{NODE}/describe_parameters"
+type = "rcl_interfaces/srv/DescribeParameters"
+request = {{ names = ["speed", "frames"] }}
+field = "descriptors[].name"
+[[page.widget]]
 id = "describe"
 kind = "call"
 label = "Describe"
@@ -45,9 +54,9 @@ answer = "it is {{descriptors[0].name}}"
 id = "ask"
 kind = "call"
 label = "Ask"
-service = "{NODE}/list_parameters"
-type = "rcl_interfaces/srv/ListParameters"
-request = {{ prefixes = ["{{frame}}"] }}
+service = "{NODE}/get_parameters"
+type = "rcl_interfaces/srv/GetParameters"
+request = {{ names = ["{{frame}}"] }}
 """
 
 
@@ -67,6 +76,7 @@ def test_a_services_answer_lists_the_options_of_a_calls_input(
     cell: Server, robot: CycloneRobot
 ) -> None:
     assert "speed" in options(cell, "name")
+    until(lambda: options(cell, "described") == ["speed", "frames"], "a text of each message")
     robot.declare_parameter(name="late", value=1.5)
     until(lambda: "late" in options(cell, "name"), "the service is called again")
     receipt = cell.press("describe", inputs={"name": "late"}).json()

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import pytest
 
-from tests.diagnose.setups import Setup
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import live_server
+from tests.tools.doctor.setups import Setup
 
 STATE: Final = "sensor_msgs/msg/JointState"
 LOOKS: Final = 100
@@ -153,7 +153,8 @@ def test_second_publisher_of_a_single_publisher_interlock_locks_and_is_named(
         until(lambda: kiosk.widget("strict_go")["reason"] == f"{strict} {named}", "both are named")
         assert {permission[0] for permission in permissions(kiosk)} == {False}
         until(
-            lambda: named in (kiosk.widget("loose_go")["reason"] or ""), "the flapping one names both"
+            lambda: "Door is published by /door, /robot." in (kiosk.widget("loose_go")["reason"] or ""),
+            "the flapping one names both",
         )
         assert findings(own_bridge, tmp_path) == ["/door, /robot"]
         robot.end()

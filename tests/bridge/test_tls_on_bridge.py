@@ -10,13 +10,15 @@ from typing import Any, Final
 import pytest
 import zenoh
 
-from app.cli.command import main
+from app.tools.cli.command import main
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot, encoded
 from tests.support.panel_text import ADD, CELL, COUNT, LOCKED_START, SPEED
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until
 
-robots = cyclone.robots
+pytestmark = pytest.mark.promise("neighbours")
+
+cyclone_robots = cyclone.cyclone_robots
 
 FIBONACCI = COUNT.replace("/count", "/fibonacci")
 SPEED_OF_ROBOT = SPEED.replace("/arm", "/cyclone_robot")
@@ -95,10 +97,10 @@ def session(endpoint: str, folder: Path, name: str = "") -> zenoh.Session:
 
 
 def test_the_panel_works_over_tls(
-    bridge: Bridge, kiosk: Server, robots: Callable[..., CycloneRobot]
+    bridge: Bridge, kiosk: Server, cyclone_robots: Callable[..., CycloneRobot]
 ) -> None:
     node = RosNode(bridge.domain)
-    robots(bridge.domain).fibonacci(step_s=30)
+    cyclone_robots(bridge.domain).fibonacci(step_s=30)
     try:
         node.advertise("/operation_enabled", "std_msgs/msg/Bool")
         node.every("/operation_enabled", {"data": True}, 0.2)

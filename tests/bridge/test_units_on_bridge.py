@@ -13,6 +13,8 @@ from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.promise("values")
+
 FLOAT: Final = "std_msgs/msg/Float64"
 BATTERY: Final = "sensor_msgs/msg/BatteryState"
 SENT: Final = ("/test_go", "/test_heat", "/test_jog")
@@ -33,9 +35,6 @@ max_age_s = 60
 id = "charge"
 label = "Battery"
 source = "battery"
-scale = 100
-unit = "%"
-format = ".1f"
 min = 20
 
 [[page]]

@@ -9,17 +9,19 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect
 
-from app.i18n.catalogue import files as files_of_languages
 from app.panel import load_panel
-from app.settings import PACKAGE
+from app.system.settings import PACKAGE
+from app.system.texts.catalogue import files as files_of_languages
 from app.web.language import COOKIE as LANGUAGE
-from app.web.rendering.display_choice import CHOICES, COOKIE
-from tests.runtime.test_robots_on_one_page import panel_file
+from app.web.pages.display_choice import CHOICES, COOKIE
+from tests.cell.session.test_robots_on_one_page import panel_file
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.line import Line
 from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.long("detail")
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
 # Rules of WCAG 2.2 A and AA, and axe's best practices; and those of them that depend on a theme.
@@ -33,6 +35,8 @@ RUN: Final = """async (runOnly) => {
 }"""
 SHOW: Final = "(theme) => (document.documentElement.dataset.theme = theme)"
 EXAMPLE: Final = "docs/examples/palletizer.toml"
+PAGES: Final = ("cell", "operation", "recipe", "robot", "watch")
+OF_SHIPPED: Final = (*(f"/pages/{name}" for name in PAGES), "/gallery", "/log", "/help")
 MM_PER_PX: Final = 0.22
 TOUCH: Final = 44.0
 
@@ -109,20 +113,22 @@ def test_axe_finds_nothing_on_the_example(example: Server, page: Page) -> None:
         assert violations(page) == [], path
 
 
-def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, page: Page) -> None:
+@pytest.mark.long("every screen")
+@pytest.mark.parametrize("path", OF_SHIPPED)
+def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, page: Page, path: str) -> None:
     """Each page, the gallery and the log; the languages take turns. The large gallery is seen in one
     theme: the contrast of the others' colours is tested by `tests/web/test_tokens.py`."""
-    languages = sorted(files_of_languages())
     pages = [f"/pages/{described.id}" for described in load_panel(PACKAGE / "panel.toml").pages]
-    for number, path in enumerate([*pages, "/gallery", "/log", "/help"]):
-        language = languages[number % len(languages)]
-        page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
-        page.goto(shipped.url + path)
-        expect(page.locator("html")).to_have_attribute("lang", language)
-        if path in pages:
-            expect(page.locator("#state")).not_to_have_attribute("data-state", "unknown")
-        themes = CHOICES["theme"][:1] if path == "/gallery" else CHOICES["theme"]
-        assert violations(page, themes) == [], (path, language)
+    assert pages == [shown for shown in OF_SHIPPED if shown.startswith("/pages/")]
+    languages = sorted(files_of_languages())
+    language = languages[OF_SHIPPED.index(path) % len(languages)]
+    page.context.add_cookies([{"name": LANGUAGE, "value": language, "url": shipped.url}])
+    page.goto(shipped.url + path)
+    expect(page.locator("html")).to_have_attribute("lang", language)
+    if path in pages:
+        expect(page.locator("#state")).not_to_have_attribute("data-state", "unknown")
+    themes = CHOICES["theme"][:1] if path == "/gallery" else CHOICES["theme"]
+    assert violations(page, themes) == [], (path, language)
 
 
 # Parts of a key's face that reach out of the key, and labels that the sign of a longer text lies on.
@@ -243,6 +249,7 @@ CONTROLS: Final = """() => {
 }"""
 
 
+@pytest.mark.long(None)
 @pytest.mark.parametrize("path", ["/pages/cell", "/pages/setup"])
 def test_every_control_is_reached_by_the_keyboard_in_order(
     example: Server, page: Page, path: str
@@ -279,6 +286,7 @@ BOXES: Final = """() => [...document.querySelectorAll(
 MAIN_KEYS: Final = ".cell > .key > button:not(.more), .action button:not(.more)"
 
 
+@pytest.mark.long(None)
 def test_touch_targets_are_large_enough(example: Server, page: Page) -> None:
     for path in ("/pages/cell", "/pages/setup"):
         page.goto(example.url + path)
@@ -288,7 +296,7 @@ def test_touch_targets_are_large_enough(example: Server, page: Page) -> None:
             small = [box for box in page.evaluate(BOXES) if min(box[1], box[2]) < TOUCH - 0.5]
             assert small == [], (path, width)
             page.keyboard.press("Escape")
-            least = (14 if height <= 560 else 20) / MM_PER_PX
+            least = TOUCH if height <= 560 else 20 / MM_PER_PX  # beside a key that cancels
             for key in page.locator(MAIN_KEYS).locator("visible=true").all():
                 box = place(key)
                 assert box["height"] >= least - 0.5

@@ -10,6 +10,8 @@ from tests.support.confirmed import ALARMS, PANEL, add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.long("detail")
+
 SIZES = ((1280, 800), (800, 480))
 
 

@@ -10,15 +10,16 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.alarms.disk import NAME
-from app.alarms.history import HistoryRow
-from app.alarms.store import AlarmStore
+from app.cell.alarms.history import HistoryRow
+from app.cell.alarms.store import NAME, AlarmStore
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import ReusedPage, sized
-from tests.support.browser.pages import DRAWN, place
+from tests.support.browser.pages import DRAWN, follow, place
 from tests.support.parts import Server
 from tests.web.test_alarms import HEALTHY, server_with
+
+pytestmark = pytest.mark.long("detail")
 
 EVENTS = 120
 
@@ -81,16 +82,16 @@ def test_the_history_is_reached_from_the_list_and_has_pages(
 ) -> None:
     page = without_scripts
     page.goto(f"{cell.url}/alarms")
-    page.get_by_role("link", name="History").click()
+    follow(page.get_by_role("link", name="History"))
     assert shown(page)[:2] == ["pump119", "pump118"]
     assert len(shown(page)) == 50
     expect(page.locator(".pager")).to_contain_text("Events 1–50 of 120, newest first")
-    page.get_by_role("link", name="Older").click()
-    page.get_by_role("link", name="Older").click()
+    follow(page.get_by_role("link", name="Older"))
+    follow(page.get_by_role("link", name="Older"))
     assert shown(page)[-1] == "pump0"
     expect(page.locator(".pager")).to_contain_text("Events 101–120 of 120")
     expect(page.get_by_role("link", name="Older")).to_have_count(0)
-    page.get_by_role("link", name="Newest").click()
+    follow(page.get_by_role("link", name="Newest"))
     assert shown(page)[0] == "pump119"
 
 
@@ -100,10 +101,10 @@ def test_events_are_found_by_text_priority_group_and_time(cell: Server, without_
     page.get_by_label("Text").fill("Pump 11")
     page.get_by_label("Group").select_option(label="Air")
     page.get_by_label("Priority").select_option(label="Low")
-    page.get_by_role("button", name="Show").click()
+    follow(page.get_by_role("button", name="Show"))
     expect(page.locator(".entries .empty")).to_have_text("No event has this.")
     page.get_by_label("Priority").select_option(label="all")
-    page.get_by_role("button", name="Show").click()
+    follow(page.get_by_role("button", name="Show"))
     assert shown(page)[:2] == ["pump119", "pump117"]
     page.goto(f"{cell.url}/alarms/history?text=Pump 11&priority=2")
     assert shown(page) == ["pump119", "pump117", "pump115", "pump113", "pump111", "pump11"]
@@ -111,7 +112,7 @@ def test_events_are_found_by_text_priority_group_and_time(cell: Server, without_
     page.get_by_label("Text").fill("")
     page.locator(".times summary").click()
     page.get_by_label("From").fill(since)
-    page.get_by_role("button", name="Show").click()
+    follow(page.get_by_role("button", name="Show"))
     assert all(int(str(name)[4:]) >= 109 for name in shown(page))
     assert "pump119" not in shown(page)  # its clock was set back
     expect(page.get_by_role("link", name="CSV")).to_have_attribute(
@@ -143,10 +144,10 @@ def test_the_page_has_the_figures_of_the_chosen_time(cell: Server, page: Page) -
     expect(page.locator(".ranking ol li")).to_have_count(10)
     expect(page.locator(".ranking")).to_contain_text("10 of 120")
     expect(page.locator(".ranking")).to_contain_text("No alarm chatters.")
-    page.locator(".ranking ol a").first.click()
+    follow(page.locator(".ranking ol a").first)
     assert len(shown(page)) == 1
-    page.get_by_role("link", name="Show all alarms").click()
-    page.get_by_role("link", name="7 days").click()
+    follow(page.get_by_role("link", name="Show all alarms"))
+    follow(page.get_by_role("link", name="7 days"))
     expect(page.locator(".plot-head").first).to_contain_text("Raised in each day")
     assert page.locator(".alarm-plot rect").count() in (7, 8)
 

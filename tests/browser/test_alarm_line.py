@@ -1,5 +1,6 @@
 """The line of alarms below the header: it shows the most urgent, and acknowledges what it shows."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -15,8 +16,10 @@ from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, middle, place
 from tests.support.parts import ROOT, Server, until
-from tests.support.servers import panel_file
+from tests.support.servers import demo_server, panel_file
 from tests.web.test_alarms import LOW, PANEL, act, listed, server_with
+
+pytestmark = pytest.mark.promise("alarms")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 LINE: Final = ".alarm-line"
@@ -55,11 +58,34 @@ def test_the_line_shows_the_most_urgent_alarm_with_what_to_do_first(cell: Server
     expect(line).to_have_attribute("data-priority", "2")
     expect(line.locator("b[data-text=text]")).to_have_text("Air pressure low")
     expect(line.locator("[data-text=action]")).to_have_text("Open valve V1")
+    expect(line.locator(".step-of")).to_be_hidden()
     expect(line.locator("b[data-text=unacknowledged]")).to_have_text("1")
-    expect(line.locator("[data-text=standing]")).to_have_text("2")
+    expect(line.locator("[data-text=active]")).to_have_text("2")
     expect(page.locator(BUTTON)).to_be_enabled()
     started(page, f"{cell.url}/log")
     expect(page.locator(LINE)).to_have_attribute("data-alarm", "air_low")
+
+
+@pytest.mark.long("detail")
+def test_the_line_says_its_robot_and_that_more_steps_follow(tmp_path: Path, page: Page) -> None:
+    robots = "".join(
+        f'[[robot]]\nid = "{name}"\nnamespace = "/{name}"\n'
+        f'name = {{ en = "Cell {name.upper()}", de = "Zelle {name.upper()}" }}\n'
+        for name in ("a", "b")
+    )
+    steps = PANEL.replace('en = "Open valve V1"', 'en = "Open valve V1.\\nCall service."')
+    steps = steps.replace("latched = true\n", 'latched = true\naction = "Look.\\nReset."\n')
+    panel = steps.replace("[[page]]", f"{robots}[[page]]", 1) % LOW
+    with demo_server(tmp_path, panel) as server:
+        until(lambda: len(listed(server)) == 4, "the alarms are raised")
+        started(page, server.url)
+        line = page.locator(LINE)
+        for width, height in SIZES:
+            sized(page, width, height).evaluate(DRAWN)
+            expect(line.locator(".robot")).to_have_text(re.compile("^Cell [AB]$"))
+            expect(line.locator(".robot")).to_be_visible()
+            expect(line.locator(".step-of")).to_have_text("1/2")
+            expect(line.locator(".step-of")).to_be_visible()
 
 
 def test_an_alarm_that_came_under_the_finger_is_not_acknowledged(
@@ -141,6 +167,7 @@ def test_acknowledge_is_locked_without_control(tmp_path: Path, own_page: Page, p
         expect(page.locator(f"{LINE} .by-control")).to_be_visible()
 
 
+@pytest.mark.long("detail")
 def test_without_scripts_a_form_acknowledges_what_it_showed(
     cell: Server, without_scripts: Page
 ) -> None:
@@ -152,6 +179,7 @@ def test_without_scripts_a_form_acknowledges_what_it_showed(
     assert not listed(cell)["air_low"]["acknowledged"]
 
 
+@pytest.mark.long("detail")
 def test_axe_finds_nothing_on_the_line(cell: Server, axe_page: Page) -> None:
     started(axe_page, cell.url)
     assert violations(axe_page) == []
@@ -161,6 +189,7 @@ def test_axe_finds_nothing_on_the_line(cell: Server, axe_page: Page) -> None:
     assert violations(axe_page) == []
 
 
+@pytest.mark.long("detail")
 def test_the_line_takes_its_height_from_the_page_and_none_without_alarms(
     cell: Server, tmp_path: Path, page: Page
 ) -> None:
@@ -171,11 +200,15 @@ def test_the_line_takes_its_height_from_the_page_and_none_without_alarms(
         screen = Screen.from_size(f"{width}x{height}", described.mm_per_px)
         main = place(page.locator("main"))
         assert main["y"] == 2 * screen.header
-        assert main["height"] - 2 * screen.pad == page_height(described, described.pages[0], screen)
+        assert main["height"] - 2 * screen.pad_above == page_height(
+            described, described.pages[0], screen
+        )
     quiet = described.model_copy(update={"alarms": ()})
     for size in SIZES:
         screen = Screen.from_size(f"{size[0]}x{size[1]}", quiet.mm_per_px)
-        assert page_height(quiet, quiet.pages[0], screen) == size[1] - screen.header - 2 * screen.pad
+        assert (
+            page_height(quiet, quiet.pages[0], screen) == size[1] - screen.header - 2 * screen.pad_above
+        )
 
 
 def test_without_a_robot_the_line_does_not_say_that_there_is_no_alarm(

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.alarms.state_times import NAME as STATES
-from app.alarms.state_times import StateRow, write_states
+from app.cell.alarms.report import NAME as STATES
+from app.cell.alarms.report import StateRow, write_states
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_history import written
 from tests.browser.test_alarm_line import SIZES, started
@@ -18,6 +18,8 @@ from tests.support.browser.pages import DRAWN
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
+
+pytestmark = pytest.mark.long("detail")
 
 MORE = """
 [[page.widget]]
@@ -69,7 +71,8 @@ def test_the_report_has_alarms_presses_and_states_without_scripts(
 ) -> None:
     page = without_scripts
     cell.http.post("/widgets/go", json={"inputs": {}})
-    act(cell, "air_latched", "acknowledge", occurrence=1)
+    shown = listed(cell)["air_latched"]["occurrence"]
+    act(cell, "air_latched", "acknowledge", occurrence=shown)
     page.goto(f"{cell.url}/alarms/history")
     page.get_by_role("link", name="Shift report").click()
     paper = page.locator(".paper")

@@ -17,6 +17,8 @@ from tests.support.servers import demo_server
 from tests.support.users import add_user
 from tests.web.test_alarms import LOW, PANEL, act, listed
 
+pytestmark = pytest.mark.long("detail")
+
 __all__ = ["axe_page"]
 
 SECOND_TAP_MS: Final = 800  # sooner a form without scripts counts as a second tap

@@ -12,6 +12,8 @@ from tests.browser.test_alarm_line import started
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, Server, until
 from tests.web.test_alarms import act, listed, server_with
 
+pytestmark = pytest.mark.long("detail")
+
 SOUND: Final = "\n[alarms]\nsound = true\nsound_priorities = [1, 2]\n"
 SILENCE: Final = ".alarm-line .silence"
 # The tones that the page plays, by their frequency.

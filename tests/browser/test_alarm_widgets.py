@@ -11,10 +11,12 @@ from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import CONTROL, SIZES, axe_page, started
 from tests.support.browser.browsers import sized
 from tests.support.browser.finger import Touch
-from tests.support.browser.pages import DRAWN, HIDE, middle, place
+from tests.support.browser.pages import DRAWN, HIDE, follow, middle, place
 from tests.support.parts import ENOUGH_S, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
+
+pytestmark = pytest.mark.long("detail")
 
 __all__ = ["axe_page"]
 
@@ -120,7 +122,7 @@ def test_without_scripts_the_buttons_are_forms(cell: Server, chromium: Browser) 
         for widget, alarm in ((AIR_LIST, "air_low"), (HIGH_LINE, "air_latched")):
             page.goto(cell.url)
             page.wait_for_timeout(800)  # sooner it counts as a second tap
-            page.locator(f"{widget} button:not(.more-acts)").click()
+            follow(page.locator(f"{widget} button:not(.more-acts)"))
             assert page.url.startswith(f"{cell.url}/pages/main")
             assert listed(cell)[alarm]["acknowledged"]
 
@@ -154,3 +156,39 @@ def test_widgets_fit_every_screen_and_axe_finds_nothing(cell: Server, axe_page: 
             assert size["height"] >= 44
             assert size["x"] + size["width"] <= width
     assert violations(axe_page) == []
+
+
+FIVE: Final = "".join(
+    f"""
+[[alarm]]
+id = "air_{number}"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "Air {number}"
+group = "Air"
+low = 5.0
+"""
+    for number in range(5)
+)
+OUT_OF_SIGHT: Final = """list => [...list.children].filter(item => {
+  const { top, bottom } = item.getBoundingClientRect();
+  return (top + bottom) / 2 > list.getBoundingClientRect().bottom;
+}).length"""
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_a_list_says_how_many_rows_are_below_its_edge(
+    tmp_path: Path, page: Page, width: int, height: int
+) -> None:
+    with demo_server(tmp_path, PANEL.replace("[demo]\n", WIDGETS) % LOW + FIVE) as server:
+        until(lambda: len(listed(server)) == 7, "the alarms are raised")
+        page.set_viewport_size({"width": width, "height": height})
+        started(page, server.url)
+        rows, rest = page.locator(f"{AIR_LIST} ol.alarms"), page.locator(f"{AIR_LIST} .rest")
+        expect(rows.locator("li")).to_have_count(6)
+        expect(page.locator(f"{AIR_LINE} .count")).to_contain_text("6 active")
+        hidden = rows.evaluate(OUT_OF_SIGHT)
+        assert hidden > 0
+        expect(rest).to_have_text(f"{hidden} more below: scroll the list.")
+        rows.evaluate("list => list.scrollTo(0, list.scrollHeight)")
+        expect(rest).to_have_text("")

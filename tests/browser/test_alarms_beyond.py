@@ -6,11 +6,13 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.alarms.shown import MAX_ROWS
+from app.cell.alarms.shown import MAX_ROWS
 from tests.browser.test_alarm_line import started
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
+
+pytestmark = pytest.mark.long("detail")
 
 ALL: Final = MAX_ROWS + 40
 LEAST: Final = "air_many"  # of the lowest priority: the stream does not bring it

@@ -12,10 +12,12 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import ReusedPage, sized
-from tests.support.browser.pages import DRAWN
+from tests.support.browser.pages import DRAWN, follow
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import act, listed, server_with
+
+pytestmark = pytest.mark.long("detail")
 
 SECOND_TAP_MS: Final = 800  # a form that is sent sooner after the page is a second tap
 TABS: Final = """
@@ -72,6 +74,7 @@ def ids(page: Page) -> list[str | None]:
     return [row.get_attribute("data-alarm") for row in page.locator("li.alarm").all()]
 
 
+@pytest.mark.long(None)
 def test_the_list_follows_the_events_in_the_servers_order(cell: Server, page: Page) -> None:
     started(page, f"{cell.url}/alarms?alarm=air_low")
     assert ids(page) == ["air_latched", "air_low"]
@@ -106,7 +109,7 @@ def test_the_choices_count_and_events_keep_the_filter(cell: Server, page: Page) 
     expect(page.locator("li.alarm[data-state=shelved]")).to_have_count(1)
     assert ids(page) == ["air_low"]
     assert counts(page) == ["1", "0", "1"]
-    page.locator(".choices a", has_text="Unacknowledged").click()
+    follow(page.locator(".choices a", has_text="Unacknowledged"))
     started(page, page.url)
     assert ids(page) == []
     act(cell, "air_low", "unshelve")
@@ -121,7 +124,7 @@ def test_the_filter_works_without_scripts_and_follows_to_the_details(
     page = without_scripts
     page.goto(f"{cell.url}/alarms?group=Air")
     assert ids(page) == ["air_low"]
-    page.locator("li.alarm a").click()
+    follow(page.locator("li.alarm a"))
     assert page.url.endswith("/alarms?group=Air&alarm=air_low")
     assert page.locator("[name^='occurrence.']").count() == 1
     page.goto(f"{cell.url}/alarms?show=latched")
@@ -240,6 +243,7 @@ def test_an_alarm_acknowledged_elsewhere_locks_its_button(cell: Server, page: Pa
     expect(page.locator(".all-shown button")).to_be_disabled()
 
 
+@pytest.mark.long(None)
 def test_all_shown_are_those_at_the_touch(cell: Server, page: Page) -> None:
     """One that came again under the finger is not acknowledged."""
     act(cell, "air_low", "shelve", reason="Tests", for_s=60)

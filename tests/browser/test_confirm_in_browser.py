@@ -9,6 +9,7 @@ from tests.support.browser.pages import place, press_button, widget
 from tests.support.confirmed import PANEL, PINS, add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
+from tests.support.users import says
 
 SIZES = ((1280, 800), (1024, 600), (800, 480))
 
@@ -58,6 +59,7 @@ def touches(first: Locator, second: Locator) -> bool:
     return not (beside or a["y"] + a["height"] <= b["y"] or b["y"] + b["height"] <= a["y"])
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES)
 def test_a_wrong_pin_says_so_and_the_right_one_presses(
     own_page: Page, kiosk: Server, size: tuple[int, int]
@@ -79,9 +81,10 @@ def test_a_wrong_pin_says_so_and_the_right_one_presses(
     expect(sheet).to_be_hidden()
     receipt = widget(page, "start").locator(".receipt")
     expect(receipt).to_contain_text("Confirmed by M. Sato with the PIN.")
-    assert "2580" not in page.content()
+    assert not says(page.content(), "2580")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("language", ["en", "de", "ja"])
 def test_the_sheet_is_whole_on_the_screen_in_every_language(
@@ -135,6 +138,7 @@ def test_a_keyboard_is_enough(own_page: Page, kiosk: Server) -> None:
     expect(sheet).to_be_hidden()
 
 
+@pytest.mark.long("detail")
 def test_a_badge_reader_types_into_the_field_of_the_pin(own_page: Page, kiosk: Server) -> None:
     page = own_page
     opened(page, kiosk, "M. Sato")
@@ -155,6 +159,7 @@ def test_a_badge_reader_types_into_the_field_of_the_pin(own_page: Page, kiosk: S
     assert "04A2B3C4" not in page.content()
 
 
+@pytest.mark.long("detail")
 def test_a_second_person_is_chosen_and_both_are_named(own_page: Page, kiosk: Server) -> None:
     page = own_page
     opened(page, kiosk, "K. Novak")
@@ -168,6 +173,7 @@ def test_a_second_person_is_chosen_and_both_are_named(own_page: Page, kiosk: Ser
     expect(page.locator("td", has_text="Confirmed by K. Novak and J. Brandt (PIN).")).to_be_visible()
 
 
+@pytest.mark.long("detail")
 def test_each_position_of_a_switch_has_its_word_on_the_sheet(own_page: Page, kiosk: Server) -> None:
     page = own_page
     opened(page, kiosk, "M. Sato")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.commands.test_confirmations import TYPED, panel_file
+from tests.cell.commands.test_confirmations import TYPED, panel_file
 from tests.support.browser.pages import asked, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
 from tests.support.servers import ready
@@ -42,12 +42,13 @@ def test_a_press_is_confirmed_by_the_robot_in_every_browser(
     expect(dialog).to_be_hidden()
     for browser_page in (page, other):
         expect(browser_page.locator('[data-widget="go"] .result')).to_contain_text(
-            "Confirmed by /last_heard"
+            "Confirmed by the robot"
         )
     expect(page.locator('[data-widget="go"] .receipt')).to_be_empty()
     other_context.close()
 
 
+@pytest.mark.long("detail")
 def test_without_scripts_the_server_asks(asking: Server, without_scripts: Page) -> None:
     page = without_scripts
     page.goto(asking.url)
@@ -62,7 +63,7 @@ def test_without_scripts_the_server_asks(asking: Server, without_scripts: Page) 
     page.get_by_role("button", name="Start").click()
     page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Start").click()
-    expect(page.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
+    expect(page.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by the robot")
 
 
 def test_a_lock_takes_the_question_away(

@@ -7,10 +7,12 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.web.rendering.display_choice import CHOICES, COOKIE
+from app.web.pages.display_choice import CHOICES, COOKIE
 from tests.support.browser.browsers import sized
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.long("every screen")
 
 # Each group of a panel's page, each view of diagnostics, the pages of alarms, and the log.
 PATHS: Final = (

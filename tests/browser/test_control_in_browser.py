@@ -20,6 +20,8 @@ from tests.support.processes.signals import send_signal
 from tests.support.servers import ready
 from tests.web.test_control_over_http import PROXY, control_panel
 
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("control")]
+
 IDLE_S = 4.0
 EXPIRED_S = 2.3  # a touch counts for 2 s
 FIRST, SECOND = "192.0.2.1", "192.0.2.2"
@@ -125,11 +127,12 @@ def sends(page: Page) -> None:
         page.get_by_label("Message").fill("hello")
         button(page, "Publish").click()
         expect(receipt).not_to_be_empty()
-        return "Sent on /operation at" in receipt.inner_text()
+        return "Sent at" in receipt.inner_text()
 
     until(sent, "it is sent", every_s=0.5)
 
 
+@pytest.mark.long(None)
 def test_the_panel_at_the_cell_has_control_at_once(kiosk: Server, opens: Opens) -> None:
     cell = opens()
     has_role(cell, "holding")
@@ -164,6 +167,7 @@ def test_a_touch_that_a_stopped_server_finds_late_takes_no_control(kiosk: Server
     take(page)
 
 
+@pytest.mark.long(None)
 def test_taking_looking_on_asking_keeping_and_giving(kiosk: Server, opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     locked_free(first)
@@ -287,7 +291,7 @@ def test_released_control_is_not_taken_again_by_a_page_load(opens: Opens) -> Non
     take(cell)
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_two_taps_take_control_and_do_not_release_control(opens: Opens) -> None:
     first = opens(FIRST)
     button(first, "Take control").dblclick(delay=20)
@@ -298,6 +302,7 @@ def test_two_taps_take_control_and_do_not_release_control(opens: Opens) -> None:
     has_role(first, "holding")
 
 
+@pytest.mark.long(None)
 def test_no_client_has_control_after_a_server_restart(
     kiosk: Server, opens: Opens, tmp_path: Path
 ) -> None:

@@ -8,13 +8,15 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.i18n.catalogue import sentences
+from app.system.texts.catalogue import sentences
 from tests.browser.test_widths_in_browser import opened
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
 from tests.support.users import add_user
+
+pytestmark = pytest.mark.promise("layout")
 
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280))
 PANELS: Final = {
@@ -72,6 +74,7 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
         yield mine
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
 def test_no_text_is_cut_at_any_size(server: Server, page: Page, language: str) -> None:
     page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": server.url}])
@@ -100,6 +103,7 @@ CUT_REASONS: Final = """() => [...document.querySelectorAll("[data-widget] .why"
   })"""
 
 
+@pytest.mark.long("detail")
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
 def test_the_lock_of_a_role_is_whole_on_every_button(tmp_path: Path, page: Page, language: str) -> None:
     data = tmp_path / "data"
@@ -112,7 +116,8 @@ def test_the_lock_of_a_role_is_whole_on_every_button(tmp_path: Path, page: Page,
         parts = sentences(language)["role_needed"].split("{role}")
         for path in ("/pages/cell", "/pages/recipe", "/pages/operation"):
             opened(page, server, language, path)
-            expect(page.locator('[data-widget] [data-text="reason"]').first).not_to_be_empty()
+            needed = page.locator('[data-widget] [data-text="reason"]', has_text=max(parts, key=len))
+            expect(needed.first).to_be_attached()
             for width, height in SIZES:
                 sized(page, width, height).evaluate(DRAWN)
                 tabs = page.locator(".group-tab:visible")

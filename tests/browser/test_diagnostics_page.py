@@ -12,13 +12,15 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from app.runtime.live_look import LINGER_S
+from app.cell.session.looks import LINGER_S
 from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import DRAWN
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, SHIPPED, Server, until
 from tests.support.servers import demo_server, ready
 from tests.web.test_recordings import PANEL, RECORD
+
+pytestmark = pytest.mark.long("detail")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 VIEWS: Final = ("links", "topics", "servers", "graph", "nodes")

@@ -9,10 +9,12 @@ from playwright.sync_api import Page, expect
 
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
-from app.panel.widgets.tiles import LOW_SCREEN, Screen
+from app.panel.widgets.tiles import LOW_SCREEN, TOUCH, Screen
 from tests.support.browser.pages import DRAWN, ROWS, place
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.promise("layout")
 
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
 SCREENS: Final = ("1920x1080", "1280x800", "1024x600", "800x480", "800x1280")
@@ -89,9 +91,9 @@ def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
                 ".cell > .key > button:not(.more):visible, .action button:not(.more):visible"
             ).all()
         ]
-        least = 14 if screen.height <= LOW_SCREEN else 20  # beside a key that cancels
+        least = TOUCH if screen.height <= LOW_SCREEN else 20 * screen.mm  # beside a key that cancels
         assert len(boxes) >= 2
-        assert all(box["height"] >= least * screen.mm - 0.5 for box in boxes), size
+        assert all(box["height"] >= least - 0.5 for box in boxes), size
         start, reset = (
             place(page.locator(f"[data-widget={widget}] > button:not(.more)"))
             for widget in ("start", "reset")
@@ -139,6 +141,7 @@ step = 5
 """
 
 
+@pytest.mark.long("detail")
 def test_a_step_may_be_a_quarter_of_its_group(tmp_path: Path, page: Page) -> None:
     """Its value is above its buttons where it is too narrow for them side by side."""
     path = tmp_path / "steps.toml"

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browser.pages import middle
+from tests.support.browser.pages import hold_by_key, middle
 from tests.support.browser.touch import (
     HALT,
     HEARD,
@@ -20,6 +20,8 @@ from tests.support.browser.touch import (
     touched_server,
 )
 from tests.support.parts import Server, until
+
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("fingers")]
 
 DIM_S: Final = 1.0
 # The order that the robot has heard, as the machine's state.
@@ -117,6 +119,7 @@ def test_cleaning_lock_takes_thirty_seconds(screen: Page) -> None:
     assert 25 < then < 30  # a page that stood still leaves some out
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_cleaning_shows_only_the_state_and_presses_nothing(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
@@ -163,17 +166,12 @@ def test_cleaning_continues_after_a_reload(screen: Page) -> None:
 
 
 def test_cleaning_ends_a_hold(screen: Page) -> None:
-    def holds() -> bool:  # as soon as its script is there
-        screen.keyboard.up(" ")
-        screen.locator(".hold").focus()
-        screen.keyboard.down(" ")
-        return screen.locator("[data-widget=jog][data-hold]").count() == 1
-
-    until(holds, "it is held", every_s=0.2)
+    held = screen.locator("[data-widget=jog][data-hold]")
+    hold_by_key(screen.locator(".hold"), held)
     # Without a second touch, which would end the hold too.
     screen.locator(".clean").evaluate("(key) => key.click()")
     expect(screen.locator("#cleaning")).to_be_visible()
-    expect(screen.locator("[data-widget=jog][data-hold]")).to_have_count(0)
+    expect(held).to_have_count(0)
     screen.keyboard.up(" ")
 
 
@@ -200,6 +198,7 @@ def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: S
     assert presses(kiosk) == before + 1
 
 
+@pytest.mark.long(None)
 def test_waking_touch_on_a_dark_screen_presses_nothing(sleepy: Page, dimming: Server) -> None:
     before = presses(dimming)
     for selector in ("[data-widget=load] > [type=submit]", "#input-speed", ".hold"):

@@ -18,10 +18,12 @@ from tests.browser.test_control_in_browser import (
     tap,
 )
 from tests.browser.test_pages import SIZES
-from tests.runtime.test_several_robots import MANY, heard, ten
+from tests.cell.session.test_several_robots import MANY, heard, ten
 from tests.support.browser.fonts import SETS, WITHOUT_OWN
 from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import TAP_AGAIN_MS, Server, until
+
+pytestmark = pytest.mark.long("detail")
 
 __all__ = ["kiosk", "opens", "reused_pages", "ten"]  # fixtures
 

@@ -124,6 +124,7 @@ def test_one_reason_of_all_buttons_stands_beside_the_title(cell: Server, page: P
     expect(page.get_by_role("dialog", name="Back is locked")).to_be_visible()
 
 
+@pytest.mark.long("detail")
 def test_it_goes_with_the_lock(cell: Server, page: Page) -> None:
     says(cell, "halt")
     sized(page, 1280, 800).goto(cell.url)
@@ -147,7 +148,7 @@ def test_where_it_has_no_room_each_button_says_it(
         expect(page.locator("#why-back")).to_contain_text(text)
 
 
-def test_a_stop_whose_reason_is_cut_shows_that_there_is_more_and_shows_it(
+def test_a_stop_whose_reason_is_cut_opens_nothing_and_has_it_above_the_page(
     cell: Server, page: Page
 ) -> None:
     says(cell, "halt")
@@ -157,6 +158,7 @@ def test_a_stop_whose_reason_is_cut_shows_that_there_is_more_and_shows_it(
     expect(stop.locator(".more[data-clipped]")).to_be_visible()
     assert stop.locator(".more").evaluate("(more) => getComputedStyle(more).opacity") == "1"
     stop.click()
-    sheet = page.locator("#whole")
-    expect(sheet).to_contain_text("Use the emergency stop of the cell.")
-    expect(sheet).to_contain_text(SHORT)
+    report = page.locator(".stop-report")
+    expect(report).to_contain_text("Use E-stop.")
+    expect(report).to_contain_text(SHORT)
+    expect(page.locator("#whole")).to_be_hidden()

@@ -14,6 +14,8 @@ from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import ready
 
+pytestmark = pytest.mark.long("every screen")
+
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480))
 LOGO: Final = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 4"><path d="M0 0h9v4z"/></svg>'
@@ -114,6 +116,7 @@ def test_who_has_control_is_said_in_words_of_their_own_width(controlled: Server,
     assert who["width"] > 100
 
 
+@pytest.mark.long("detail")
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
 def test_who_has_control_is_beside_the_state_and_not_cut(
     story: Server, chromium: Browser, language: str
@@ -162,6 +165,7 @@ RENEWED: Final = """async (text) => {
 }"""
 
 
+@pytest.mark.long("detail")
 @pytest.mark.parametrize("language", ["en", "ja", "de"])
 def test_the_menu_has_what_the_header_has_no_room_for(
     branded: Server, page: Page, language: str

@@ -8,9 +8,9 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.i18n.values import alike
 from app.panel import load_panel
-from app.web.rendering.display_choice import CHOICES
+from app.system.texts.text import alike
+from app.web.pages.display_choice import CHOICES
 from tests.browser.test_accessibility import reused_page, violations
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import demo_server
@@ -58,6 +58,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 HIDDEN_LABEL: Final = "label-title-only"  # that an input has no label which is seen, as the panel says
 
 
+@pytest.mark.long("detail")
 def test_a_label_that_is_not_seen_is_still_the_name(bare: Server, page: Page) -> None:
     for described in load_panel(SHIPPED).pages:
         page.goto(f"{bare.url}/pages/{described.id}")
@@ -75,6 +76,7 @@ def test_a_label_that_is_not_seen_is_still_the_name(bare: Server, page: Page) ->
     expect(page.get_by_label("Speed", exact=True)).to_be_attached()
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_no_shipped_panel_says_its_group_twice(path: Path) -> None:
     twice: list[Any] = [

@@ -13,6 +13,8 @@ from tests.support.browser.finger import Finger, jogged
 from tests.support.holds import PATIENT, TOPIC, TRIES, codes, ended, has_ended, jogging
 from tests.support.parts import Bridge, RosNode, Server, has_heard, until
 
+pytestmark = pytest.mark.promise("hold")
+
 # A network on which each message takes 45 ms.
 SLOW: Final = """
     window.WebSocket = class extends WebSocket {
@@ -48,6 +50,7 @@ def ends_before(finger: Finger) -> int:
     return len(codes(finger.server))
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("tap_ms", [0, 30, 80, 130, 190, 400])
 def test_a_tap_over_a_slow_way_has_its_receipt(
     chromium: Browser, kiosk: Server, jogger: RosNode, tap_ms: int
@@ -127,14 +130,15 @@ def test_hold_without_scripts_is_locked_with_a_reason(without_scripts: Page, kio
 def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Page) -> None:
     requested = []
 
-    def cut_once(route: Route) -> None:
+    def cut_at_first(route: Route) -> None:
+        """The request ahead of the page's scripts, and that of the script itself."""
         requested.append(route.request.url)
-        if len(requested) == 1:
+        if len(requested) <= 2:
             route.abort()
         else:
             route.continue_()
 
-    page.route("**/hold.js", cut_once)
+    page.route("**/holds.js", cut_at_first)
     page.goto(kiosk.url)
     page.wait_for_function("() => performance.getEntriesByType('navigation')[0].type === 'reload'")
     button = page.get_by_role("button", name="Jog")

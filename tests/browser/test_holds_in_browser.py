@@ -30,7 +30,7 @@ from tests.support.holds import (
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import kept_running
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.long("real time"), pytest.mark.promise("hold")]
 
 SOON_S: Final = 2.0
 

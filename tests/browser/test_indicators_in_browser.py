@@ -16,6 +16,8 @@ from tests.support.browser.pages import ROWS, widget
 from tests.support.parts import ROOT, Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server, panel_file
 
+pytestmark = pytest.mark.long("detail")
+
 PANEL: Final = """
 title = "Cell"
 mm_per_px = 0.22
@@ -197,6 +199,7 @@ def test_joints_look_the_same_on_a_page_without_gauges(page: Page, tmp_path: Pat
         server.end()
 
 
+@pytest.mark.long(None)
 def test_joints_are_found_by_name_in_messages_of_any_order(
     cell: Server, node: RosNode, page: Page
 ) -> None:

@@ -16,7 +16,7 @@ from tests.support.holds import QUIET_S, codes
 from tests.support.parts import Bridge, RosNode, Server, until
 from tests.support.servers import kept_running, live_server
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.long("real time"), pytest.mark.promise("hold")]
 
 PANEL: Final = """
 title = "Drive"
@@ -235,15 +235,22 @@ def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) ->
     until(lambda: robot.heard("/stamped")[-1]["twist"]["linear"]["x"] == 0.0, "it stops")
 
 
-def test_finger_outside_the_joystick_does_not_move_it(thumb: Thumb, robot: RosNode) -> None:
-    """It ends, as with any hold; and a finger that is first elsewhere begins nothing."""
+def test_finger_that_rests_elsewhere_does_not_move_the_joystick(thumb: Thumb, robot: RosNode) -> None:
+    """It follows the finger on it, which came after the other one."""
     before = len(robot.heard(TOPIC))
     thumb.touch.send("touchStart", (5, 5))
-    thumb.touch.send("touchStart", (5, 5), thumb.at(0, 1))
-    thumb.touch.send("touchMove", (60, 60), thumb.at(1, 0))
     time.sleep(QUIET_S)
     assert len(robot.heard(TOPIC)) == before
+    thumb.touch.send("touchStart", (5, 5), thumb.at(0, 1))
+    until(lambda: (0.5, 0.0) in heard(robot, before), "it drives")
+    driven = len(robot.heard(TOPIC))
+    thumb.touch.send("touchMove", (60, 60), thumb.at(0, 1))
+    until(lambda: len(robot.heard(TOPIC)) > driven + 5, "it drives on")
+    assert {*heard(robot, driven)} == {(0.5, 0.0)}
+    thumb.touch.send("touchMove", (60, 60), thumb.at(1, 0))
+    until(lambda: (0.0, -1.0) in heard(robot, driven), "it turns")
     thumb.touch.send("touchEnd")
+    until(partial(stopped, robot), "it stops")
 
 
 def test_hold_without_scripts_is_locked_with_a_reason(without_scripts: Page, kiosk: Server) -> None:

@@ -158,9 +158,10 @@ def test_entry_is_kept_over_another_page_and_is_not_sent(kiosk: Server, page: Pa
     are_there(page)
     assert sent == []
     page.locator('[data-widget="send"] button[type=submit]').click()
-    expect(page.locator("#receipt-send")).to_contain_text("Sent on /level")
+    expect(page.locator("#receipt-send")).to_contain_text("Sent at")
 
 
+@pytest.mark.long("detail")
 def test_a_number_is_restored_in_the_notation_of_the_page(kiosk: Server, page: Page) -> None:
     opened(page, kiosk)
     enter(page)
@@ -171,6 +172,7 @@ def test_a_number_is_restored_in_the_notation_of_the_page(kiosk: Server, page: P
     expect(page.locator(GAINS)).to_have_value("1,5; 2")
 
 
+@pytest.mark.long("detail")
 def test_a_parameter_follows_the_robot_again_after_it_is_set(kiosk: Server, page: Page) -> None:
     opened(page, kiosk)
     page.locator(GAIN).fill("4.5")
@@ -182,6 +184,7 @@ def test_a_parameter_follows_the_robot_again_after_it_is_set(kiosk: Server, page
     expect(page.locator(GAIN)).to_have_value("3")
 
 
+@pytest.mark.long("detail")
 def test_entry_outside_the_limits_or_not_a_number_is_not_restored(kiosk: Server, page: Page) -> None:
     opened(page, kiosk)
     initial = page.locator(GAINS).input_value()
@@ -208,7 +211,11 @@ def test_entry_outside_the_limits_or_not_a_number_is_not_restored(kiosk: Server,
     are_initial(page)
 
 
-@pytest.mark.parametrize("change", [False, True], ids=["a restart", "another panel file"])
+@pytest.mark.parametrize(
+    "change",
+    [False, pytest.param(True, marks=pytest.mark.long("detail"))],
+    ids=["a restart", "another panel file"],
+)
 def test_restart_discards_the_entered_value(page: Page, tmp_path: Path, change: bool) -> None:
     first = demo_server(tmp_path, PANEL)
     try:
@@ -230,6 +237,7 @@ def test_restart_discards_the_entered_value(page: Page, tmp_path: Path, change: 
         again.end()
 
 
+@pytest.mark.long("detail")
 def test_each_robot_has_its_own_kept_entries(page: Page, tmp_path: Path) -> None:
     robots = "".join(
         f'[[robot]]\nid = "{id}"\nname = "{id}"\nnamespace = "/{id}"\n' for id in ("r1", "r2")

@@ -19,6 +19,8 @@ from tests.support.browser.touch import (
 )
 from tests.support.parts import Server
 
+pytestmark = pytest.mark.promise("fingers")
+
 FIELDS: Final = ("#input-order", "#input-note")
 BOXES: Final = """(keys) => keys.map((key) => {
   const { width, height } = key.getBoundingClientRect();
@@ -54,6 +56,7 @@ def test_letters_capitals_and_signs(screen: Page) -> None:
     expect(screen.locator("#input-note")).to_have_value("aBcDEf 7€g")
 
 
+@pytest.mark.long("detail")
 def test_keyboard_edits_at_the_caret(screen: Page) -> None:
     keyboard_for(screen, "#input-note")
     press(screen, "a", "c", "left", "b")
@@ -66,6 +69,7 @@ def test_keyboard_edits_at_the_caret(screen: Page) -> None:
     expect(screen.locator("#input-note")).to_have_value("x")
 
 
+@pytest.mark.long("detail")
 def test_keyboard_accepts_no_more_characters_than_the_field(screen: Page) -> None:
     keyboard_for(screen, "#input-order")
     screen.locator("#input-order").evaluate("(input) => input.setSelectionRange(4, 4)")
@@ -101,6 +105,7 @@ def test_hold_buttons_are_locked_while_the_keyboard_is_open(screen: Page) -> Non
     expect(screen.locator(".hold")).to_be_disabled()
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_keyboard_never_covers_its_field_stop_or_the_header(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
@@ -120,6 +125,7 @@ def test_keyboard_never_covers_its_field_stop_or_the_header(
         settled(page)
 
 
+@pytest.mark.long("detail")
 def test_german_has_its_own_letters(screen: Page) -> None:
     screen.evaluate("document.documentElement.lang = 'de-AT'")
     keyboard_for(screen, "#input-note")
@@ -159,6 +165,7 @@ def test_enter_and_escape_that_end_a_conversion_close_nothing(screen: Page) -> N
     expect(screen.locator(".sheet")).to_have_count(0)
 
 
+@pytest.mark.long("real time")
 def test_bar_code_replaces_the_value_of_its_field(desk: Page) -> None:
     Keys(desk, READER_S).type("AB 12-3\n")
     expect(desk.locator("#input-order")).to_have_value("AB 12-3")
@@ -167,12 +174,24 @@ def test_bar_code_replaces_the_value_of_its_field(desk: Page) -> None:
     expect(desk.locator("#input-order")).not_to_be_focused()
 
 
+@pytest.mark.parametrize("code", ["9", "99"])
+def test_an_enter_as_near_as_the_last_keys_of_a_hand_ends_a_text(screen: Page, code: str) -> None:
+    keyboard_for(screen, "#input-note")
+    keys = Keys(screen, HUMAN_S)
+    keys.type(f"12{code[0]}")
+    keys.type(f"{code[1:]}\n", READER_S)
+    expect(screen.locator(".sheet")).to_have_count(0)
+    expect(screen.locator("#input-note")).to_have_value(f"12{code}")
+
+
+@pytest.mark.long("detail")
 def test_a_bar_code_into_the_field_itself_replaces_too(desk: Page) -> None:
     desk.locator("#input-order").click()
     Keys(desk, READER_S).type("999\n")
     expect(desk.locator("#input-order")).to_have_value("999")
 
 
+@pytest.mark.long("detail")
 def test_a_bar_code_stays_in_another_field_that_is_focused(desk: Page) -> None:
     desk.locator("#input-note").click()
     Keys(desk, READER_S).type("999\n")
@@ -180,6 +199,7 @@ def test_a_bar_code_stays_in_another_field_that_is_focused(desk: Page) -> None:
     expect(desk.locator("#input-order")).to_have_value("4711")
 
 
+@pytest.mark.long("real time")
 def test_a_code_that_is_too_long_is_not_cut(desk: Page) -> None:
     Keys(desk, READER_S).type("1234567890123\n")
     text = "The bar code has more than 12 characters. Nothing was entered."
@@ -189,6 +209,7 @@ def test_a_code_that_is_too_long_is_not_cut(desk: Page) -> None:
     expect(desk.locator("#scan-order")).to_be_empty()
 
 
+@pytest.mark.long("real time")
 def test_typing_by_hand_is_not_taken_for_a_bar_code(desk: Page) -> None:
     Keys(desk, HUMAN_S).type("999\n")
     Keys(desk, READER_S).type("88\n")  # two keys together
@@ -197,6 +218,7 @@ def test_typing_by_hand_is_not_taken_for_a_bar_code(desk: Page) -> None:
     expect(desk.locator("#input-order")).to_have_value("777")
 
 
+@pytest.mark.long("real time")
 @pytest.mark.parametrize("apart_s", [READER_S, HUMAN_S])
 def test_bar_code_reader_does_not_press_the_focused_button(
     desk: Page, kiosk: Server, apart_s: float

@@ -8,7 +8,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.support.browser.pages import place
+from tests.support.browser.pages import hold_by_key, place
 from tests.support.browser.touch import (
     HALT,
     HEARD,
@@ -26,6 +26,8 @@ from tests.support.browser.touch import (
 )
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
+
+pytestmark = pytest.mark.promise("numbers")
 
 JOYSTICK: Final = """
 title = "Drive"
@@ -129,6 +131,7 @@ def test_value_outside_the_limits_stays_on_the_keypad_and_cannot_be_set(screen: 
         settled(screen)
 
 
+@pytest.mark.long("detail")
 def test_empty_keypad_cannot_be_set(screen: Page) -> None:
     sheet = open_for(screen, "#input-speed")
     sheet.get_by_role("button", name="Clear").tap()
@@ -158,12 +161,14 @@ def test_keypad_keys_edit_the_number(screen: Page) -> None:
     expect(entered).to_have_text("1")  # in place of the limit
 
 
+@pytest.mark.long("detail")
 def test_keys_that_a_number_cannot_have_are_locked(screen: Page) -> None:
     sheet = open_for(screen, "#input-speed")
     for name in ("Change the sign", "Decimal point"):
         expect(sheet.get_by_role("button", name=name)).to_be_disabled()
 
 
+@pytest.mark.long("detail")
 def test_a_slider_takes_an_exact_value(screen: Page) -> None:
     open_for(screen, "[data-widget=height] output")
     enter(screen, "123.25")
@@ -172,6 +177,7 @@ def test_a_slider_takes_an_exact_value(screen: Page) -> None:
     expect(screen.locator("[data-widget=height] output")).to_have_text("123.25")
 
 
+@pytest.mark.long("detail")
 def test_a_parameter_is_entered_and_then_set_by_its_own_key(screen: Page) -> None:
     sheet = open_for(screen, "#input-belt")
     expect(sheet.get_by_role("heading")).to_have_text("Belt speed")
@@ -186,6 +192,7 @@ def test_a_parameter_is_entered_and_then_set_by_its_own_key(screen: Page) -> Non
     expect(screen.locator("[data-widget=belt] .value")).to_have_text("250 mm/s")
 
 
+@pytest.mark.long("detail")
 def test_a_parameter_follows_the_robot_after_cancel(screen: Page, kiosk: Server) -> None:
     """What was not kept is not entered."""
     first = screen.locator("#input-belt").input_value()
@@ -197,6 +204,7 @@ def test_a_parameter_follows_the_robot_after_cancel(screen: Page, kiosk: Server)
     expect(screen.locator("#input-belt")).to_have_value("70")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_keypad_never_covers_its_field_stop_or_the_header(
     touchscreen: Page, kiosk: Server, size: tuple[int, int]
@@ -223,6 +231,7 @@ def test_keypad_never_covers_its_field_stop_or_the_header(
         settled(page)
 
 
+@pytest.mark.long("detail")
 def test_keypad_follows_its_field_when_the_screen_is_rotated(screen: Page) -> None:
     open_for(screen, "#input-offset")
     screen.set_viewport_size({"width": 800, "height": 1280})
@@ -232,6 +241,7 @@ def test_keypad_follows_its_field_when_the_screen_is_rotated(screen: Page) -> No
     expect(screen.locator(".sheet")).to_be_in_viewport(ratio=1)
 
 
+@pytest.mark.long("detail")
 def test_a_page_that_was_lifted_lies_as_before(touchscreen: Page, kiosk: Server) -> None:
     page = touched(touchscreen, kiosk, (800, 480))
     before = page.locator("#input-speed").bounding_box()
@@ -251,6 +261,7 @@ def test_hold_buttons_are_locked_while_the_keypad_is_open(screen: Page) -> None:
     expect(screen.locator("#why-jog")).to_have_text("")
 
 
+@pytest.mark.long("detail")
 def test_joysticks_are_locked_while_the_keypad_is_open(touch_page: Page, tmp_path: Path) -> None:
     with demo_server(tmp_path, JOYSTICK) as server:
         page = touched(touch_page, server)
@@ -264,15 +275,10 @@ def test_joysticks_are_locked_while_the_keypad_is_open(touch_page: Page, tmp_pat
 
 
 def test_opening_the_keypad_ends_a_hold(screen: Page) -> None:
-    def holds() -> bool:  # as soon as its script is there, and the stream has enabled it
-        screen.keyboard.up(" ")
-        screen.get_by_role("button", name="Left").focus()
-        screen.keyboard.down(" ")
-        return screen.locator("[data-widget=jog][data-hold]").count() == 1
-
-    until(holds, "it is held", every_s=0.2)
+    held = screen.locator("[data-widget=jog][data-hold]")
+    hold_by_key(screen.get_by_role("button", name="Left"), held)
     open_for(screen, "#input-speed")
-    expect(screen.locator("[data-widget=jog][data-hold]")).to_have_count(0)
+    expect(held).to_have_count(0)
     screen.keyboard.up(" ")
 
 
@@ -317,6 +323,7 @@ def test_a_second_tap_on_set_presses_nothing_below(screen: Page) -> None:
     assert screen.evaluate("hit()")
 
 
+@pytest.mark.long("detail")
 def test_tapping_another_field_moves_the_keypad_and_discards_the_entry(screen: Page) -> None:
     open_for(screen, "#input-speed")
     enter(screen, "80")
@@ -349,6 +356,7 @@ def test_a_bar_code_is_not_confirmed_as_a_number(screen: Page) -> None:
     expect(screen.locator("#input-speed")).to_have_value("120")
 
 
+@pytest.mark.long("detail")
 def test_keypad_words_come_from_the_server(screen: Page) -> None:
     """The browser has a number, a unit and limits, and no word of its own."""
     served = screen.context.request.get(screen.url).text()
@@ -363,6 +371,7 @@ def test_keypad_words_come_from_the_server(screen: Page) -> None:
     assert [word for word in words if word not in served] == []
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize(
     ("keyboard", "has_touch", "opens"),
     [("auto", False, False), ("on", False, True), ("off", True, False), ("off", False, False)],
@@ -390,6 +399,7 @@ def test_panel_file_sets_where_the_keypad_opens(
             expect(page.locator("#input-note")).not_to_have_attribute("inputmode", "none")
 
 
+@pytest.mark.long("detail")
 def test_keypad_is_absent_without_scripts(chromium: Browser, kiosk: Server) -> None:
     context = chromium.new_context(java_script_enabled=False, has_touch=True)
     page = context.new_page()

@@ -6,14 +6,16 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.i18n import render, say
-from app.i18n.catalogue import files
+from app.system.texts import render, say
+from app.system.texts.catalogue import files
 from app.web.language import COOKIE
 from tests.browser.test_layout_in_browser import PANEL
 from tests.browser.test_screen_in_browser import CUT, OVERFLOWS
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import Server
 from tests.support.servers import demo_server
+
+pytestmark = pytest.mark.long("every screen")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 STATES: Final = ("online", "unknown", "lost")

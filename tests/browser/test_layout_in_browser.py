@@ -13,6 +13,8 @@ from tests.support.browser.pages import asked, place
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = [pytest.mark.long("every screen"), pytest.mark.promise("layout")]
+
 SOFT_HYPHEN: Final = "\u00ad"
 LONG: Final = SOFT_HYPHEN.join(("Geschwindigkeits", "begrenzungs", "freigabe"))
 ROBOT: Final = "Montageroboter Süd"
@@ -169,6 +171,7 @@ def test_confirmation_names_the_robot_and_empty_inputs(shown: Page) -> None:
     dialog.locator(".no").click()
 
 
+@pytest.mark.long("detail")
 def test_confirmation_question_is_the_same_without_scripts(demo: Server, without_scripts: Page) -> None:
     page = without_scripts
     page.goto(demo.url)
@@ -189,6 +192,7 @@ def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:
     assert box(shown, '[data-widget="n"]')["y"] == box(shown, '[data-widget="speed"]')["y"]
 
 
+@pytest.mark.long("detail")
 def test_displays_are_no_higher_than_their_content(shown: Page) -> None:
     low, high = box(shown, '[data-widget="enabled"]'), box(shown, '[data-widget="feed"]')
     middle, height = low["y"] + low["height"] / 2, high["height"]
@@ -215,6 +219,7 @@ BREAKS: Final = """(label) => {
 }"""
 
 
+@pytest.mark.long("detail")
 def test_a_soft_hyphen_says_where_a_long_word_is_broken(shown: Page) -> None:
     """No browser needs a dictionary for it."""
     breaks = shown.locator('[data-widget="allow"] .label').evaluate(BREAKS)

@@ -13,6 +13,8 @@ from tests.support.browser.pages import place
 from tests.support.parts import ENOUGH_S, REFERENCE, Bridge, RosNode, Server, live, until
 from tests.support.servers import ready
 
+pytestmark = pytest.mark.long("detail")
+
 Keep = Callable[[Server], Server]
 
 MOMENT = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$")
@@ -56,6 +58,7 @@ def lamp(page: Page, link: str) -> Locator:
     return page.locator(f'[data-lamp="{link}"]')
 
 
+@pytest.mark.long(None)
 def test_killed_bridge_is_shown_with_the_controls_that_it_locks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
 ) -> None:

@@ -15,6 +15,8 @@ from tests.support.browser.touch import overlap
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.promise("locks")
+
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 SVG: Final = '<svg xmlns="http://www.w3.org/2000/svg" width="160" height="90" viewBox="0 0 160 90"/>'
 # The demo robot says on /last_heard what it heard: a press sets the interlock.
@@ -119,6 +121,7 @@ def opens(cell: Server, page: Page) -> Page:
     return page
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", ["start", "fast"])
 def test_a_touch_says_the_condition_its_value_what_is_needed_and_what_to_do(
@@ -229,6 +232,7 @@ def test_the_focus_of_a_button_that_locks_stays_at_it_and_presses_nothing(
     expect(more).to_be_hidden()
 
 
+@pytest.mark.long("detail")
 def test_a_screen_reader_reads_it(cell: Server, page: Page) -> None:
     sized(opens(cell, page), 1280, 800)
     page.locator("[data-widget=start]").click()

@@ -15,6 +15,8 @@ from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import ready
 
+pytestmark = pytest.mark.long("detail")
+
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (390, 844))
 STOP: Final = "[data-widget=stop] > button:not(.more)"
 # A button's own face, a unit that stands after its number, and the lines below a new line may move.
@@ -33,6 +35,7 @@ def cell() -> Iterator[Server]:
         yield mine
 
 
+@pytest.mark.long(None)
 def test_stop_is_on_the_log_page_and_works(cell: Server, page: Page) -> None:
     page.goto(f"{cell.url}/log")
     for width, height in SIZES:
@@ -44,7 +47,50 @@ def test_stop_is_on_the_log_page_and_works(cell: Server, page: Page) -> None:
     expect(page.locator("html[data-floor]")).to_be_attached()
     sized(page, 1280, 800).locator(STOP).click()
     until(lambda: " of stop by " in cell.process.text, "Stop is sent")
-    expect(page.locator("[data-widget=stop] .result")).to_contain_text("Confirmed")
+    expect(page.locator("[data-widget=stop] .result")).to_contain_text("Stopped")
+
+
+def test_on_a_phone_an_answer_is_whole_below_what_was_done(cell: Server, page: Page) -> None:
+    cell.http.post("/widgets/operation", json={"inputs": {"message": "for a phone"}})
+    page.goto(f"{cell.url}/log?text=for a phone")
+    sized(page, 390, 844).evaluate(DRAWN)
+    row = page.locator("tr[data-kind]").first
+    time, _, done, answer = (place(cell) for cell in row.locator("td").all())
+    assert time["y"] < done["y"] < answer["y"]
+    assert answer["x"] + answer["width"] <= 390
+    assert page.locator(".entries").evaluate("(part) => part.scrollWidth <= part.clientWidth")
+    sized(page, 1280, 800)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_buttons_show_today_yesterday_this_shift_and_the_start(
+    cell: Server, page: Page, size: tuple[int, int]
+) -> None:
+    cell.http.post("/widgets/operation", json={"inputs": {"message": "today"}})
+    page.goto(f"{cell.url}/log?text=today")
+    sized(page, *size).evaluate(DRAWN)
+    for number, entries in ((0, 1), (1, 0), (2, 1)):
+        page.locator(".quick a").nth(number).click()
+        expect(page.locator(".quick [aria-current]")).to_have_count(1)
+        expect(page.locator(".quick a").nth(number)).to_have_attribute("aria-current", "true")
+        assert bool(page.locator("tr[data-kind]").count()) is bool(entries)
+        box = place(page.locator(".quick a").nth(number))
+        assert min(box["width"], box["height"]) >= 44
+    page.locator(".quick a").last.click()
+    expect(page).to_have_url(f"{cell.url}/log?")
+    sized(page, 1280, 800)
+
+
+def test_the_log_is_printed_by_its_button_without_the_frame(cell: Server, own_page: Page) -> None:
+    page = own_page
+    page.add_init_script("window.print = () => (document.body.dataset.printed = '')")
+    page.goto(f"{cell.url}/log")
+    page.locator("#print").click()
+    expect(page.locator("body[data-printed]")).to_be_attached()
+    page.emulate_media(media="print")
+    expect(page.locator("tr[data-kind]").first).to_be_visible()
+    for part in ("header", ".quick", ".filter", ".pager", STOP):
+        expect(page.locator(part).first).to_be_hidden()
 
 
 def test_the_log_has_days_and_the_words_of_an_operator(cell: Server, page: Page) -> None:

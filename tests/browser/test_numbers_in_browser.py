@@ -8,14 +8,16 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
-from app.i18n.typed_numbers import read_number, read_numbers
-from app.panel.number_range import Range, decimal_text
+from app.panel.numbers import Range, decimal_text
+from app.system.texts.locales import read_number, read_numbers
 from tests.support.browser.browsers import opened
 from tests.support.browser.pages import asked
 from tests.support.browser.touch import HUMAN_S
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, until
 from tests.support.servers import live_server
-from tests.support.typed_numbers import LANGUAGES, TABLE, as_sent, generated
+from tests.support.typed_numbers import LANGUAGES, TABLE, UNCLEAR, as_sent, generated
+
+pytestmark = pytest.mark.promise("numbers")
 
 TOPIC: Final = "/test_typed"
 FLOAT: Final = "std_msgs/msg/Float64"
@@ -93,7 +95,10 @@ JUDGED: Final = """async ([path, rows]) => {
 }"""
 READ: Final = """async ([path, rows]) => {
   const { readNumber, readNumbers } = await import(path);
-  return rows.map(([text, isWhole, isList]) => (isList ? readNumbers : readNumber)(text, isWhole));
+  return rows.map(([text, isWhole, isList]) => {
+    const read = (element) => readNumber(element, isWhole);
+    return isList ? readNumbers(text, read) : read(text);
+  });
 }"""
 
 
@@ -188,6 +193,7 @@ ROWS: Final[dict[str, tuple[Numbers, list[str]]]] = {
 WAYS: Final = {"typed": typed, "pasted": pasted, "composed": composed, "a form": without}
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("language", "locale"), READERS)
 def test_entered_number_reaches_the_robot_exactly_or_is_refused(
@@ -218,6 +224,7 @@ def test_entered_number_reaches_the_robot_exactly_or_is_refused(
     assert node.heard_data(TOPIC)[before:] == [number for _, number in accepted]
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize(("language", "locale"), READERS)
 def test_the_keypad_reads_by_the_same_rules(
     node: RosNode, opens: Opens, language: str, locale: str
@@ -281,6 +288,42 @@ def test_slider_and_its_buttons_show_the_value_that_is_sent(node: RosNode, opens
     expect(entry(page)).to_have_value("−2000")  # nothing yet, then the lowest value, and never below it
 
 
+def test_a_lone_group_that_may_be_either_is_judged_as_by_the_server(opens: Opens) -> None:
+    for language in LANGUAGES:
+        page = opens(language, "en-US")
+        path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
+            "main", "number-inputs"
+        )
+        rows = [(text, limits, number) for text, its, limits, number in UNCLEAR if its == language]
+        judged = page.evaluate(JUDGED, [path, [(text, *limits) for text, limits, _ in rows]])
+        assert judged == [None if number is not None else "unclear" for *_, number in rows]
+
+
+def test_a_lone_group_of_three_digits_is_refused_and_the_keypad_shows_how_it_was_read(
+    node: RosNode, opens: Opens
+) -> None:
+    before = len(node.heard(TOPIC))
+    for language, text, read in (("de", "1.000", "1000"), ("en", "1.250", "1.25")):
+        page = opens(language, "en-US", has_touch=True)
+        entry(page).evaluate("(input, text) => { input.value = text; }", text)
+        entry(page).dispatch_event("input")
+        expect(entry(page)).to_have_attribute("data-unread", "unclear")
+        press(page)
+        expect(page.locator("#receipt-send")).to_contain_text(text)
+        expect(entry(page)).to_have_value(text)
+        entry(page).evaluate("(input) => { input.value = ''; }")
+        page.locator("#input-level").tap()
+        expect(page.locator(".sheet.keypad")).to_be_visible()
+        page.locator("#input-level").select_text()
+        by_hand(page, text)
+        expect(page.locator(".sheet.keypad output")).to_have_text(text)
+        page.locator(".sheet.keypad .set-entry").tap()
+        expect(entry(page)).to_have_value(read)
+        expect(entry(page)).not_to_have_attribute("data-unread")
+        page.close()
+    assert node.heard_data(TOPIC)[before:] == []
+
+
 def exact(number: float | str | None) -> float | str | None:
     return number if isinstance(number, str | None) else float(number)
 
@@ -289,7 +332,7 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
     for language in LANGUAGES:
         page = opens(language, "en-US")
         path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
-            "start", "number-text"
+            "main", "number-text"
         )
         rows = [(row.text, row.whole, False) for row in TABLE if row.language == language]
         texts = [text for text, _ in generated(20_000, seed=len(rows))]
@@ -310,7 +353,7 @@ def test_scripts_and_server_read_the_same(opens: Opens) -> None:
 def test_scripts_and_server_judge_limits_and_steps_the_same(opens: Opens) -> None:
     page = opens("en", "de-DE")
     path = (page.locator("script[type=module]").get_attribute("src") or "").replace(
-        "start", "number-inputs"
+        "main", "number-inputs"
     )
     chance = random.Random(2)
     rows: list[tuple[float, Range, bool]] = []

@@ -10,6 +10,8 @@ from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 from tests.support.users import add_user
 
+pytestmark = pytest.mark.long("detail")
+
 OIDC = """
 [access.oidc]
 issuer = "{url}"
@@ -40,6 +42,7 @@ def kiosk(plant: Provider, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         yield mine
 
 
+@pytest.mark.long(None)
 def test_a_user_of_the_plant_signs_in_with_a_touch(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(kiosk.url)

@@ -14,7 +14,7 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from app.i18n import render, say
+from app.system.texts import render, say
 from tests.support.browser.webdriver import firefox, webkit
 from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import demo_server, kept_running
@@ -165,12 +165,14 @@ def shipped(servers: Callable[[Server], Server]) -> Server:
     return mine
 
 
+@pytest.mark.long("every screen")
 def test_each_page_of_the_shipped_panel_starts_whole(shipped: Server, other_browser: Remote) -> None:
     for page in PAGES:
         opened(other_browser, f"{shipped.url}/pages/{page}")
         assert other_browser.execute_script(LEFT_OUT) == 0, page
 
 
+@pytest.mark.long("every screen")
 def test_values_follow_the_robot(start: Callable[[], Server], other_browser: Remote) -> None:
     opened(other_browser, start().url)
     value = '[data-widget="count"] .value'
@@ -187,6 +189,7 @@ def test_a_press_has_its_receipt(start: Callable[[], Server], other_browser: Rem
     assert "Grüße 電" in str(logged(server, "operation"))
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize(("typed", "value"), [("2.5", "2.5"), ("-7", "-7")])
 def test_a_number_that_is_typed_is_sent(
     start: Callable[[], Server], other_browser: Remote, typed: str, value: str
@@ -214,6 +217,7 @@ def test_a_hold_lasts_until_it_is_released(start: Callable[[], Server], other_br
     until(lambda: text(other_browser, "#receipt-jog"), "it has a receipt")
 
 
+@pytest.mark.long("every screen")
 def test_a_vertical_gauge_stays_in_its_group(
     start: Callable[[], Server], other_browser: Remote
 ) -> None:
@@ -222,6 +226,7 @@ def test_a_vertical_gauge_stays_in_its_group(
     assert dial <= gauge <= group
 
 
+@pytest.mark.long("every screen")
 def test_dragging_over_locked_buttons_selects_nothing(
     start: Callable[[], Server], other_browser: Remote
 ) -> None:

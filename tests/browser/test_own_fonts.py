@@ -7,11 +7,12 @@ import pytest
 from playwright.sync_api import Page, Response
 
 from app.panel import load_panel
-from app.panel.widths.letters import SHIPPED, Fonts, text_width
-from app.panel.widths.panel_fonts import fonts_of
+from app.panel.widths.fonts import SHIPPED, Fonts, fonts_of, text_width
 from tests.panel.test_fonts import PANEL, wide_font
 from tests.support.parts import until
 from tests.support.servers import demo_server
+
+pytestmark = pytest.mark.long("detail")
 
 TEXT: Final = "Guard door agW 88"
 WIDTHS: Final = """async (text) => {

@@ -14,7 +14,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
-from app.printable import printable
+from app.system.printable import printable
 from tests.support import holds
 from tests.support.browser.pages import HIDE, place
 from tests.support.parts import (
@@ -33,6 +33,8 @@ from tests.support.parts import (
 )
 from tests.support.samples import TEXTS
 from tests.support.servers import ready
+
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("offline")]
 
 SIZES = [(1280, 800), (1024, 600)]
 NO_SERVER = "No connection to the panel server"
@@ -73,17 +75,18 @@ def shipped(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
     mine.end()
 
 
+@pytest.mark.long(None)
 def test_the_main_job(shipped: Server, node: RosNode, page: Page) -> None:
     page.goto(f"{shipped.url}/pages/operation")
     expect(button(page, "Publish1")).to_be_disabled()
-    expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
+    expect(why(page, "operation1")).to_contain_text("is not known yet")
     permit(shipped, node, True)
     expect(button(page, "Publish1")).to_be_enabled()
     expect(button(page, "Publish2")).to_be_enabled()
     before = len(node.heard("/operation1"))
     page.get_by_label("Message").fill("pick up")
     button(page, "Publish1").click()
-    expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1 at")
+    expect(page.locator("#receipt-operation1")).to_contain_text("Sent at")
     until(lambda: node.heard_data("/operation1")[before:] == ["pick up"], "the robot has it")
     permit(shipped, node, False)
     for name, widget in (("Publish1", "operation1"), ("Publish2", "operation2")):
@@ -164,6 +167,7 @@ def opens_nothing(server: Server, page: Page, **answer: Any) -> None:
     expect(button(page, "Publish")).to_be_enabled()
 
 
+@pytest.mark.long(None)
 def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
@@ -191,6 +195,7 @@ def test_a_reload_shows_the_true_state_before_any_script(
     expect(why(page, "operation1")).to_contain_text("does not permit")
 
 
+@pytest.mark.long(None)
 def test_without_scripts_a_press_is_a_form(
     server: Server, node: RosNode, without_scripts: Page
 ) -> None:
@@ -202,7 +207,7 @@ def test_without_scripts_a_press_is_a_form(
     page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_label("Message").fill("no script 日本語")
     button(page, "Publish").click()
-    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent at")
     expect(page.get_by_label("Message")).to_have_value("no script 日本語")
     until(lambda: len(node.heard("/operation")) > before, "heard")
     page.go_back()
@@ -254,6 +259,7 @@ TAPS: Final = """() => {
 JOINED_MS: Final = 700 - 50  # a tap so soon after another one is the same press
 
 
+@pytest.mark.long(None)
 def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
     page.evaluate(TAPS)
@@ -284,7 +290,7 @@ def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page:
     assert presses() == before + 1, "a press after that is another one"
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 @pytest.mark.parametrize("fault", ["killed", "frozen"])
 def test_a_lost_server_locks_every_control_within_two_seconds(
     bridge: Bridge, node: RosNode, tmp_path: Path, page: Page, fault: str
@@ -311,6 +317,7 @@ def test_a_lost_server_locks_every_control_within_two_seconds(
         mine.end(signal.SIGKILL)
 
 
+@pytest.mark.long(None)
 def test_a_restarted_server_opens_by_a_fresh_snapshot(
     bridge: Bridge, node: RosNode, tmp_path: Path, page: Page
 ) -> None:
@@ -323,11 +330,12 @@ def test_a_restarted_server_opens_by_a_fresh_snapshot(
     try:
         expect(button(page, "Publish")).to_be_enabled()
         expect(button(page, "Publish1")).to_be_disabled()
-        expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
+        expect(why(page, "operation1")).to_contain_text("is not known yet")
     finally:
         second.end()
 
 
+@pytest.mark.long(None)
 def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
     server: Server, node: RosNode, own_page: Page
 ) -> None:
@@ -382,6 +390,7 @@ def sends(page: Page) -> bool:
     return "Sent" in receipt.inner_text()
 
 
+@pytest.mark.long(None)
 def test_a_hidden_page_gives_its_stream_back_and_is_locked_until_a_new_snapshot(
     server: Server, node: RosNode, page: Page
 ) -> None:
@@ -423,9 +432,10 @@ def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) ->
     assert page.locator("main img").count() == 0
 
 
+@pytest.mark.long(None)
 @pytest.mark.parametrize(
     ("panel", "widget", "most_files", "most_bytes"),
-    [(REFERENCE, "operation", 17, 44_500), (SHIPPED, "stop", 27, 61_000)],
+    [(REFERENCE, "operation", 20, 48_000), (SHIPPED, "stop", 31, 69_500)],
     ids=["reference", "shipped"],
 )
 def test_the_first_page_is_small_and_asks_no_other_host(
@@ -515,6 +525,7 @@ def test_the_page_fits_its_screen_with_buttons_of_twenty_millimetres(
     assert page.evaluate(fits) <= [width, height]
 
 
+@pytest.mark.long(None)
 def test_a_button_acts_on_release_and_sliding_off_cancels(
     server: Server, node: RosNode, page: Page
 ) -> None:

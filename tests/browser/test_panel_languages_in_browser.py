@@ -10,6 +10,8 @@ from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
 from tests.support.servers import ready
 from tests.web.test_panel_languages import APP, PANEL
 
+pytestmark = pytest.mark.long("detail")
+
 
 @pytest.fixture(scope="module")
 def kiosk() -> Iterator[Server]:
@@ -22,6 +24,7 @@ def choose(page: Page, language: str) -> None:
     page.get_by_role("button", name=language, exact=True).click()
 
 
+@pytest.mark.long(None)
 def test_browser_changes_its_own_language_only(chromium: Browser, page: Page, kiosk: Server) -> None:
     other = chromium.new_page()
     for browser_page in (page, other):
@@ -34,7 +37,7 @@ def test_browser_changes_its_own_language_only(chromium: Browser, page: Page, ki
     page.locator('[data-widget="set_limit"] button[type=submit]').click()
     expect(page.locator("#receipt-set_limit")).to_contain_text("Gesendet auf /limit um")
     other.locator('[data-widget="set_limit"] button[type=submit]').click()
-    expect(other.locator("#receipt-set_limit")).to_contain_text("Sent on /limit at")
+    expect(other.locator("#receipt-set_limit")).to_contain_text("Sent at")
     choose(page, "日本語")
     expect(page.locator("#label-speed")).to_have_text("速度")
     expect(page.locator("h1")).to_have_text("セル1")

@@ -14,9 +14,11 @@ from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, Server, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client
-robots = cyclone.robots
+cyclone_robots = cyclone.cyclone_robots
 robot = cyclone.robot
 
 MM = 1 / 0.22  # CSS pixels
@@ -37,6 +39,7 @@ def set_(page: Page, label: str) -> None:
     button.click()
 
 
+@pytest.mark.long(None)
 def test_a_number_is_stepped_and_set_with_gloves(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:
@@ -128,6 +131,7 @@ def test_confirmed_value_is_the_value_in_the_dialog(
         assert robot.parameters()["limit"] == 20
 
 
+@pytest.mark.long(None)
 def test_value_out_of_range_is_marked_and_refused(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:

@@ -17,6 +17,8 @@ from tests.support.browser.finger import Touch
 from tests.support.browser.pages import asked, middle, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
+pytestmark = pytest.mark.promise("offline")
+
 # Each press as it leaves: in which event, how many buttons were busy by then, and how late the beat was
 # that set the page's clock. Each pointer that goes down: when, and whether it could answer.
 NOTE: Final = """
@@ -124,7 +126,7 @@ def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, way: s
         began = shown.evaluate("Date.now()")
         make(shown, by)
         shown.wait_for_function("() => left.length")
-        expect(receipt(shown)).to_contain_text("Sent on /operation at")
+        expect(receipt(shown)).to_contain_text("Sent at")
         expect(publish(shown)).not_to_have_attribute("aria-busy", "true")
         (press,) = shown.evaluate("left")
         assert press["by"] == way, by
@@ -137,9 +139,11 @@ def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, way: s
         assert began - press["late"] - ROUNDED_MS < at < shown.evaluate("Date.now()"), by
 
 
+@pytest.mark.long("detail")
 def test_each_press_has_its_own_id(shown: Page) -> None:
-    for by in ("mouse", "Enter", "mouse"):
+    for number, by in enumerate(("mouse", "Enter", "mouse"), 1):
         make(shown, by)
+        shown.wait_for_function("(number) => left.length === number", arg=number)
         expect(publish(shown)).not_to_have_attribute("aria-busy", "true")
     presses = shown.evaluate("left")
     assert len(presses) == len({press["id"] for press in presses}) == 3
@@ -152,7 +156,7 @@ def test_a_locked_button_is_pressed_by_no_program(shown: Page, by: str) -> None:
     shown.evaluate("() => document.querySelector('form.page').requestSubmit()")
     publish(shown).evaluate("(button) => { button.disabled = false; }")
     publish(shown).press("Enter")
-    expect(receipt(shown)).to_contain_text("Sent on /operation at")
+    expect(receipt(shown)).to_contain_text("Sent at")
     assert len(shown.evaluate("left")) == 1
 
 
@@ -168,7 +172,7 @@ def test_a_button_that_opens_under_a_resting_finger_is_not_pressed(shown: Page) 
     shown.mouse.up()
     assert shown.evaluate("[clicks, left]") == [1, []]
     publish(shown).click()
-    expect(receipt(shown)).to_contain_text("Sent on /operation at")
+    expect(receipt(shown)).to_contain_text("Sent at")
     assert len(shown.evaluate("left")) == 1
 
 
@@ -280,7 +284,7 @@ def over_a_button(page: Page, answer: str) -> tuple[int, float, float]:
     raise AssertionError("no question has its answer over a button")
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_the_second_tap_of_a_press_that_asks_is_no_answer(opens: Opens, page: Page) -> None:
     mine = opens(page, True)
     expect(page.locator("html[data-floor]")).to_be_attached()
@@ -321,6 +325,7 @@ def test_the_second_tap_of_an_answer_presses_nothing_below(
     expect(dialog).to_be_visible()  # a later tap is a press
 
 
+@pytest.mark.long("detail")
 def test_a_question_comes_late_and_says_so_where_it_can_not_come(opens: Opens, page: Page) -> None:
     """Its script is loaded at the first touch: a press before that waits for it, and is not lost."""
     mine = opens(page, True)
@@ -329,8 +334,12 @@ def test_a_question_comes_late_and_says_so_where_it_can_not_come(opens: Opens, p
     page.route("**/ask.js", lambda route: held.append(route))
     expect(page.locator("html[data-floor]")).to_be_attached()
     start(page, 3).click()
-    page.wait_for_timeout(300)
-    assert held
+
+    def is_asked_for() -> bool:
+        page.wait_for_timeout(50)
+        return bool(held)
+
+    until(is_asked_for, "the script of questions is asked for")
     expect(page.get_by_role("dialog")).to_be_hidden()
     for route in held:
         route.continue_()
@@ -403,6 +412,7 @@ def is_read(page: Page) -> bool:
     return time.time() - rendered_at(page) > TAP_AGAIN_MS / 1000
 
 
+@pytest.mark.long("detail")
 def test_without_scripts_too(opens: Opens, without_scripts: Page) -> None:
     page, mine = without_scripts, opens(without_scripts, True)
     start(page, 1).click()
@@ -431,12 +441,12 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
         page.wait_for_timeout(TAP_AGAIN_MS)
         forms_come_soon(page, but=rendered_at(page))
         double_tap(page, box["x"] + 20, box["y"] + 20)
-        return "Sent on /operation at" in page.locator("#receipt-go1").inner_text()
+        return "Sent at" in page.locator("#receipt-go1").inner_text()
 
     until(is_sent, "it is sent")
     # The second tap is on the page that the first one brings, or still on that of the first one, whose
     # form is the same press again.
-    sent, soon = r"Sent on /operation at [\d:]+\.", "Not sent: pressed so soon after the page.*"
+    sent, soon = r"Sent at [\d:]+\.", "Not sent: pressed so soon after the page.*"
     either = re.compile(f"^(Start 1: {sent} {soon}|{sent})$")
     expect(page.locator("#receipt-go1")).to_have_text(either)
     assert pressed(mine) == 1
@@ -446,6 +456,7 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     until(lambda: pressed(mine) == 2, "a later one is another press")
 
 
+@pytest.mark.long("detail")
 def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: Server) -> None:
     soon = {"_since": str(time.time() + 60), "message": "typed"}
     page = demo.http.post("/widgets/operation", data=soon, follow_redirects=True)
@@ -458,18 +469,19 @@ def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: S
     assert [(entry["kind"], entry["outcome"]) for entry in entries] == [("refused", "refused")]
 
 
+@pytest.mark.long("detail")
 def test_without_scripts_a_page_that_loaded_itself_takes_a_press_at_once(
     opens: Opens, without_scripts: Page
 ) -> None:
     page, mine = without_scripts, opens(without_scripts, False)
     start(page, 1).click()
-    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent at")
     with page.expect_navigation(timeout=15_000):
         pass
-    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent at")
     assert page.locator("input[name=_since]").count() == 0
     start(page, 2).click()
-    expect(page.locator("#receipt-go2")).to_contain_text("Sent on /operation1 at")
+    expect(page.locator("#receipt-go2")).to_contain_text("Sent at")
     assert pressed(mine) == 2
 
 

@@ -12,6 +12,8 @@ from tests.browser.test_pages import SIZES as LARGE
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.long("every screen")
+
 SIZES: Final = [*LARGE, (800, 480)]
 PANEL: Final = """
 title = "Cell"
@@ -54,7 +56,7 @@ span = 12
 "/doors_closed" = { silent = true }
 "/air" = { silent = true }
 """
-NO_AIR: Final = "Locked: waiting for /air."
+NO_AIR: Final = "Locked: /air is not known yet."
 
 
 @pytest.fixture(scope="module")
@@ -79,14 +81,14 @@ def test_an_operator_with_gloves_reads_all_reasons(
     button = page.get_by_role("button", name="Several", exact=True)
     why, whole = page.locator("#why-several"), page.locator("#whole")
     expect(button).to_be_disabled()
-    expect(why).to_contain_text("Locked: waiting for /doors_closed.")
+    expect(why).to_contain_text("Locked: open doors is not known yet.")
     expect(why).to_contain_text("+1 more")
     expect(why).to_be_visible(visible=scripts)
     expect(whole).to_be_hidden()
     described = (button.get_attribute("aria-describedby") or "").split()
     assert {"why-several", "reasons-several"} <= set(described)
     below = page.locator('[data-widget="below"]').bounding_box()
-    reasons = f"Locked: waiting for /doors_closed.\n{NO_AIR}"
+    reasons = f"Locked: open doors is not known yet.\n{NO_AIR}"
     if scripts:
         expect(page.locator('[data-widget="several"] .more')).to_be_attached()
         page.locator('[data-widget="several"]').tap()

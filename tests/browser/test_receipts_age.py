@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.long("detail")
+
 PANEL: Final = """
 title = "Cell"
 mode = "demo"
@@ -39,8 +41,8 @@ def test_a_receipt_ages_and_goes(cell: Server, own_page: Page) -> None:
     page.locator("[data-widget=on] .more").wait_for(state="attached")
     page.get_by_role("button", name="On", exact=True).click()
     receipt = page.locator("#receipt-on")
-    expect(receipt).to_contain_text("Sent on /operation at")
-    page.evaluate("""() => import(document.querySelector('link[href$="/receipts.js"]').href)
+    expect(receipt).to_contain_text("Sent at")
+    page.evaluate("""() => import(document.querySelector('link[href$="/show.js"]').href)
       .then(({ showOutcome }) => { window.showOutcome = showOutcome; })""")
     page.clock.install()
     page.evaluate(

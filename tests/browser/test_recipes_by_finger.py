@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.test_confirm_in_browser import opened, typed
-from tests.recipes.panels import CARTON, PANEL, TRAY
+from tests.cell.recipes.panels import CARTON, PANEL, TRAY
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import place
 from tests.support.browser.touch import settled
@@ -17,6 +17,8 @@ from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers
 from tests.web.test_recipes_confirmed import FAST, OTHER
+
+pytestmark = pytest.mark.long("detail")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 SECOND_TAP_MS: Final = 800

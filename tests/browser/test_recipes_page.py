@@ -9,11 +9,13 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
-from tests.recipes.panels import CARTON, TRAY
+from tests.cell.recipes.panels import CARTON, TRAY
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import Server, until
 from tests.web.test_recipes import act, exported, load, make, server_with
+
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("recipes")]
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 LOAD: Final = "[data-widget=boxes] .load > button"
@@ -48,6 +50,7 @@ def started(page: Page, url: str) -> Page:
     return page
 
 
+@pytest.mark.long(None)
 def test_a_recipe_is_chosen_and_loaded_and_the_page_says_so(cell: Server, page: Page) -> None:
     started(page, f"{cell.url}/recipes/boxes")
     page.locator("ol.recipes a", has_text="Tray").click()

@@ -10,6 +10,8 @@ from tests.support.browser.pages import place, widget
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.long("detail")
+
 PANEL: Final = """
 title = "Cell"
 mode = "demo"

@@ -11,6 +11,8 @@ from tests.support.browser.pages import widget
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 LIST: Final = "/test_stations"
 LIST_TYPE: Final = "sensor_msgs/msg/JointState"
 GO: Final = "/test_go_to"
@@ -58,6 +60,7 @@ def sent(node: RosNode) -> list[str]:
     return [message["data"] for message in node.heard(GO)]
 
 
+@pytest.mark.long(None)
 def test_options_come_from_the_robot_and_lock_while_they_are_not_known(
     cell: Server, node: RosNode, page: Page
 ) -> None:
@@ -65,7 +68,7 @@ def test_options_come_from_the_robot_and_lock_while_they_are_not_known(
     select, go = page.get_by_label("Station"), page.locator("[data-widget=go] > button:not(.more)")
     expect(widget(page, "go")).to_contain_text("the list of Station is not known")
     expect(go).to_be_disabled()
-    expect(widget(page, "station").locator(".note")).to_contain_text(LIST)
+    expect(widget(page, "station").locator(".note")).to_contain_text("waiting for data")
 
     lists(cell, node, "Dock", "Belt 1")
     expect(go).to_be_enabled()

@@ -16,6 +16,8 @@ from tests.support.browser.pages import DRAWN
 from tests.support.parts import Server
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.long("every screen")
+
 ROBOTS: Final = "".join(
     f'[[robot]]\nid = "r{number}"\nname = "Robot {number}"\nnamespace = "/r{number}"\n'
     for number in range(1, 6)

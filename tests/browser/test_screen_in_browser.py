@@ -8,13 +8,15 @@ from typing import Final
 import pytest
 from playwright.sync_api import CDPSession, Locator, Page, expect
 
-from app.i18n import sentences
+from app.system.texts import sentences
 from tests.browser.test_layout_in_browser import PANEL
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, place, settled
 from tests.support.panel_text import MAIN, START
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready
+
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("layout")]
 
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
 SCREENS: Final = ((1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
@@ -122,6 +124,7 @@ def button(page: Page, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
 
 
+@pytest.mark.long(None)
 @pytest.mark.parametrize("look", ["normal", "large"])
 def test_no_element_overflows_on_any_screen(
     cell: Server, several: Server, page: Page, look: str
@@ -241,7 +244,7 @@ def test_frame_button_returns_to_the_page_where_it_was_pressed(
         expect(button(shown, "Stop")).to_be_enabled()
         shown.wait_for_timeout(TAP_AGAIN_MS)
         button(shown, "Stop").click()
-        expect(shown.locator("#receipt-stop")).to_contain_text("Sent on /operation at")
+        expect(shown.locator("#receipt-stop")).to_have_attribute("data-outcome", "published")
         assert shown.url.partition("?")[0] == f"{cell.url}/pages/setup"
         expect(shown.locator("#receipt-stop")).to_be_visible()
 
@@ -253,13 +256,14 @@ def test_a_form_of_the_frame_that_names_no_page_goes_to_the_first(cell: Server, 
     assert answer.headers["location"].partition("?")[0] == "/pages/cell"
 
 
+@pytest.mark.long(None)
 def test_a_touch_on_a_locked_key_shows_its_whole_reason(long: Server, page: Page) -> None:
     sized(page, 1024, 600).goto(long.url)
     key, whole = page.locator("[data-widget=locked]"), page.locator("#whole")
     why = page.locator("#why-locked")
     expect(why).to_contain_text(DOORS)
     assert why.evaluate("(why) => why.scrollHeight > why.clientHeight")
-    expect(key.locator(".more")).to_be_attached()  # full-text.js is loaded
+    expect(key.locator(".more")).to_be_attached()  # its script is there
     key.click()
     expect(whole.get_by_role("heading", level=2)).to_have_text("Locked is locked")
     expect(whole.locator(".reason")).to_have_text(why.text_content() or "")
@@ -276,6 +280,7 @@ def test_a_keyboard_reaches_the_whole_reason(long: Server, page: Page) -> None:
     expect(page.locator("#whole .reason")).to_contain_text(DOORS)
 
 
+@pytest.mark.long(None)
 def test_touching_a_buttons_result_shows_its_full_text_and_presses_nothing(
     long: Server, page: Page
 ) -> None:
@@ -296,7 +301,7 @@ def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
     """What is no longer so is not read on."""
     page.route("**/lock", lambda route: route.abort())
     sized(page, 1024, 600).goto(long.url)
-    expect(page.locator("[data-widget=locked] .more")).to_be_attached()  # full-text.js is loaded
+    expect(page.locator("[data-widget=locked] .more")).to_be_attached()  # its script is there
     page.locator("[data-widget=locked]").click()
     expect(page.locator("#whole > p")).to_contain_text(DOORS)
     page.locator("#why-locked [data-text=reason]").evaluate(
@@ -314,7 +319,7 @@ def test_keys_that_lock_at_once_are_measured_together(tmp_path: Path, page: Page
     many = 'title = "Keys"\nmode = "demo"\n' + MAIN + "".join(keys)
     with demo_server(tmp_path, many) as mine:
         page.goto(mine.url)
-        expect(page.locator(".key .more")).to_have_count(KEYS)  # full-text.js is loaded
+        expect(page.locator(".key .more")).to_have_count(KEYS)  # its script is there
         clock = page.locator("#clock").text_content() or ""
         expect(page.locator("#clock")).not_to_have_text(clock)  # a beat: the snapshot is shown
         page.evaluate(DRAWN)

@@ -11,6 +11,8 @@ from tests.support.browser.pages import place, widget
 from tests.support.parts import Bridge, RosNode, Server, publish_until, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 PICTURE: Final = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="200"><path d="M0 0h400v200H0z"/></svg>'
 )

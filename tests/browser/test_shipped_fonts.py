@@ -7,9 +7,12 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, CDPSession, Error, Page
 
+from app.web.pages.display_choice import FONTS
 from deploy.font_characters import characters
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.long("detail")
 
 LATIN: Final = "Start Öffnen Schließen für 0123456789 −71 °C µm ±½ × ÷ – … „Halt“ ‘x’ •"
 
@@ -101,7 +104,10 @@ def test_without_them_a_page_is_shown_with_the_systems_fonts(
 
 
 def test_a_browser_gets_them_once(shipped: Server) -> None:
-    html = shipped.http.get("/", headers={"accept-language": "ja"}).text
+    """Those of its language, with each page from the second on."""
+    japanese = {"accept-language": "ja"}
+    assert 'rel="preload"' not in shipped.http.get("/", headers=japanese).text
+    html = shipped.http.get("/", headers={**japanese, "cookie": "=".join(FONTS)}).text
     assert html.count('rel="preload"') == 4
     path = html.split('rel="preload" href="')[1].split('"')[0]
     answer = shipped.http.get(path)

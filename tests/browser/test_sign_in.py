@@ -4,11 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
-from tests.support.parts import ROOT, Server
+from tests.support.browser.pages import CUT_TILES
+from tests.support.browser.touch import READER_S, Keys
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
-from tests.support.users import add_user
+from tests.support.users import add_user, says
+from tests.web.test_alarms import listed, server_with
+
+pytestmark = pytest.mark.promise("users")
 
 SIZES = ((1280, 800), (1024, 600), (800, 480))
 PIN_IS = {"M. Sato": "2580", "K. Novak": "1470"}
@@ -35,6 +40,7 @@ def signed_in_by_pad(page: Page, server: Server, user: str, pin: str) -> None:
     page.locator(".sign-in-key").click()
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES)
 def test_a_user_signs_in_on_the_pad_and_hands_over(
     own_page: Page, kiosk: Server, size: tuple[int, int]
@@ -51,6 +57,7 @@ def test_a_user_signs_in_on_the_pad_and_hands_over(
     expect(page.locator("a.user")).to_have_attribute("data-user", "")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("language", ["en", "de", "ja"])
 def test_everything_of_the_page_is_within_the_screen(
@@ -71,6 +78,7 @@ def test_everything_of_the_page_is_within_the_screen(
             assert min(box["width"], box["height"]) >= 40, selector
 
 
+@pytest.mark.long("detail")
 def test_a_sign_in_reaches_the_other_tabs_of_the_browser(own_page: Page, kiosk: Server) -> None:
     page = own_page
     other = page.context.new_page()
@@ -92,7 +100,63 @@ def test_a_wrong_pin_says_so_and_is_not_kept(own_page: Page, kiosk: Server) -> N
     signed_in_by_pad(page, kiosk, "K. Novak", "1471")
     expect(page.locator("p.said")).to_contain_text("The user or the PIN is wrong. Tries left:")
     expect(page.locator("input[name=pin]")).to_have_value("")
-    assert "1471" not in page.content()
+    assert not says(page.content(), "1471")
+
+
+@pytest.mark.long("every screen")
+@pytest.mark.parametrize("size", SIZES)
+def test_a_wrong_pin_moves_nothing_and_no_tile_is_cut(
+    own_page: Page, kiosk: Server, size: tuple[int, int]
+) -> None:
+    page = own_page
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.set_extra_http_headers({"accept-language": "de"})
+    page.goto(f"{kiosk.url}/signin?user=M.+Sato")
+    assert page.locator(".tiles").evaluate(CUT_TILES) == []
+    pad, key = page.locator(".pad"), page.locator(".sign-in-key")
+    before = [pad.bounding_box(), key.bounding_box()]
+    page.locator(".pad button[value='1']").click()
+    key.click()
+    said = page.locator("p.said")
+    expect(said).to_contain_text("falsch")
+    assert [pad.bounding_box(), key.bounding_box()] == before
+    inside, field = said.bounding_box(), page.locator(".pin").bounding_box()
+    assert inside == field
+    page.locator(".pad button[value='1']").click()
+    expect(said).to_be_hidden()
+    for digit in "clear", *"2580", "enter":
+        page.locator(f".secret button:not(.first)[value='{digit}']").click()
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
+
+
+@pytest.mark.long("detail")
+def test_a_check_that_takes_long_says_that_it_goes_on(own_page: Page, kiosk: Server) -> None:
+    page, held = own_page, list[Route]()
+    page.route("**/session", lambda route: held.append(route))
+    page.goto(f"{kiosk.url}/signin?user=M.+Sato")
+    for digit in *"2580", "enter":
+        page.locator(f".secret button:not(.first)[value='{digit}']").click()
+    expect(page.locator("p.said")).to_have_text("Still checking. Please wait.")
+    page.locator(".sign-in-key").click()
+    assert len(held) == 1
+    held[0].continue_()
+    expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
+
+
+def test_acknowledge_stays_locked_while_nobody_is_signed_in(own_page: Page, tmp_path: Path) -> None:
+    """Its script has heard that no control is required."""
+    add_user(tmp_path / "data", "M. Sato", "operator", pin="2580")
+    page = own_page
+    with server_with(tmp_path, data=tmp_path / "data") as server:
+        until(lambda: listed(server), "an alarm is raised")
+        page.goto(server.url)
+        expect(page.locator("html[data-floor]")).to_be_attached()
+        button = page.locator(".alarm-line button[type=submit]")
+        expect(page.locator(".alarm-line .by-control")).to_be_visible()
+        expect(button).to_be_disabled()
+        signed_in_by_pad(page, server, "M. Sato", "2580")
+        expect(button).to_be_enabled()
+        expect(page.locator(".alarm-line .by-control")).to_be_hidden()
 
 
 def test_a_badge_is_read_without_a_touch_and_never_shown(own_page: Page, kiosk: Server) -> None:
@@ -100,12 +164,12 @@ def test_a_badge_is_read_without_a_touch_and_never_shown(own_page: Page, kiosk: 
     page.goto(f"{kiosk.url}/signin")
     expect(page.locator("#badge")).to_be_focused()
     expect(page.locator("#badge")).to_have_attribute("type", "password")
-    page.keyboard.type("04A2B3")
-    page.keyboard.press("Enter")
+    Keys(page, READER_S).type("04A2B3\n")
     expect(page.locator("a.user")).to_have_attribute("data-user", "M. Sato")
     assert "04A2B3" not in page.content() + page.url
 
 
+@pytest.mark.long("detail")
 def test_a_password_signs_in(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(f"{kiosk.url}/signin?user=J.+Brandt")
@@ -114,6 +178,7 @@ def test_a_password_signs_in(own_page: Page, kiosk: Server) -> None:
     expect(page.locator("a.user")).to_have_attribute("data-user", "J. Brandt")
 
 
+@pytest.mark.long("detail")
 def test_without_a_touch_a_warning_comes_which_a_touch_ends(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(kiosk.url)
@@ -124,6 +189,7 @@ def test_without_a_touch_a_warning_comes_which_a_touch_ends(own_page: Page, kios
     expect(page.locator("#idle")).to_be_hidden()
 
 
+@pytest.mark.long("real time")
 def test_idle_time_ends_in_the_page_of_sign_in(own_page: Page, kiosk: Server) -> None:
     page = own_page
     page.goto(kiosk.url)
@@ -133,6 +199,7 @@ def test_idle_time_ends_in_the_page_of_sign_in(own_page: Page, kiosk: Server) ->
     expect(page.locator("a.user")).to_have_attribute("data-user", "")
 
 
+@pytest.mark.long("detail")
 def test_without_scripts_the_pad_works_and_no_page_has_the_pin(
     own_page: Page, kiosk: Server, tmp_path: Path
 ) -> None:
@@ -145,7 +212,7 @@ def test_without_scripts_the_pad_works_and_no_page_has_the_pin(
         for digit in "147":
             page.locator(f".pad button[value='{digit}']").click()
         expect(page.locator(".dots")).to_have_text("●●●")
-        assert "147" not in page.content() + page.url
+        assert not says(page.content() + page.url, "147")
         page.locator(".pad button[value='0']").click()
         page.locator(".sign-in-key").click()
         expect(page.locator("a.user")).to_have_attribute("data-user", "K. Novak")

@@ -15,6 +15,8 @@ from tests.support.browser.line import Line
 from tests.support.parts import Bridge, RosNode, Server, live, until
 from tests.support.processes.signals import send_signal
 
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("reconnect")]
+
 STOOD_STILL_S: Final = 5.0
 UPDATES_PER_S: Final = 50.0
 BYTES_PER_S: Final = 1_000  # of a line that carries less than what is said
@@ -66,6 +68,7 @@ def follows(page: Page, node: RosNode) -> None:
     until(shows, "what the robot says is shown", every_s=0.2)
 
 
+@pytest.mark.long(None)
 def test_resumed_page_shows_the_present_state_only(
     kiosk: Server, node: RosNode, chromium: Browser, page: Page
 ) -> None:

@@ -2,19 +2,22 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from itertools import pairwise
 from typing import Any, Final
 
 import pytest
 from playwright.sync_api import Browser, Error, Page, Request, Route, expect
 
-from app.i18n import render, say
-from app.i18n.catalogue import files
+from app.system.texts import render, say
+from app.system.texts.catalogue import files
 from app.web.language import COOKIE
 from tests.support.browser.browsers import opened
 from tests.support.browser.pages import HIDE
 from tests.support.parts import ROOT, SHIPPED, Server, until
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.promise("reconnect")
 
 THROWS: Final = 'get() { throw new DOMException("denied", "SecurityError"); }, configurable: true'
 NO_STORAGE: Final = "".join(
@@ -48,35 +51,27 @@ FAULTS: Final[dict[str, dict[str, Any] | None]] = {
 # sheets come later.
 SCRIPTS: Final = {
     "main": "operation",
-    "source": "operation",
-    "start": "operation",
-    "stop-keys": "operation",
+    "touches": "operation",
     "show": "operation",
     "press": "operation",
     "entries": "operation",
-    "full-text": "operation",
-    "tabs": "cell",
-    "holding": "cell",
-    "inputs": "recipe",
+    "number-inputs": "recipe",
     "number-text": "recipe",
-    "kinds/hold": "cell",
-    "kinds/pallet": "cell",
-    "kinds/conditions": "watch",
-    "kinds/parameter": "recipe",
+    "kinds/holds": "cell",
+    "kinds/facts": "cell",
+    "kinds/entries": "recipe",
     "kinds/gauge": "robot",
     "kinds/joints": "robot",
     "kinds/step": "robot",
     "kinds/table": "robot",
     "kinds/camera": "watch",
-    "kinds/joystick": "watch",
     "kinds/log": "watch",
     "kinds/trend": "watch",
     "trend/plot": "watch",
-    "floor/floor": "operation",
 }
 OPERATION: Final = "/pages/operation"
 PAUSES_S: Final = (1, 2, 4, 8, 16, 30, 30)  # before the reloads of a page that stays incomplete
-STARTS_WITHIN_S: Final = 10
+START_WAITS_S: Final = (10, 20, 40, 80, 120)  # for the next file: longer after each reload
 SETTLED_S: Final = 60
 # Timers of whole seconds end when the test says so.
 KEEP_TIMERS: Final = """
@@ -179,9 +174,10 @@ def presses_all_buttons(page: Page) -> bool:
 def publish(page: Page) -> None:
     page.get_by_label("Message").fill("once")
     page.get_by_role("button", name="Publish", exact=True).click()
-    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent at")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("oddity", ODDITIES)
 def test_whatever_a_browser_says_or_lacks_the_page_works(
     demo: Server, own_page: Page, oddity: str
@@ -201,7 +197,7 @@ def test_a_page_whose_script_has_a_fault_is_locked_and_presses_nothing(
     demo: Server, tab: Page, fault: str
 ) -> None:
     posts = noted(tab, "POST")
-    for script in ("main", "press", "tabs", "kinds/hold"):
+    for script in ("main", "press", "show", "kinds/holds"):
         answer(tab, script, fault)
         go(tab, f"{demo.url}/pages/cell")
         is_locked(tab)
@@ -211,6 +207,7 @@ def test_a_page_whose_script_has_a_fault_is_locked_and_presses_nothing(
         tab.unroute_all()
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_each_script_is_needed(demo: Server, tab: Page, script: str) -> None:
     answer(tab, script, "500")
@@ -218,6 +215,7 @@ def test_each_script_is_needed(demo: Server, tab: Page, script: str) -> None:
     is_locked(tab)
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("language", sorted(files()))
 def test_a_page_is_locked_in_the_readers_language(demo: Server, tab: Page, language: str) -> None:
     tab.context.add_cookies([{"name": COOKIE, "value": language, "url": demo.url}])
@@ -228,9 +226,10 @@ def test_a_page_is_locked_in_the_readers_language(demo: Server, tab: Page, langu
 
 
 def kept_timers(page: Page) -> list[int]:
-    """The times of the page's long timers, in seconds; they end when the test says so."""
+    """The times of the page's long timers, in seconds; they end when the test says so. Without those
+    that wait for the start."""
     times: list[int] = page.evaluate("timers.map((timer) => timer.ms / 1000)")
-    return [time for time in times if time != STARTS_WITHIN_S]
+    return [time for time in times if time not in START_WAITS_S]
 
 
 def end_timer(page: Page, time_s: int) -> None:
@@ -239,12 +238,13 @@ def end_timer(page: Page, time_s: int) -> None:
     )
 
 
+@pytest.mark.long("detail")
 @pytest.mark.parametrize("storage", ["", NO_STORAGE], ids=["storage", "no storage"])
 def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
     demo: Server, tab: Page, storage: str
 ) -> None:
     tab.add_init_script(KEEP_TIMERS + storage)
-    answer(tab, "full-text", "500")
+    answer(tab, "touches", "500")
     go(tab, demo.url + OPERATION)
     for pause_s in PAUSES_S:
         is_locked(tab)
@@ -259,7 +259,7 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
     expect(tab.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
     tab.wait_for_function("() => timers.some((timer) => timer.ms === 60000)")
     end_timer(tab, SETTLED_S)
-    answer(tab, "full-text", "500")
+    answer(tab, "touches", "500")
     tab.reload()
     is_locked(tab)
     assert kept_timers(tab) == [PAUSES_S[0]]
@@ -267,27 +267,87 @@ def test_reloads_of_a_faulty_page_back_off_and_end_with_the_fault(
 
 def test_a_faulty_page_does_not_reload_while_its_server_is_gone(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
-    answer(tab, "full-text", "500")
+    answer(tab, "touches", "500")
     go(tab, demo.url + OPERATION)
     is_locked(tab)
-    tab.route("**/static/*/start.js", lambda route: route.abort())
+    tab.route("**/static/*/main.js", lambda route: route.abort())
     for pause_s, longer_s in pairwise(PAUSES_S[:4]):
         end_timer(tab, pause_s)
         tab.wait_for_function("(ms) => timers.at(-1).ms === ms", arg=1000 * longer_s)
     is_locked(tab)
 
 
+def is_locked_after_waits(page: Page, wait_s: int) -> bool:
+    """Ends a wait for the start; whether the page is locked then. It waits again if a file has arrived
+    since the last one."""
+    end_timer(page, wait_s)
+    return bool(page.locator("body[data-locked]").count())
+
+
 def test_a_script_that_never_arrives_locks_the_page(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
     tab.route("**/static/*/press.js", lambda route: None)
     go(tab, demo.url + OPERATION, wait_until="domcontentloaded")
-    end_timer(tab, STARTS_WITHIN_S)
-    is_locked(tab)
+    for wait_s, longer_s in pairwise(START_WAITS_S[:3]):
+        until(partial(is_locked_after_waits, tab, wait_s), "all else has arrived")
+        is_locked(tab)
+        with tab.expect_navigation(wait_until="domcontentloaded"):
+            end_timer(tab, kept_timers(tab)[0])
+        tab.wait_for_function("(ms) => timers.some((timer) => timer.ms === ms)", arg=1000 * longer_s)
 
 
+@pytest.mark.long("detail")
+def test_a_page_whose_scripts_arrive_slowly_waits_for_them(demo: Server, tab: Page) -> None:
+    """On a busy machine they take minutes: the page does not begin again while they arrive."""
+    held: list[Route] = []
+    tab.add_init_script(KEEP_TIMERS)
+    tab.route("**/static/*/*.js", lambda route: held.append(route))
+    go(tab, demo.url + OPERATION, wait_until="commit")
+    tab.wait_for_function("() => timers.length > 0")
+    pages = noted(tab, OPERATION)
+    while not tab.locator("html[data-floor]").count():
+        arrived = tab.evaluate("performance.getEntriesByType('resource').length")
+        until(lambda: bool(held), "a script is requested")
+        held.pop(0).continue_()
+        tab.wait_for_function("(n) => performance.getEntriesByType('resource').length > n", arg=arrived)
+        if tab.evaluate("timers.some((timer) => timer.ms === 10000)"):
+            end_timer(tab, START_WAITS_S[0])
+        assert tab.locator("body[data-locked]").count() == 0
+    assert pages == []
+
+
+LATER: Final = {"press-socket"}  # a press waits for it, the page does not
+PAGES: Final = (
+    "/pages/cell",
+    "/pages/recipe",
+    "/pages/watch",
+    OPERATION,
+    "/alarms",
+    "/log",
+    "/diagnostics",
+)
+
+
+@pytest.mark.long("table")
+@pytest.mark.parametrize("path", PAGES)
+def test_a_page_requests_all_scripts_of_its_start_at_once(demo: Server, tab: Page, path: str) -> None:
+    requested = noted(tab, "/static/")
+    go(tab, demo.url + path)
+    expect(tab.locator("html[data-floor]")).to_be_attached()
+    links = tab.locator("link[rel=modulepreload]").evaluate_all("links => links.map(l => l.href)")
+    assert {url for url in requested if url.endswith(".js")} - later(links) == set(links)
+
+
+def later(links: list[str]) -> set[str]:
+    """The scripts that come later, as URLs."""
+    folder = links[0].rpartition("/")[0]
+    return {f"{folder}/{name}.js" for name in LATER}
+
+
+@pytest.mark.long("detail")
 def test_a_faulty_page_stays_locked_when_it_is_shown_again(demo: Server, tab: Page) -> None:
     tab.add_init_script(KEEP_TIMERS)
-    answer(tab, "floor/floor", "500")
+    answer(tab, "touches", "500")
     go(tab, demo.url + OPERATION)
     is_locked(tab)
     streams = noted(tab, "/events")
@@ -312,6 +372,7 @@ def test_press_that_fails_before_sending_says_not_sent(demo: Server, tab: Page) 
         expect(button).not_to_have_attribute("aria-busy", "true")
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("need", NEEDS)
 @pytest.mark.parametrize("language", sorted(files()))
 def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
@@ -327,6 +388,7 @@ def test_a_browser_that_is_too_old_shows_that_and_nothing_else(
     assert streams == []
 
 
+@pytest.mark.long("detail")
 def test_overlays_are_hidden_without_the_popover_api(demo: Server) -> None:
     """In the markup, for a browser without scripts."""
     html = demo.http.get(OPERATION).text
@@ -337,6 +399,7 @@ def test_overlays_are_hidden_without_the_popover_api(demo: Server) -> None:
     assert popovers > html.count(" popovertarget") > 0
 
 
+@pytest.mark.long("detail")
 def test_text_that_is_not_to_be_selected_is_so_in_webkit_too() -> None:
     for sheet in (ROOT / "static/css").rglob("*.css"):
         text = sheet.read_text()

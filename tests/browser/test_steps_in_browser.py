@@ -20,6 +20,8 @@ from tests.support.parts import (
 )
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 PANEL: Final = """
 title = "Cell"
 
@@ -67,12 +69,13 @@ def is_reported(cell: Server, node: RosNode, speed: float) -> None:
     until(lambda: cell.widget("speed")["enabled"], "the last press is over")
 
 
+@pytest.mark.long(None)
 def test_a_press_is_one_step_and_the_next_waits_for_it(cell: Server, node: RosNode, page: Page) -> None:
     page.goto(cell.url)
     up, down = key(page, "up"), key(page, "down")
     reason = page.locator("#why-speed")
     expect(up).to_be_disabled()
-    expect(reason).to_contain_text("Locked: waiting for /test_speed.")
+    expect(reason).to_contain_text("Locked: Speed is not known yet.")
     assert "why-speed" in (up.get_attribute("aria-describedby") or "")
     colour, cursor = up.evaluate(
         "(key) => [getComputedStyle(key).backgroundColor, getComputedStyle(key).cursor]"
@@ -89,7 +92,7 @@ def test_a_press_is_one_step_and_the_next_waits_for_it(cell: Server, node: RosNo
     node.publish(REPORTED, {"data": 50.0})
     expect(up).to_be_enabled()
     expect(up).to_have_attribute("value", "60")
-    expect(page.locator('[data-widget="speed"] .result')).to_contain_text("Confirmed by /test_speed")
+    expect(page.locator('[data-widget="speed"] .result')).to_contain_text("Confirmed by the robot")
     assert node.heard_data(SET)[before:] == [50.0]
     is_reported(cell, node, 60.0)
     expect(up).to_be_disabled()
@@ -143,4 +146,4 @@ def test_without_scripts_a_form_sends_the_value_of_its_key(
     node.publish(REPORTED, {"data": 20.0})
     assert node.heard_data(SET)[before:] == [20.0]
     expect(page.locator('[data-widget="speed"] .value')).to_contain_text("20")
-    expect(page.locator('[data-widget="speed"] .result')).to_contain_text("Confirmed by /test_speed")
+    expect(page.locator('[data-widget="speed"] .result')).to_contain_text("Confirmed by the robot")

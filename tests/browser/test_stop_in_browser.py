@@ -10,10 +10,12 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.support.browser.finger import Touch
-from tests.support.browser.pages import middle, place
+from tests.support.browser.pages import comes, middle, place
 from tests.support.browser.touch import MM_PER_PX, PANEL, SIZES, overlap, permit, settled, touched
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
+
+pytestmark = pytest.mark.promise("stop")
 
 STOP: Final = "[data-widget=stop] > button:not(.more)"
 PAUSE: Final = """
@@ -107,8 +109,7 @@ def test_stop_works_while_a_finger_holds_the_robot(page: Page, cell: Server) -> 
     def held() -> bool:
         """Its script may not have been there at the first touch."""
         touch.send("touchStart", hold)
-        page.wait_for_timeout(500)
-        if page.locator("[data-widget=jog][data-hold=held]").count():
+        if comes(page.locator("[data-widget=jog][data-hold=held]")):
             return True
         touch.send("touchEnd")
         return False
@@ -154,6 +155,7 @@ def test_keyboard_key_presses_stop_once(page: Page, cell: Server) -> None:
     pressed(cell, before)
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_a_question_stands_beside_its_button_and_stop_is_pressed_at_once(
     touchscreen: Page, cell: Server, size: tuple[int, int]
@@ -222,6 +224,7 @@ def opened_parts(page: Page) -> Iterator[tuple[str, str]]:
         expect(page.locator("body[data-asks]")).to_have_count(0)
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_nothing_that_opens_reaches_the_rail_with_stop_in_its_lower_left_corner(
     touchscreen: Page, cell: Server, size: tuple[int, int]
@@ -270,6 +273,7 @@ def test_the_question_presses_with_yes_only(page: Page, cell: Server) -> None:
     assert resets() == before + 1
 
 
+@pytest.mark.long("every screen")
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_stop_stays_uncovered_and_works_during_cleaning(
     touchscreen: Page, cell: Server, size: tuple[int, int]
@@ -279,12 +283,15 @@ def test_stop_stays_uncovered_and_works_during_cleaning(
     page.get_by_role("button", name="Menu").tap()
     page.get_by_role("button", name="Clean the screen").tap()
     expect(page.locator("#cleaning")).to_be_visible()
+    expect(page.locator("#cleaning")).to_contain_text("Only Stop works")
+    expect(page.locator("#cleaning")).to_contain_text("or when the button below is held")
     assert uncovered(page)
     page.touchscreen.tap(*middle(page.locator(STOP)))
     pressed(cell, before)
     expect(page.locator("#cleaning")).to_be_visible()
 
 
+@pytest.mark.long("detail")
 def test_cleaning_ends_when_its_button_is_held(page: Page, cell: Server) -> None:
     page.get_by_role("button", name="Menu").tap()
     page.get_by_role("button", name="Clean the screen").tap()
@@ -309,7 +316,7 @@ def test_the_first_touch_on_a_dark_page_stops(touchscreen: Page, tmp_path: Path)
         expect(page.locator("#dark")).to_be_hidden()
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_touch_is_seen_within_50_ms(page: Page, cell: Server) -> None:
     load = page.locator("[data-widget=load] > button:not(.more)")
     touch = Touch(page)

@@ -11,6 +11,8 @@ from tests.support.browser.pages import place, press_button, widget
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, publish_until, until
 from tests.support.servers import live_server
 
+pytestmark = pytest.mark.long("detail")
+
 SET: Final = "/test_light_set"
 REPORTED: Final = "/test_light"
 BOOL: Final = "std_msgs/msg/Bool"
@@ -66,6 +68,7 @@ def report(cell: Server, node: RosNode, position: str) -> None:
     publish_until(node, REPORTED, is_on, lambda: cell.widget("light")["at"] == position)
 
 
+@pytest.mark.long(None)
 def test_it_moves_when_the_robot_reports_it_and_not_before(
     cell: Server, node: RosNode, page: Page
 ) -> None:
@@ -102,7 +105,7 @@ def test_it_says_that_the_report_did_not_come(cell: Server, node: RosNode, page:
     off, switch = key(page, "off"), widget(page, "light")
     expect(off).to_be_enabled()
     off.click()
-    expect(switch.locator(".result")).to_contain_text("No confirmation on /test_light within 2 s.")
+    expect(switch.locator(".result")).to_contain_text("The robot did not confirm it within 2 s.")
     expect(switch.locator(".result")).to_be_visible()
     expect(switch).to_have_attribute("data-at", "on")
     expect(off).to_be_enabled()

@@ -12,10 +12,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Response, Route, expect
 
-from app.view.trend_plot import axis_range, value_ticks
+from app.cell.view.trend import axis_range, value_ticks
 from tests.support.browser.pages import HIDE, place
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, until
 from tests.support.servers import live_server
+
+pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("history")]
 
 PANEL = """
 title = "Trends"
@@ -154,6 +156,7 @@ def test_the_axis_and_the_values_have_the_decimal_sign_of_the_language(
     context.close()
 
 
+@pytest.mark.long(None)
 def test_every_sample_of_a_real_node_is_in_the_line_and_the_text(
     cell: Server, node: RosNode, page: Page
 ) -> None:
@@ -187,7 +190,7 @@ def test_a_pause_keeps_the_picture_while_the_server_goes_on(
     opened(page, cell)
     says(node, 5.5)
     until(lambda: line(page), "a line is drawn")
-    key(page, "pause").click()
+    key(page, "pause").press("Enter")
     expect(page.locator(".paused")).to_have_text(re.compile(r"^Paused −00:00:\d\d$"))
     expect(key(page, "live")).to_be_focused()
     before, urls = line(page), []
@@ -253,7 +256,7 @@ def test_the_cursor_goes_by_keys(cell: Server, node: RosNode, page: Page) -> Non
     before = values.locator("b").inner_text()
     for _ in range(3):
         page.keyboard.press("ArrowLeft")
-    assert values.locator("b").inner_text() < before
+    until(lambda: values.locator("b").inner_text() < before, "the cursor is at an earlier time")
     page.keyboard.press("Escape")
     expect(values).to_be_hidden()
 
@@ -339,6 +342,7 @@ def test_requests_are_at_most_two_a_second_and_small(cell: Server, page: Page) -
     assert all("since=" in url and size < 600 for url, size in sizes[1:])
 
 
+@pytest.mark.long(None)
 def test_a_lost_server_marks_values_as_old_and_keeps_the_picture(
     bridge: Bridge, node: RosNode, page: Page, tmp_path: Path
 ) -> None:
@@ -375,14 +379,14 @@ AXES = """async ([module, ranges]) => {
 def test_the_browser_draws_the_axes_of_the_server(cell: Server, page: Page) -> None:
     """Also for values at which an axis has no width, or more than a double can say."""
     page.goto(cell.url)
-    script = page.locator('script[src$="start.js"]').get_attribute("src") or ""
+    script = page.locator('script[src$="main.js"]').get_attribute("src") or ""
     ends = [(low, high) for low, high in itertools.product(DOUBLES, DOUBLES) if low <= high]
     ranges = [
         (*pair, *fixed)
         for pair in ends
         for fixed in ((None, None), (0.0, None), (None, 5e-324), (-5.0, 5.0))
     ]
-    module = script.replace("start.js", "trend/axis.js")
+    module = script.replace("main.js", "trend/plot.js")
     for drawn, parameters in zip(page.evaluate(AXES, [module, ranges]), ranges, strict=True):
         low, high = axis_range(*parameters)
         expected = [low, high, *(value for value, _ in value_ticks(low, high))]

@@ -6,8 +6,8 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.access.secrets_hash import matches
-from app.access.users_file import UsersFile
+from app.cell.people.secrets_hash import matches
+from app.cell.people.users_file import UsersFile
 from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import ReusedPage, sized
@@ -15,6 +15,8 @@ from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 from tests.support.users import add_user, token_of
+
+pytestmark = pytest.mark.long("detail")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 ENGINEER: Final = {"user": "J. Brandt", "password": "long enough"}
@@ -70,6 +72,7 @@ def save(page: Page) -> None:
     page.get_by_role("button", name="Save").click()
 
 
+@pytest.mark.long(None)
 def test_an_engineer_adds_and_changes_a_user_by_finger(chromium: Browser, kiosk: Server) -> None:
     with chromium.new_context(has_touch=True, viewport={"width": 800, "height": 480}) as context:
         page = context.new_page()

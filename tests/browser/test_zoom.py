@@ -6,12 +6,14 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.i18n.catalogue import files as languages
+from app.system.texts.catalogue import files as languages
 from app.web.language import COOKIE as LANGUAGE
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.long("every screen")
 
 WIDTH, HEIGHT = 640, 400  # of 1280x800
 TOUCH: Final = 44

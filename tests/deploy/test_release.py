@@ -68,6 +68,7 @@ def test_only_files_of_a_release_are_removed(tmp_path: Path) -> None:
     assert len(list(folder.iterdir())) == 3
 
 
+@pytest.mark.long("packaging")
 def test_the_sdist_gives_the_wheel_of_the_checkout(tmp_path: Path) -> None:
     wheel = release.build(tmp_path)
     assert wheel.name == f"operator_panel-{release.version()}-py3-none-any.whl"

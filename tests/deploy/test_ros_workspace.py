@@ -30,6 +30,8 @@ from tests.support.parts import (
     zenoh_file,
 )
 
+pytestmark = pytest.mark.long("packaging")
+
 PACKAGE: Final = "operator_panel"
 PANEL: Final = f'title = "Robot cell 1"\n{MAIN}{START}'
 # The bridge's own program takes `-c FILE` and ROS_DOMAIN_ID; that of the tests FILE and places in it.
@@ -156,7 +158,8 @@ def launched(workspace: Workspace, domain: int, tmp_path: Path) -> Iterator[tupl
     file = workspace.installed / f"share/{PACKAGE}/launch/kiosk.launch.py"
     process = Process(
         [
-            *(sys.executable, str(TESTS / "ros/launch_file.py"), str(file), f"panel:={panel.name}"),
+            *(sys.executable, str(TESTS / "ros_nodes/launch_file.py"), str(file)),
+            f"panel:={panel.name}",
             *(f"port:={port}", f"bridge_command:={bridge}", f"bridge_config:={config}"),
         ],
         {
@@ -190,7 +193,7 @@ def launch(workspace: Workspace, folder: Path, *arguments: str) -> str:
     (folder / "cell1.toml").write_text(PANEL.replace('"/start"', '"start"'))
     file = workspace.installed / f"share/{PACKAGE}/launch/kiosk.launch.py"
     done = subprocess.run(
-        [sys.executable, str(TESTS / "ros/launch_file.py"), str(file), *arguments],
+        [sys.executable, str(TESTS / "ros_nodes/launch_file.py"), str(file), *arguments],
         cwd=folder,
         env={**workspace.environment(), "KIOSK_DATA": str(folder / "data")},
         capture_output=True,

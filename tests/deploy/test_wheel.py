@@ -17,10 +17,12 @@ from zipfile import ZipFile
 import pytest
 from ruamel.yaml import YAML
 
-from app.settings import PACKAGE
+from app.system.settings import PACKAGE
 from tests.support import locked
 from tests.support.parts import ROOT, Process, Server, free_port, http_client, sends, until
 from tests.support.shown_commands import commands_for
+
+pytestmark = [pytest.mark.long("packaging"), pytest.mark.promise("kiosk")]
 
 SHIPPED: Final = PACKAGE / "panel.toml"
 # What the pages' commands read and write of the machine is in a folder instead.
@@ -133,7 +135,7 @@ def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: 
     assert shipped.returncode == 0, shipped.stderr
     assert str(ROOT) not in shipped.stdout
     services = (
-        "from app.interfaces import load_interfaces as of; "
+        "from app.ros.messages import load_interfaces as of; "
         "of('jazzy').service_types('std_srvs/srv/SetBool')"
     )
     assert machine.run(f"{RELEASE}/bin/python -c {shlex.quote(services)}").returncode == 0
@@ -169,7 +171,10 @@ def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: P
         mine.end()
     live = Server(tmp_path, python=machine.python, KIOSK_MODE="live")
     try:  # by the zenoh.json5 that is in it
-        assert "No connection to the robot" in live.widget("operation")["reason"]
+        until(
+            lambda: "No connection to the robot" in live.widget("operation")["reason"],
+            "the start is over, and the lock says what is missing",
+        )
     finally:
         live.end()
 
@@ -179,7 +184,7 @@ def test_a_wheel_has_no_gallery_and_says_so_in_development(
 ) -> None:
     names = ZipFile(wheel).namelist()
     assert [name for name in names if "gallery" in name] == []
-    assert {"app/templates/log.html", "app/static/css/log.css", "app/web/routes/log_lines.py"} <= {
+    assert {"app/templates/log.html", "app/static/css/log.css", "app/web/routes/widget_data.py"} <= {
         *names
     }
     mine = Server(tmp_path, python=machine.python, KIOSK_MODE="demo", KIOSK_DEV="1")
@@ -251,7 +256,7 @@ def shell(words: str) -> str:
 
 
 @pytest.fixture
-def container(machine: Machine) -> Iterator[Process]:
+def container(namespaces: None, machine: Machine) -> Iterator[Process]:
     """What the image starts; its environment is that of the service page, with the same content."""
     (entry,), (command,) = instructions("ENTRYPOINT"), instructions("CMD")
     start = shell(json.dumps([*json.loads(entry), *json.loads(command)]))

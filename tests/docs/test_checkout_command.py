@@ -10,11 +10,13 @@ from tests.support.parts import ROOT
 from tests.support.processes.shell import Shell
 from tests.support.shown_commands import commands_for
 
+pytestmark = pytest.mark.long("documents")
+
 INSTALLS = "tests/docs/test_checkout_command.py::test_the_command_of_a_checkout_installs_its_wheel"
 
 
 @pytest.fixture(scope="module")
-def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def checkout(namespaces: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A checkout of its own after `make wheel`."""
     shell = Shell(tmp_path_factory.mktemp("machine"))
     done = shell.run("make wheel")

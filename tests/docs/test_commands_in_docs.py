@@ -8,10 +8,12 @@ from typing import Final
 import pytest
 
 from tests.docs.test_tutorial import STEPS
-from tests.simulator.test_replay import mcap_file
 from tests.support.parts import ROOT, Process, until
 from tests.support.processes.shell import Shell
 from tests.support.shown_commands import TABLE, Row, Shown, beside, commands_of, row_of, rows, shown
+from tests.tools.simulator.test_replay import mcap_file
+
+pytestmark = pytest.mark.promise("documents")
 
 RECORDING: Final = "cell1-2026-05-04.mcap"
 
@@ -69,7 +71,7 @@ def _command(name: str) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+def machine(namespaces: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
     mine = Machine(tmp_path_factory.mktemp("machine"))
     yield mine
     mine.shell.close()
@@ -98,6 +100,7 @@ def test_command_that_is_not_run_here_has_a_reason_or_a_test(row: Row) -> None:
         assert f"\ndef {name}(" in (ROOT / file).read_text()
 
 
+@pytest.mark.long("documents")
 @pytest.mark.parametrize(("row", "command"), runs(), ids=lambda value: getattr(value, "place", ""))
 def test_documented_command_works_as_its_page_says(machine: Machine, row: Row, command: Shown) -> None:
     if name := runs_beside(command.command):

@@ -10,9 +10,9 @@ from typing import Any, Final
 import pytest
 from jsonschema_rs import Draft7Validator
 
-from app.i18n import BETWEEN, ENGLISH, sentences
-from app.i18n.catalogue import catalogues_in
-from app.settings import VARIABLES
+from app.system.settings import VARIABLES
+from app.system.texts import BETWEEN, ENGLISH, sentences
+from app.system.texts.catalogue import catalogues_in
 from docs._generate import locks, places, schema
 from docs._generate import settings as variables
 from docs._generate.__main__ import filled, out_of_date

@@ -10,6 +10,8 @@ import pytest
 from app.panel import load_panel
 from tests.support.parts import ROOT
 
+pytestmark = pytest.mark.promise("documents")
+
 TEXT: Final = (ROOT / "README.md").read_text()
 
 

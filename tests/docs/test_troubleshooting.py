@@ -5,7 +5,7 @@ from typing import Final
 
 import pytest
 
-from app.i18n import ENGLISH, sentences
+from app.system.texts import ENGLISH, sentences
 from tests.support.parts import ROOT
 
 PAGE: Final = (ROOT / "docs/troubleshooting.md").read_text(encoding="utf-8")

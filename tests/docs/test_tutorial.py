@@ -14,6 +14,8 @@ from app.panel import load_panel
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
 from tests.support.processes import command
 
+pytestmark = pytest.mark.promise("documents")
+
 TEXT: Final = (ROOT / "docs/tutorial.md").read_text()
 BLOCKS: Final = re.findall(r"^```toml\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 # An empty line between them, as one would leave it: what the check prints has the line's number.
@@ -80,6 +82,7 @@ def test_the_mistake_is_named_as_the_tutorial_shows(tmp_path: Path) -> None:
     assert faulty.stderr.startswith(f"cell1.toml can't be used:\n{shown}")
 
 
+@pytest.mark.long("documents")
 def test_the_demo_robot_hears_the_buttons(panel: Path, servers: Callable[[Server], Server]) -> None:
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel)))
     until(mine.ready, "ready")

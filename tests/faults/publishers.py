@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 
 import zenoh
 
-from app.dialect import bridge_dialect
+from app.ros.dialects import bridge_dialect
 from tests.faults.rig import kiosk
 from tests.support import domains
 from tests.support.cyclone import CYCLONE
@@ -56,14 +56,14 @@ KINDS: Final = (
 
 
 class Publisher(Commanded):
-    """See `tests/ros/publishers.py`."""
+    """See `tests/ros_nodes/publishers.py`."""
 
     def __init__(self, vendor: Vendor, domain: int) -> None:
         env = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": tempfile.gettempdir()}
         env |= {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         if vendor == "cyclone":
             env["CYCLONEDDS_URI"] = CYCLONE.format(lease_s=10)
-        super().__init__([ROS_PYTHON, TESTS / "ros/publishers.py", vendor], env)
+        super().__init__([ROS_PYTHON, TESTS / "ros_nodes/publishers.py", vendor], env)
 
     def publish(self, value: bool, kind: Kind) -> None:
         """Publishes the value from a new process, as `ros2 topic pub` does."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from tests.support.form import LONG
+from tests.support.form import MEASURES
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, until, zenoh_file
 
 BOOL: Final = "std_msgs/msg/Bool"
@@ -85,9 +85,9 @@ LISTENED_TO: Final = ("kept", "pulsed", "heard")
 
 
 def limit(seconds: float) -> float:
-    """A time limit, exact in the long form, which measures. The short form runs beside other tests, so
-    its limits are loose; `tests/faults/test_faults_on_bridge.py` checks the times."""
-    return seconds if LONG else seconds + ENOUGH_S
+    """A time limit, exact in `make faults`, which measures. Elsewhere the tests run beside each other,
+    so the limits are loose; `tests/faults/test_faults_on_bridge.py` checks the times."""
+    return seconds if MEASURES else seconds + ENOUGH_S
 
 
 def ears(domain: int) -> RosNode:

@@ -4,6 +4,8 @@ delayed."""
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from tests.faults import fixtures
 from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
@@ -13,6 +15,8 @@ from tests.faults.trial import presses_work
 from tests.faults.watch import Watch, answering, resources, until_released
 from tests.support.form import several
 from tests.support.parts import ENOUGH_S, Server, until
+
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("reconnect")]
 
 rig = fixtures.rig
 server = fixtures.server

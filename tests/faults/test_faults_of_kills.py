@@ -4,6 +4,8 @@ import random
 import secrets
 from pathlib import Path
 
+import pytest
+
 from tests.faults import fixtures
 from tests.faults.kills import Life, kill_at_random_moments
 from tests.faults.presser import accounted
@@ -13,12 +15,16 @@ from tests.faults.trial import UNDER_WAY_S
 from tests.support.form import several
 from tests.support.parts import free_port
 
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("receipt")]
+
 rig = fixtures.rig
 
 KILLS = several(3, 200)
+LIFE_AT_MOST_S = 10.0
 LATE_S = 1.0
 
 
+@pytest.mark.timeout(300 + KILLS * LIFE_AT_MOST_S)
 def test_a_server_killed_at_random_moments(rig: Rig, tmp_path: Path) -> None:
     seed = secrets.randbits(32)
     port = free_port()

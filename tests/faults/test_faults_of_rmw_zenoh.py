@@ -17,6 +17,8 @@ from tests.faults.watch import Watch
 from tests.support.form import LONG, several
 from tests.support.parts import Server
 
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("dialects")]
+
 NOTICED_S: Final = 1.0
 KILLED_S: Final = 0.05
 CUT_S: Final = 30 if LONG else 5
@@ -72,7 +74,7 @@ def test_a_frozen_router(rig: RmwRig, server: Server) -> None:
     recorded("rmw_zenoh: router frozen for 4 s", trial)
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_killed_node_locks_at_once(rig: RmwRig, server: Server) -> None:
     """The median: one that the scheduler held back does not count."""
     watch = Watch(server)

@@ -21,10 +21,13 @@ from tests.faults.watch import Resources, Watch, answering, resources, until_rel
 from tests.support.form import several
 from tests.support.parts import ENOUGH_S, RosNode, Server, until
 
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("locks")]
+
 rig = fixtures.rig
 server = fixtures.server
 
 RESTARTS = several(3, 100)
+RESTART_AT_MOST_S = 20.0
 FLOOD_S = several(2, 30)
 FLOOD_PER_S = 2000.0
 LONG_MESSAGES = several(6, 60)
@@ -91,6 +94,7 @@ def test_publisher_replaced_by_another_type_locks(rig: Rig, server: Server) -> N
     recorded("publisher replaced by one of another type, and back", trial)
 
 
+@pytest.mark.timeout(300 + RESTARTS * RESTART_AT_MOST_S)
 def test_a_robot_that_restarts_again_and_again(rig: Rig, server: Server) -> None:
     """Bridge and node are killed together; nothing accumulates over the restarts."""
     before: Resources | None = None
@@ -186,7 +190,7 @@ def test_a_flood_on_a_readout(rig: Rig, server: Server) -> None:
     record(f"{said} messages on a readout's topic", presses=account, latest=ms(account.latest_s))
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     rig.robot.advertise("/heard", TEXT)
     until(lambda: rig.robot.subscribers("/heard"), "the bridge listens")

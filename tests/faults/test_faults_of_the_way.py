@@ -18,6 +18,8 @@ from tests.faults.watch import Watch, answering
 from tests.support.form import LONG, several
 from tests.support.parts import TESTS, Server, free_port, until
 
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("offline")]
+
 rig = fixtures.rig
 server = fixtures.server
 
@@ -81,9 +83,7 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
 
     def moved_back() -> None:
         until(server.ready, "the bridge of the other domain is joined")
-        until(
-            lambda: "Waiting for a new /kept" in (server.widget("guarded")["reason"] or ""), "it waits"
-        )
+        until(lambda: "is not known yet" in (server.widget("guarded")["reason"] or ""), "it waits")
         until(
             lambda: server.press("free", "no subscriber").json()["outcome"] == "unknown", "it is sent"
         )

@@ -4,6 +4,8 @@ import time
 from datetime import datetime
 from pathlib import Path
 
+import pytest
+
 from tests.faults import fixtures
 from tests.faults.clock import Clock
 from tests.faults.presser import Presser, accounted
@@ -12,6 +14,8 @@ from tests.faults.rig import MAX_AGE_S, PANEL, Rig, limit
 from tests.faults.trial import presses_work
 from tests.faults.watch import Watch, answering
 from tests.support.parts import Server, until
+
+pytestmark = pytest.mark.long("fault")
 
 rig = fixtures.rig
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.dialect.peer_traits import BRIDGE_TRAITS
+from app.ros.dialects.peer_traits import BRIDGE_TRAITS
 from tests.support.cyclone import Client
 from tests.support.parts import (
     REFERENCE,
@@ -24,6 +24,8 @@ from tests.support.parts import (
     publish_until,
     until,
 )
+
+pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("locks")]
 
 ENABLED = "operation-enabled-updated"
 FREEZES = 5
@@ -86,7 +88,7 @@ def lock_after(kiosk: Server, cause: Callable[[], object]) -> tuple[float, str]:
     return locked_at - began, reason
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
     own_bridge: Bridge, kiosk: Server
 ) -> None:
@@ -113,13 +115,13 @@ def test_after_a_return_an_old_permission_does_not_count(
     until(lambda: not permitted(kiosk), "locked")
     own_bridge.start()
     until(kiosk.ready, "the bridge is back")
-    assert "Waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    assert "is not known yet" in kiosk.widget("operation1")["reason"]
     # Published repeatedly: to the node, the killed bridge is a subscriber for some more seconds.
     own_node.every("/operation_enabled", {"data": True}, 0.1)
     opened(kiosk)
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_frozen_bridge_locks_within_a_second_and_opens_when_it_thaws(
     own_bridge: Bridge, kiosk: Server
 ) -> None:
@@ -156,7 +158,10 @@ def test_server_starts_without_a_bridge_and_keeps_connecting(
 ) -> None:
     late = Bridge(domain + 3)
     kiosk = servers(live(late.endpoint, tmp_path))
-    assert "No connection to the robot" in kiosk.widget("operation")["reason"]
+    until(
+        lambda: "No connection to the robot" in kiosk.widget("operation")["reason"],
+        "the start is over, and the lock says what is missing",
+    )
     assert "bridge" in kiosk.http.get("/readyz").json()["reason"]
     late.start()
     try:
@@ -177,7 +182,7 @@ def test_a_required_publisher_that_goes_away_locks(
     assert "no node of the robot publishes /operation_enabled" in kiosk.widget("operation1")["reason"]
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_stale_value_locks_and_a_fresh_value_unlocks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
@@ -220,7 +225,7 @@ def test_new_publisher_of_a_required_topic_must_publish_again(
 ) -> None:
     kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
-    until(lambda: "waiting for /operation" in kiosk.widget("operation1")["reason"], "its token is seen")
+    until(lambda: "is not known yet" in kiosk.widget("operation1")["reason"], "its token is seen")
     until(lambda: own_node.subscribers("/operation_enabled"), "the bridge listens")
     until(lambda: (own_node.publish("/operation_enabled", {"data": True}), permitted(kiosk))[1], "open")
     time.sleep(BRIDGE_TRAITS.token_delay_s)  # no message is under way any more
@@ -308,7 +313,7 @@ def test_old_latched_value_does_not_count_as_fresh(
     with kiosk.stream() as stream:
         for _ in range(4):  # two seconds of beats: the latched value has come, and does not count
             stream.next("beat")
-    assert "waiting for /operation_enabled" in kiosk.widget("operation1")["reason"]
+    assert "is not known yet" in kiosk.widget("operation1")["reason"]
 
     def said_again() -> bool:
         own_node.publish("/operation_enabled", {"data": True})

@@ -75,8 +75,8 @@ type Show = (root: HTMLElement, value: Data) => void;
 type Handlers = Record<string, (data?: Data) => void>;
 
 type Click = { seen: string | null; at: string; press?: string; confirmation?: string };
-type Press = Click & { id: string; inputs: Record<string, Data>; widget?: string };
-type Receipt = { outcome: string; reason: string; id?: string };
+type Press = Click & { id: string; inputs: Record<string, Data>; widget?: string; robots?: string };
+type Receipt = { outcome: string; reason: string; id?: string; brief?: string };
 type Entry = HTMLInputElement | HTMLSelectElement;
 type Checkbox = HTMLInputElement & { type: "checkbox" };
 type NumberInput = HTMLInputElement & { type: "text" | "range" };
@@ -120,15 +120,23 @@ type View = {
   live: boolean;
 };
 
-// What the script of a widget kind registers, static/js/kinds/<kind>.js.
+// The source of the page's state, in static/js/main.js.
+interface PageSource {
+  readonly seen: string;
+  readonly ageMs: number;
+  timeOf(event: Event): string;
+  load<T>(module: Promise<T>, use: (module: T) => void): void;
+}
+
+// What the script of a widget kind registers, static/js/kinds/<kind>.js, or that of several kinds under the kind's name.
 interface Hooks {
-  equip?(root: HTMLElement, source: import("../../static/js/source.js").Source): void;
+  equip?(root: HTMLElement, source: PageSource): void;
   show?: Record<string, Show>;
   lock?(root: HTMLElement, locked: boolean): void;
   values?(button: HTMLButtonElement, value: string): Record<string, Data>;
 }
 
-// The data of a page, app/web/rendering/page_data.py.
+// The data of a page, app/web/pages/context.py.
 interface PageData {
   page: string;
   base: string;
@@ -140,7 +148,7 @@ interface PageData {
   sounds: boolean;
   dimAfterS: number | null;
   sections: string[];
-  kinds: string[];
+  kinds: Record<string, string>; // the kinds of its widgets that have a script, and the name of that
   confirms: string[];
   sentences: Record<string, string>;
 }

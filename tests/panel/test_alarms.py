@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import PanelError
-from app.i18n import render
 from app.panel import Panel, load_panel
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
+from app.system.errors import PanelError
+from app.system.texts import render
 
 PANEL = """
 title = "Cell"
@@ -79,6 +79,8 @@ def test_diagnostics_have_their_topic_and_type(tmp_path: Path) -> None:
         (AIR.replace("Float64", "String") + "low = 5.0\n", "alarm[0].field", "is string"),
         (AIR + 'field = "value"\nlow = 5.0\n', "alarm[0].field", "value"),
         (AIR + "low = 5.0\nscale = 0.0\n", "alarm[0].scale", "is 0"),
+        (AIR + 'low = 5.0\nformat = "d"\n', "alarm[0].format", "is for whole numbers"),
+        ('text = "Driver"\nnode = "/driver"\nformat = ".1f"\n', "alarm[0].format", "no meaning"),
         (AIR + 'low = 5.0\nstate = "FAULT"\n', "alarm[0].state", "the panel has no [state]"),
         (AIR + 'low = 5.0\nstate = "OFF"\n' + STATE, "alarm[0].state", 'no state "OFF"; there is ON'),
         ('text = "Air"\nlow = 5.0\ntype = "std_msgs/msg/Float64"\n', "alarm[0].topic", "is missing"),

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.check import main
-from app.errors import Note
 from app.panel import load_panel
-from app.settings import PACKAGE
+from app.system.errors import Note
+from app.system.settings import PACKAGE
+from app.tools.cli.check import main
 from tests.support.beside_panel import put_beside
 from tests.support.parts import REFERENCE, TESTS
 from tests.support.processes import command
+
+pytestmark = pytest.mark.promise("panel file")
 
 SHIPPED = PACKAGE / "panel.toml"
 REFERENCE_TEXT = REFERENCE.read_text()
@@ -28,11 +30,10 @@ def faulty(tmp_path: Path) -> Path:
 def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
-    first, note, *fits = said.out.splitlines()
+    first, *fits = said.out.splitlines()
     panel = load_panel(SHIPPED)
     counted = f"{len(panel.pages)} page(s), {len(list(panel.widgets()))} widget(s)"
     assert first == f'{SHIPPED}: good: "Robot cell 1", {counted}'
-    assert note.startswith('  note: interlock[0] "operation", line 35: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
     assert [line.partition("fits ")[2] for line in fits] == ["", "", screens, screens, screens]
     assert "keeps 1h" in fits[0]
@@ -187,3 +188,11 @@ def test_an_interlock_that_locks_nothing_is_noted(
     assert notes == [
         f'  note: interlock[1] "spare", line {line}: locks nothing: no control has interlock = "spare"'
     ]
+
+
+def test_the_shipped_panel_is_named_where_no_file_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("KIOSK_PANEL", raising=False)
+    assert main([]) == 0
+    assert capsys.readouterr().err == "no panel file is named, so the shipped one is checked\n"

@@ -6,17 +6,16 @@ from typing import Any, Final
 
 import pytest
 
-from app.errors import PanelError
+from app.cell.permission.conditions import permits
+from app.cell.permission.interlocks import interlock_verdict
+from app.cell.robot.sample_handlers import SampleHandlers
+from app.cell.robot.state import RobotState, Sample, SkippedPayload
+from app.cell.session.ingest import Ingest
 from app.panel import load_panel
 from app.panel.checks.conditions import condition_faults
-from app.panel.condition import Condition
-from app.panel.interlock import Interlock
-from app.permission.conditions import permits
-from app.permission.interlocks import interlock_verdict
-from app.robot.sample_handlers import SampleHandlers
-from app.robot.state import RobotState, Sample, SkippedPayload
-from app.runtime.ingest import Ingest
-from app.transport.inbox import Changes
+from app.panel.condition import Condition, Interlock
+from app.ros.zenoh.inbox import Changes
+from app.system.errors import PanelError
 from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
 from tests.support.samples import BATTERY
 from tests.support.words import coded

@@ -5,10 +5,10 @@ from typing import Final
 
 import pytest
 
-from app.errors import PanelError
-from app.interfaces import load_interfaces
 from app.panel import load_panel
-from app.panel.load import check_panel
+from app.panel.file.load import check_panel
+from app.ros.messages import load_interfaces
+from app.system.errors import PanelError
 from tests.support.builders import faults_text
 
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"

@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 
 from app.panel import Panel
+from app.panel.widths.boxes import line_count, widest_piece
 from app.panel.widths.cut_texts import cut_notes
-from app.panel.widths.lines import line_count, widest_piece
+
+pytestmark = pytest.mark.promise("layout")
 
 KEY = {"kind": "publish", "topic": "/a", "type": "std_msgs/msg/Empty", "message": {}}
 GOAL = {
@@ -45,6 +47,16 @@ def test_a_reason_has_the_lines_that_its_button_is_high() -> None:
     (note,) = noted({**KEY, "label": "Start", "interlock": "guard"}, interlock=[interlock])
     assert note.startswith("page[0].group[0].widget[0].interlock: ")
     assert "(en) needs 4 lines, the button has 3 of 159 px" in note
+
+
+def test_what_to_use_instead_of_a_stop_is_whole_on_its_button() -> None:
+    """The text of the catalogue is so on the smallest rail; one of the panel file is measured."""
+    stop = {**KEY, "id": "stop", "label": "Stop", "role": "stop"}
+    frame: dict[str, Any] = {"frame": {"widget": [stop]}}
+    frame |= {"screens": ["1280x800", "1024x600", "800x480"], "languages": ["en", "de", "ja"]}
+    assert noted({**KEY, "label": "Start"}, **frame) == []
+    (note,) = noted({**KEY, "label": "Start"}, **frame, stop_hint="Use the red button at the gate.")
+    assert note.startswith("frame.widget[0].stop_hint: ")
 
 
 def test_a_label_has_one_line_while_its_button_is_locked() -> None:

@@ -5,9 +5,9 @@ from typing import Final
 
 import pytest
 
-from app.errors import Fault, PanelError
 from app.panel import load_panel
-from app.panel.faults.places import add_locations, place_of
+from app.panel.file.keys import add_locations, place_of
+from app.system.errors import Fault, PanelError
 
 PANEL: Final = """title = "Cell"
 [[page]]

@@ -5,7 +5,7 @@ from typing import Final
 
 import pytest
 
-from app.panel.load import check_panel
+from app.panel.file.load import check_panel
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 

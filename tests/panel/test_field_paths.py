@@ -6,19 +6,19 @@ from typing import Any, Final
 
 import pytest
 
-from app.clock import format_time
-from app.commands.confirmations import Confirmations
-from app.commands.service_calls import with_fields
-from app.errors import InterfaceError, PanelError
-from app.interfaces import field_name, load_interfaces, parent_path
-from app.interfaces.field_path import Key, path_steps
+from app.cell.commands.confirmations import Confirmations
+from app.cell.commands.services import with_fields
+from app.cell.permission.interlocks import interlock_verdict
+from app.cell.robot.state import RobotState, Sample
+from app.cell.view.view import build_view
 from app.panel import load_panel
 from app.panel.checks.panel import find_faults
 from app.panel.response_text import response_paths
-from app.permission.interlocks import interlock_verdict
-from app.robot.state import RobotState, Sample
-from app.view.view import build_view
-from tests.commands.test_presses import Way
+from app.ros.messages import field_name, load_interfaces, parent_path
+from app.ros.messages.field_path import Key, path_steps
+from app.system.clock import format_time
+from app.system.errors import InterfaceError, PanelError
+from tests.cell.commands.test_presses import Way
 from tests.support.builders import (
     BRIDGE,
     ENABLED,
@@ -149,7 +149,7 @@ def test_an_element_by_its_key_confirms(level: int, outcome: str) -> None:
     panel = panel_of(MESSAGE, {**FREE, "confirm": confirm})
     assert list(find_faults(panel, INTERFACES)) == []
     robot, way = robot_there(panel), Way()
-    confirmations = Confirmations(robot, lambda: None)
+    confirmations = Confirmations(robot, lambda _: None)
     presses = presses_of(panel, robot, way, confirmations=confirmations)
 
     async def test() -> None:
@@ -243,10 +243,10 @@ states = [{ value = "OK", text = "Good", shape = "circle" }]
     [
         ([("x", 2), ("drive: motor", 1)], None),
         ([("drive: motor", 2)], "Drive is ERROR: it must be WARN or less."),
-        ([], "Locked: the last /operation_enabled has no status[name='drive: motor'].level."),
+        ([], "Locked: the last Drive has no status[name='drive: motor'].level."),
         (
             [("drive: motor", 0), ("drive: motor", 2)],
-            "Locked: the last /operation_enabled has status[name='drive: motor'].level more than once.",
+            "Locked: the last Drive has status[name='drive: motor'].level more than once.",
         ),
     ],
 )

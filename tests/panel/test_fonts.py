@@ -7,12 +7,11 @@ from typing import Any
 import pytest
 from fontTools.ttLib import TTFont
 
-from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
 from app.panel.widths.cut_texts import cut_notes
-from app.panel.widths.font_file import read_letters
-from app.panel.widths.letters import LATIN, Fonts, letters, text_width
+from app.panel.widths.fonts import LATIN, Fonts, letters, read_letters, text_width
+from app.system.errors import PanelError
 from tests.support.beside_panel import FONTS, put_fonts
 
 PANEL = """title = "Cell"

@@ -5,9 +5,9 @@ from typing import Any, Final
 
 import pytest
 
-from app.errors import FieldError, PanelError
 from app.panel import Hold, Panel, load_panel
 from app.panel.template import set_field
+from app.system.errors import FieldError, PanelError
 from tests.panel.test_panel import toml, without
 from tests.support.builders import INTERLOCK, Table
 

@@ -8,12 +8,14 @@ import pytest
 from hypothesis import given as varied
 from hypothesis import strategies as st
 
-from app.errors import InputError
-from app.i18n import ENGLISH
 from app.panel import Input
-from app.panel.number_range import Range
+from app.panel.numbers import Range
+from app.system.errors import InputError
+from app.system.texts import ENGLISH
 from tests.support.builders import panel_of
 from tests.support.words import coded, english
+
+pytestmark = pytest.mark.promise("numbers")
 
 SPEED: Mapping[str, Any] = {
     "id": "speed", "kind": "number", "label": "Speed", "min": -0.5, "max": 1.5, "step": 0.1,

@@ -5,8 +5,8 @@ from typing import Any, Final
 
 import pytest
 
-from app.errors import PanelError
-from app.panel.widgets.joystick import Joystick
+from app.panel.widgets.hold import Joystick
+from app.system.errors import PanelError
 from tests.panel.test_holds import fault, loaded
 from tests.panel.test_panel import without
 

@@ -3,15 +3,15 @@
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
-from app.commands.dispatch import Dispatcher
-from app.errors import KindError
+from app.cell.commands.dispatch import Dispatcher
+from app.cell.permission.interlocks import COMMAND_CHECKS
+from app.cell.view.kinds import ATTRIBUTES
 from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCommand
 from app.panel.widgets.kinds import KINDS, find_row, require_rows
 from app.panel.widgets.publish import Publish
-from app.permission.interlocks import COMMAND_CHECKS
-from app.settings import shipped_path
-from app.simulator.kinds import SIMULATED
-from app.view.kinds import ATTRIBUTES
+from app.system.errors import KindError
+from app.system.settings import shipped_path
+from app.tools.simulator.kinds import SIMULATED
 from tests.support.builders import FakeTransport, panel_of, robot_there, sending_of
 
 

@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 
-from app.errors import PanelError
-from app.icons import icons
 from app.panel import Panel, Publish, load_panel
 from app.panel.widgets.displays import Indicator
-from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS
+from app.panel.widgets.key_parts import COLOURS, ICONS, OWN_COLOURS
+from app.system.errors import PanelError
+from app.system.icons import icons
 from tests.panel.test_panel import toml
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, Table
+
+pytestmark = pytest.mark.promise("layout")
 
 STOP: Table = {**FREE, "id": "stop", "message": {"data": "stop"}}
 HALT: Table = {

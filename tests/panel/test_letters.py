@@ -2,10 +2,11 @@
 
 import pytest
 
-from app.panel.widths.letters import DATA, letters, text_width
+from app.panel.widths.fonts import DATA, letters, text_width
 from deploy.font_widths import widths_text
 
 
+@pytest.mark.long("detail")
 def test_widths_are_those_of_the_font_files() -> None:
     """`make fonts` renews them."""
     assert DATA.read_text(encoding="utf-8") == widths_text()

@@ -12,19 +12,21 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.errors import Fault, PanelError
 from app.panel import load_panel
 from app.panel.condition import COMPARISONS
-from app.panel.faults.table_keys import inner_model, known_keys
+from app.panel.file.keys import inner_model, known_keys
+from app.panel.file.same_widgets import SameWidget
 from app.panel.layout import Page
 from app.panel.model import Panel
-from app.panel.same_widgets import SameWidget
 from app.panel.source import NAME as SOURCE
 from app.panel.widgets.families import Command
 from app.panel.widgets.kinds import KINDS
+from app.system.errors import Fault, PanelError
 from tests.support.beside_panel import put_beside
 from tests.support.form import LONG, several
 from tests.support.parts import TESTS
+
+pytestmark = pytest.mark.promise("panel file")
 
 GOOD: Final = (TESTS / "everything.toml").read_text()
 LINES: Final = GOOD.splitlines()
@@ -193,6 +195,12 @@ def apart(numbers: Sequence[int]) -> list[list[int]]:
     return [list(group.values()) for group in groups]
 
 
+def every_third(cases: Sequence[Any]) -> list[Any]:
+    """The cases, of which `make test` has every third."""
+    rest = pytest.mark.long("table")
+    return [pytest.param(case, marks=rest if n % 3 else ()) for n, case in enumerate(cases)]
+
+
 def header_of(number: int) -> int:
     """The line of the header above a line; 0 where there is none."""
     return max((n for n in ALL_HEADERS if n < number), default=0)
@@ -215,7 +223,7 @@ def one_each(faults_of: FaultsOf, mistakes: Mapping[int, str]) -> dict[int, Faul
     return {fault.line: fault for fault in reported}
 
 
-@pytest.mark.parametrize("numbers", apart(KEYS), ids=shown)
+@pytest.mark.parametrize("numbers", every_third(apart(KEYS)), ids=shown)
 def test_a_value_that_is_of_no_use_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     faults = one_each(faults_of, {n: f"{key_of(n)} = 1979-05-27" for n in numbers})
     for number, fault in faults.items():
@@ -228,6 +236,7 @@ OPTIONS: Final = ("value = 1", "value = 2")  # of a select: each may be a table
 NO_OPTIONS: Final = [number for number in KEYS if LINES[number - 1] not in OPTIONS]
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("numbers", apart(NO_OPTIONS), ids=shown)
 def test_a_table_where_none_belongs_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     faults = one_each(faults_of, {n: f"{key_of(n)} = {{ a = 1 }}" for n in numbers})
@@ -235,6 +244,7 @@ def test_a_table_where_none_belongs_is_one_fault(faults_of: FaultsOf, numbers: S
         assert fault.place.removesuffix(".a").endswith(key_of(number)), str(fault)
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("numbers", [*apart(KEYS), *([number] for number in HEADERS)], ids=shown)
 def test_a_misspelt_key_or_table_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     misspelt = {n: LINES[n - 1].replace(key_of(n), f"{key_of(n)}x", 1) for n in numbers}
@@ -271,6 +281,7 @@ def shows_at(number: int) -> set[int]:
     return {header} if elsewhere is None else {header, LINES.index(elsewhere) + 1 if elsewhere else 0}
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("numbers", apart(KEYS), ids=shown)
 def test_omitted_line_is_at_most_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     left = list(numbers)
@@ -280,6 +291,7 @@ def test_omitted_line_is_at_most_one_fault(faults_of: FaultsOf, numbers: Sequenc
         left.remove(line)  # those that remain have a default
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("number", HEADERS)
 def test_a_header_that_is_left_out_is_one_fault(faults_of: FaultsOf, number: int) -> None:
     the_one(faults_of, with_line(number, "#"))
@@ -294,7 +306,7 @@ def changed(old: str, new: str) -> str:
 MISTAKES: Final = tomllib.loads((TESTS / "mistakes.toml").read_text())["mistake"]
 
 
-@pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["new"][:60])
+@pytest.mark.parametrize("mistake", every_third(MISTAKES), ids=lambda mistake: mistake["new"][:60])
 def test_a_mistake_is_one_fault_in_words(faults_of: FaultsOf, mistake: Mapping[str, str]) -> None:
     text = changed(mistake["old"], mistake["new"])
     fault = the_one(faults_of, text)

@@ -5,8 +5,8 @@ from typing import Final
 
 import pytest
 
-from app.errors import PanelError
 from app.panel import load_panel
+from app.system.errors import PanelError
 from tests.support.builders import faults_text
 
 PANEL: Final = """

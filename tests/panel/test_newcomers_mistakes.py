@@ -1,12 +1,14 @@
 """Mistakes of people who write their first panel: each fault says what would be right."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from app.errors import PanelError
-from app.panel import load_panel
+from app.panel import Panel, check_panel, load_panel
+from app.panel.file.wording import PATTERNS
+from app.system.errors import PanelError
 
 GOOD: Final = """title = "Cell"
 mode = "live"
@@ -122,6 +124,54 @@ def test_the_panel_without_a_mistake_is_good(tmp_path: Path) -> None:
         ('kind = "readout"', 'kind = "Chart"', 'a curve is a "trend"'),
         ('kind = "readout"', 'kind = "reedout"', 'did you mean "readout"?'),
         ('kind = "readout"', 'kind = "thing"', "one of text, number, slider"),
+        ('kind = "publish"\nlabel = "Go"', 'name = "Go"', '"kind" is missing; one of text, number'),
+        ('kind = "readout"\nlabel = "Position"', 'label = "P"\ndecimals = 2', '"kind" is missing'),
+        (
+            'field = "position.x"',
+            'field = "position.x"\ndecimals = 2',
+            'format, such as format = ".2f"',
+        ),
+        (
+            'field = "position.x"',
+            'field = "position.x"\nvisible_if = "ready"',
+            "what locks it is interlock",
+        ),
+        ('field = "position.x"', 'field = "position.x"\nwidth = 3', "its width is span"),
+        ('field = "position.x"', 'field = "position.x"\ncolor = "red"', "follows from its role"),
+        ('field = "position.x"', 'field = "avg(position.x)"', "there is yaw, norm, min, max, length"),
+        ('field = "position.x"', 'field = "position.x * 1000"', "such as scale = 1000"),
+        ('field = "position.x"', 'field = "position.*"', "a field is a single value"),
+        (
+            'id = "go"',
+            'id = "go"\ninterlock = [{ topic = "/door", type = "std_msgs/msg/Bool" }]',
+            "write the table by itself, such as [[interlock]] with an id",
+        ),
+        ('id = "go"', 'id = "go"\nneeds = ["speed"]', 'not a list: write needs = "speed"'),
+        ('id = "go"', 'id = "go"\nneeds = ["speed", "go"]', "must be a text, not a list of 2 values"),
+        ("[[page]]", '[brand]\ncolour = "blue"\n[[page]]', 'it must be like "#1e5aa8"'),
+        ("[[page]]", '[brand]\nlogo = "logo.bmp"\n[[page]]', 'it must be like "press.svg"'),
+        ("[[page]]", '[embed]\norigins = ["example.com"]\n[[page]]', "the origin of a site"),
+        (
+            "[[page]]",
+            '[[alarm]]\nid = "a"\nlost = "link"\ntext = "A"\npriority = 5\n[[page]]',
+            "must be a number: 1 high, 2 medium, 3 low, 4 diagnostic, not 5",
+        ),
+        (
+            "[[page]]",
+            '[[alarm]]\nid = "a"\nwhen = "/door == true"\ntext = "A"\npriority = 2\n[[page]]',
+            'write when = { topic = "/door", equals = true }',
+        ),
+        (
+            'id = "go"',
+            'id = "go_"\nkind = "select"\nlabel = "S"\noptions = ["a"]\n[[page.widget]]\nid = "go"',
+            'write { value = "a", label = "a" }',
+        ),
+        (
+            'kind = "number"',
+            'type = "button"',
+            '"kind" is missing; type is that of a message, and a button is "publish"',
+        ),
+        ('kind = "number"', 'type = "slider"', 'write kind = "slider"; type is that of a message'),
     ],
 )
 def test_a_mistake_says_what_would_be_right(tmp_path: Path, old: str, new: str, words: str) -> None:
@@ -143,3 +193,74 @@ def test_a_misspelt_name_of_the_demo_shows_beside_other_faults(tmp_path: Path) -
     label, demo = faults(tmp_path, broken)
     assert 'did you mean "label"?' in label
     assert "the panel does not use /hight; did you mean /height?" in demo
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("message = { a = 1 b = 2 }", "a comma stands between the keys of a table in braces"),
+        ("message = { a = [1 2] }", "a comma stands between the values of a list"),
+    ],
+)
+def test_a_missing_comma_is_named(tmp_path: Path, line: str, words: str) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(GOOD.replace('message = { data = "{speed}" }', line))
+    with pytest.raises(PanelError, match=words):
+        load_panel(path)
+
+
+def patterns(schema: object, key: str = "") -> Iterator[str]:
+    """The keys of a JSON Schema whose texts have a pattern."""
+    if isinstance(schema, dict):
+        if isinstance(schema.get("pattern"), str):
+            yield key
+        for name, inner in schema.items():
+            if name in ("properties", "$defs"):
+                for each, about in inner.items():
+                    yield from patterns(about, each if name == "properties" else "")
+            else:
+                yield from patterns(inner, key)
+    elif isinstance(schema, list):
+        for inner in schema:
+            yield from patterns(inner, key)
+
+
+def test_each_key_with_a_pattern_says_what_it_must_be_like() -> None:
+    keys = set(patterns(Panel.model_json_schema()))
+    assert len(keys) > 20
+    assert keys - PATTERNS.keys() == set()
+
+
+SWITCH: Final = """
+[[page.widget]]
+id = "light"
+kind = "switch"
+label = "Light"
+topic = "/set_light"
+type = "std_msgs/msg/Bool"
+on_message = { data = true }
+off_message = { data = %s }
+reported = { topic = "/light", type = "std_msgs/msg/Bool" }
+"""
+
+
+def test_both_positions_of_a_switch_send_something_else(tmp_path: Path) -> None:
+    assert faults(tmp_path, GOOD + SWITCH % "false") == []
+    (fault,) = faults(tmp_path, GOOD + SWITCH % "true")
+    assert "is the same as on_message" in fault
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('topic = "/ready"', 'topic = "/ready"\nlabel = "Door closed"', 'such as locked = "'),
+        ('label = "Go"', 'label = "Go"\nconsequence = "It moves."', "add confirm_press = true"),
+        ('label = "Go"', 'label = "−"\nshow_label = false\nicon = "minus"', "write a word"),
+    ],
+)
+def test_what_has_no_effect_is_noted(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(GOOD)
+    before = [note for note in check_panel(path).notes if words in str(note)]
+    path.write_text(GOOD.replace(old, new, 1))
+    assert [before, len([note for note in check_panel(path).notes if words in str(note)])] == [[], 1]

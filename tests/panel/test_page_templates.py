@@ -11,9 +11,9 @@ from typing import Any, Final
 import pytest
 from markupsafe import Markup
 
-from app.errors import Fault, PanelError
 from app.panel import check_panel, load_panel
-from app.panel.checks.page_templates import page_parts
+from app.panel.checks.look import page_parts
+from app.system.errors import Fault, PanelError
 from tests.support.parts import ROOT
 
 EXAMPLE: Final = ROOT / "docs/examples/plan/panel.toml"
@@ -200,6 +200,7 @@ TOO_MUCH: Final = (
 )
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("name", FOR_EVER)
 def test_a_template_that_takes_too_much_is_stopped_and_named_with_its_line(
     write: Write, name: str
@@ -211,6 +212,7 @@ def test_a_template_that_takes_too_much_is_stopped_and_named_with_its_line(
     assert re.search(TOO_MUCH, fault.message), fault.message
 
 
+@pytest.mark.long("detail")
 def test_endless_template_expression_is_stopped(write: Write) -> None:
     fault = the_fault(write(BOTH + "{% autoescape 9**(9**9) %}{% endautoescape %}"))
     assert fault.message == "plan.html: line 2: it takes more than 1 s in one expression"
@@ -252,7 +254,7 @@ def test_a_template_runs_once_and_not_in_this_process(
 
 def test_a_panel_without_templates_needs_nothing_for_them() -> None:
     code = "import sys, app.main; print([m for m in sys.modules if m in OWN])"
-    names = ("app.page_process", "app.panel.page_template", "jinja2.sandbox")
+    names = ("app.system.page_process", "app.panel.page_template", "jinja2.sandbox")
     done = subprocess.run(
         [sys.executable, "-c", code.replace("OWN", repr(names))],
         cwd=ROOT,

@@ -8,17 +8,16 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from app.commands.actions.client import CANCEL
-from app.commands.actions.goals import STATUS
-from app.errors import PanelError
-from app.i18n import render
-from app.interfaces import DISTROS
+from app.cell.commands.goals import CANCEL, STATUS_ARRAY
+from app.cell.link.rosout import LOG_TYPE
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
 from app.panel.checks.types import ROSOUT
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.service_action import ACTION_SERVER_TYPES
-from app.settings import PACKAGE
-from app.transport.rosout import LOG_TYPE
+from app.ros.messages import DISTROS
+from app.system.errors import PanelError
+from app.system.settings import PACKAGE
+from app.system.texts import render
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
 
 Load = Callable[[dict[str, Any]], Panel]
@@ -771,7 +770,7 @@ def test_types_that_the_server_needs_must_be_usable(
 
 def test_server_types_are_the_types_in_use() -> None:
     assert ROSOUT == LOG_TYPE
-    assert (STATUS, f"{CANCEL}_Request") == ACTION_SERVER_TYPES
+    assert (STATUS_ARRAY, f"{CANCEL}_Request") == ACTION_SERVER_TYPES
 
 
 def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:

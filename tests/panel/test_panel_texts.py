@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import PanelError
-from app.i18n import PanelText, render, say, text_in
-from app.i18n.catalogue import catalogues_in
 from app.panel import Panel, check_panel, load_panel
 from app.panel.texts import panel_texts
+from app.system.errors import PanelError
+from app.system.texts import PanelText, render, say, text_in
+from app.system.texts.catalogue import catalogues_in
 from tests.support.parts import ROOT
 
 FILE = ROOT / "tests/three_languages.toml"

@@ -5,9 +5,9 @@ from typing import Any, Final
 
 import pytest
 
-from app.errors import Fault, Note
-from app.panel.faults.places import add_locations, id_at, place_of
-from app.panel.faults.toml_lines import Path
+from app.panel.file.keys import add_locations, id_at, place_of
+from app.panel.file.toml_lines import Path
+from app.system.errors import Fault, Note
 
 TEXT: Final = """title = "Cell"
 interfaces = [

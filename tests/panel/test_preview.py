@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from app.interfaces import Type
-from app.panel.preview import complete_value, message_lines
+from app.panel.file.preview import complete_value, message_lines
+from app.ros.messages import Type
 from tests.support.builders import INTERFACES
 
 COVARIANT = "geometry_msgs/msg/PoseWithCovariance"

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from app.commands.service_calls import with_fields
-from app.errors import FieldError
-from app.i18n import render
-from app.interfaces import Interfaces
+from app.cell.commands.services import with_fields
 from app.panel.checks.panel import find_faults
 from app.panel.response_text import ResponseField, parsed
+from app.ros.messages import Interfaces
+from app.system.errors import FieldError
+from app.system.texts import render
 from tests.support.builders import INTERFACES, panel_of
 
 FIBONACCI = {

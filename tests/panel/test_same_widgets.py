@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.panel import load_panel
-from app.panel.load import check_panel, faults_of_text
+from app.panel.file.load import check_panel, faults_of_text
 
 PAGES = """title = "Cell"
 [[page]]

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Final
 
 from app.panel import load_panel
-from app.pictures import SHIPPED
-from app.settings import PACKAGE
+from app.system.pictures import SHIPPED
+from app.system.settings import PACKAGE
 from app.web.assets import picture
 
 CELL: Final = "palletizing-cell.svg"

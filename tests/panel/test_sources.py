@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from app.errors import Fault, PanelError
 from app.panel import load_panel
 from app.panel.checks.notes import find_notes
-from app.panel.load import faults_of_text
+from app.panel.file.load import faults_of_text
 from app.panel.widgets.displays import Indicator, Readout
+from app.system.errors import Fault, PanelError
 from tests.support.builders import INTERFACES
 
 SOURCE = """title = "Cell"
@@ -29,7 +29,7 @@ PAGE = """
 [[interlock]]
 id = "charge"
 source = "battery"
-min = 0.15
+min = 15
 
 [[page]]
 id = "main"
@@ -90,10 +90,8 @@ def test_tables_have_what_their_source_says_where_they_do_not(tmp_path: Path) ->
     assert [state.text for state in supply.states] == ["Discharging"]
     (interlock,) = panel.interlocks
     assert (interlock.topic, interlock.max_age_s) == ("/battery", 10.0)
-    assert interlock.min == pytest.approx(0.15)
-    assert (
-        interlock.unit == ""
-    )  # the unit is of the scaled number, and a condition compares what is sent
+    assert (interlock.unit, interlock.format) == ("%", ".0f")
+    assert interlock.min == pytest.approx(0.15)  # 15 % in the message
     assert panel.subscriptions() == {"/battery": "sensor_msgs/msg/BatteryState"}
 
 
@@ -109,7 +107,7 @@ def faults(folder: Path, text: str) -> list[Fault]:
         ("BatteryState", "BateryState", "source[0].type", 5, "did you mean"),
         ('"percentage"', '"percent"', "source[0].field", 6, "there is no"),
         ('id = "battery"', 'id = "akku"', "interlock[0].source", 16, "there is akku"),
-        ("min = 0.15", 'type = "a/msg/B"', "interlock[0].type", 17, "stands beside source"),
+        ("min = 15", 'type = "a/msg/B"', "interlock[0].type", 17, "stands beside source"),
     ],
 )
 def test_a_mistake_is_named_where_it_stands(
@@ -165,8 +163,8 @@ high = 50.0
     panel = loaded(tmp_path, celsius + own_scale + alarm)
     soc = panel.widget("soc", Readout)
     assert (soc.scale, soc.offset, soc.unit) == (3.0, 0.0, "")
-    (warm,) = panel.alarms  # an alarm has no offset: its limit is of what the robot sends
-    assert (warm.scale, warm.unit) == (1.0, "")
+    (warm,) = panel.alarms
+    assert (warm.scale, warm.offset, warm.unit) == (2.0, -273.15, "°C")
     panel = loaded(tmp_path, SOURCE + PAGE + alarm)
     (warm,) = panel.alarms
     assert (warm.scale, warm.unit) == (100.0, "%")

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from app.errors import FieldError
 from app.panel.template import add_now, fill, placeholder_ids, placeholders, value_at
+from app.system.errors import FieldError
 from tests.support.builders import INTERFACES, TEXT
 
 

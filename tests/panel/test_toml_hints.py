@@ -5,8 +5,8 @@ from typing import Final
 
 import pytest
 
-from app.errors import PanelError
-from app.panel.faults.toml_file import parse_toml
+from app.panel.file.toml_file import parse_toml
+from app.system.errors import PanelError
 
 GOOD: Final = """title = "Cell"
 mode = "live"

@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.panel.faults.toml_lines import Path, lines_of
-from app.settings import PACKAGE
+from app.panel.file.toml_lines import Path, lines_of
+from app.system.settings import PACKAGE
 from tests.support.form import several
 from tests.support.parts import ROOT
+
+pytestmark = pytest.mark.promise("panel file")
 
 
 def paths(value: Any, path: Path = ()) -> Iterator[Path]:

@@ -9,8 +9,8 @@ from app.panel.checks.notes import find_notes
 from app.panel.checks.panel import find_faults
 from app.panel.model import Panel
 from app.panel.widgets.trend import MAX_BYTES, Trend, history_bytes, memory_of, trends_of
-from app.simulator.kinds import needs_of
-from app.simulator.needs import Shown
+from app.tools.simulator.kinds import needs_of
+from app.tools.simulator.needs import DisplayedField
 from tests.support.builders import INTERFACES, Table, panel_of
 
 PEN: Final[Table] = {"topic": "/speed", "type": "std_msgs/msg/Float64", "label": "Speed"}
@@ -113,6 +113,6 @@ def test_check_reports_the_memory_of_a_trend() -> None:
 
 def test_the_simulated_robot_has_each_pen() -> None:
     pens = [PEN, {**PEN, "topic": "/other", "unit": "%", "scale": 100.0}]
-    shown = [need for need in needs_of(trend(pen=pens), INTERFACES) if isinstance(need, Shown)]
+    shown = [need for need in needs_of(trend(pen=pens), INTERFACES) if isinstance(need, DisplayedField)]
     rows = [(need.topic, need.unit, need.scale) for need in shown]
     assert rows == [("/speed", "", 1.0), ("/other", "%", 100.0)]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from app.panel.checks.units import unit_notes
-from app.panel.units import conversion, units_like
+from app.panel.checks.notes import unit_notes
+from app.panel.numbers import conversion, units_like
 from app.panel.widgets.numbers import Numeric
 from tests.support.builders import FREE, INTERFACES, panel_of
 

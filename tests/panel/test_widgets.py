@@ -6,12 +6,12 @@ from typing import Any, Final
 import pytest
 from pydantic import ValidationError
 
-from app.errors import Fault
-from app.interfaces import DISTROS, load_interfaces
 from app.panel.base import TopicQos
 from app.panel.checks.panel import find_faults
 from app.panel.times import DURATION, TIME
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET
+from app.ros.messages import DISTROS, load_interfaces
+from app.system.errors import Fault
 from tests.support.builders import ENABLED, FREE, GUARDED, HEARD, INTERFACES, MESSAGE, TEXT, panel_of
 
 TWIST = "geometry_msgs/msg/Twist"

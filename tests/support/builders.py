@@ -4,36 +4,34 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Final, TypeVar
 
-from app.audit import NullLog
-from app.audit.press_record import PressLog
-from app.commands.actions.goals import GoalTracker
-from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Dispatcher, Trackers
-from app.commands.parameters.sync import ParameterSync
-from app.commands.press import Press
-from app.commands.press_guard import PressGuard
-from app.commands.press_judge import PendingSamples, PressJudge
-from app.commands.presses import Presses
-from app.commands.receipts import Receipt
-from app.commands.recipe_loads import RecipeLoader
-from app.commands.service_calls import ServiceCalls
-from app.commands.transport import Transport
-from app.dialect import bridge_dialect
-from app.dialect.bridge_dialect import BridgeDialect
-from app.dialect.endpoint import TopicRole
-from app.dialect.peer_traits import BRIDGE_TRAITS
-from app.errors import PanelError
-from app.interfaces import load_interfaces
-from app.interfaces.names import Qos
+from app.cell.commands.confirmations import Confirmations
+from app.cell.commands.dispatch import Dispatcher, Trackers
+from app.cell.commands.goals import GoalTracker
+from app.cell.commands.judge import PendingSamples, PressGuard, PressJudge
+from app.cell.commands.parameters import ParameterSync
+from app.cell.commands.press import Press
+from app.cell.commands.presses import Presses
+from app.cell.commands.receipts import Receipt
+from app.cell.commands.recipe_loads import RecipeLoader
+from app.cell.commands.services import ServiceCalls
+from app.cell.commands.transport import Transport
+from app.cell.permission.control import ControlAuthority
+from app.cell.robot.state import RobotState, Sample
+from app.cell.session.recipes import Recipes
+from app.cell.view.publisher import ViewPublisher
+from app.cell.view.view import build_view
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
-from app.permission.clients import anonymous
-from app.permission.control_authority import ControlAuthority
-from app.permission.principal import Principal
-from app.robot.state import RobotState, Sample
-from app.runtime.recipes import Recipes
-from app.view.publisher import ViewPublisher
-from app.view.view import build_view
+from app.records import NullLog
+from app.records.press_record import PressLog
+from app.records.principal import Principal, anonymous
+from app.ros.dialects import bridge_dialect
+from app.ros.dialects.bridge_dialect import BridgeDialect
+from app.ros.dialects.dialect import TopicRole
+from app.ros.dialects.peer_traits import BRIDGE_TRAITS
+from app.ros.messages import load_interfaces
+from app.ros.messages.names import Qos
+from app.system.errors import PanelError
 
 Table = Mapping[str, Any]
 Widget = TypeVar("Widget", bound=Command)
@@ -169,7 +167,7 @@ def sending_of(
     **more: Any,
 ) -> Dispatcher:
     """A dispatcher, with defaults for the parts that a test does not provide."""
-    calls = calls or ServiceCalls(INTERFACES, robot, transport, lambda: None)
+    calls = calls or ServiceCalls(INTERFACES, robot, transport, lambda _: None)
     parameters = ParameterSync(panel, INTERFACES, robot, transport, calls, lambda: None)
     return Dispatcher(
         panel,
@@ -178,10 +176,10 @@ def sending_of(
         transport,
         Trackers(
             calls,
-            GoalTracker(INTERFACES, robot, transport, lambda: None),
-            confirmations or Confirmations(robot, lambda: None),
+            GoalTracker(INTERFACES, robot, transport, lambda _: None),
+            confirmations or Confirmations(robot, lambda _: None),
             parameters,
-            RecipeLoader(INTERFACES, robot, parameters, Recipes(panel), lambda: None),
+            RecipeLoader(INTERFACES, robot, parameters, Recipes(panel), lambda _: None),
         ),
         monotonic,
         **more,

@@ -9,7 +9,7 @@ from typing import Final
 
 from fastapi import FastAPI
 
-from app.i18n.catalogue import catalogues_in
+from app.system.texts.catalogue import catalogues_in
 
 KEPT: Final = ExitStack()  # until the process ends
 

@@ -13,7 +13,7 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from app.interfaces import load_interfaces
+from app.ros.messages import load_interfaces
 from tests.support import domains
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
 from tests.support.processes.commanded import Commanded
@@ -42,6 +42,7 @@ GRAPH = {
     f"SS/{NODE}/get_parameters/rcl_interfaces/srv/GetParameters",
     f"SS/{NODE}/get_parameter_types/rcl_interfaces/srv/GetParameterTypes",
     f"SS/{NODE}/set_parameters/rcl_interfaces/srv/SetParameters",
+    f"SS/{NODE}/set_parameters_atomically/rcl_interfaces/srv/SetParametersAtomically",
     f"SS/{NODE}/list_parameters/rcl_interfaces/srv/ListParameters",
     f"SS/{NODE}/describe_parameters/rcl_interfaces/srv/DescribeParameters",
     "AS/fibonacci/example_interfaces/action/Fibonacci",
@@ -66,6 +67,9 @@ DEFINITIONS = {
     "rcl_interfaces/srv/GetParameterTypes": "string[] names\n---\nuint8[] types",
     "rcl_interfaces/srv/SetParameters": (
         "rcl_interfaces/Parameter[] parameters\n---\nrcl_interfaces/SetParametersResult[] results"
+    ),
+    "rcl_interfaces/srv/SetParametersAtomically": (
+        "rcl_interfaces/Parameter[] parameters\n---\nrcl_interfaces/SetParametersResult result"
     ),
     "rcl_interfaces/srv/ListParameters": (
         "string[] prefixes\nuint64 depth\n---\nrcl_interfaces/ListParametersResult result"
@@ -115,7 +119,7 @@ def decoded(type_name: str, payload: bytes) -> Any:
 
 
 class CycloneRobot(Commanded):
-    """A node on Cyclone DDS in its own environment; see `tests/ros/cyclone_robot.py`.
+    """A node on Cyclone DDS in its own environment; see `tests/ros_nodes/cyclone_robot.py`.
 
     If it ends regularly, it announces that, and the bridge removes it at once.
     """
@@ -126,7 +130,7 @@ class CycloneRobot(Commanded):
         """With `hashed` its services have type hashes, as since iron. `namespace` is its node's, like
         "/amr"."""
         super().__init__(
-            [ROS_PYTHON, TESTS / "ros/cyclone_robot.py", f"{namespace}/{NODE}"[1:]],
+            [ROS_PYTHON, TESTS / "ros_nodes/cyclone_robot.py", f"{namespace}/{NODE}"[1:]],
             {
                 "ROS_DOMAIN_ID": str(domain),
                 "CYCLONEDDS_URI": CYCLONE.format(lease_s=lease_s),
@@ -258,7 +262,7 @@ def client(cyclone_bridge: Bridge) -> Iterator[Client]:
 
 
 @pytest.fixture
-def robots() -> Iterator[Callable[..., CycloneRobot]]:
+def cyclone_robots() -> Iterator[Callable[..., CycloneRobot]]:
     """Starts robots, and ends them after the test."""
     with ExitStack() as stack:
 
@@ -271,9 +275,11 @@ def robots() -> Iterator[Callable[..., CycloneRobot]]:
 
 
 @pytest.fixture
-def robot(robots: Callable[..., CycloneRobot], cyclone_bridge: Bridge, client: Client) -> CycloneRobot:
+def robot(
+    cyclone_robots: Callable[..., CycloneRobot], cyclone_bridge: Bridge, client: Client
+) -> CycloneRobot:
     """A robot whose services can be called."""
-    mine = robots(cyclone_bridge.domain)
+    mine = cyclone_robots(cyclone_bridge.domain)
     served(mine, client)
     return mine
 

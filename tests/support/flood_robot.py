@@ -11,11 +11,10 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from app.interfaces import load_interfaces
-from app.simulator.goals import ActionServer
-from app.simulator.simulated import SimulatedTopic
-from app.simulator.values.known_types import Moment
-from app.simulator.zenoh_peer import ANY_PORT, Simulator
+from app.ros.messages import load_interfaces
+from app.tools.simulator.known_types import Moment
+from app.tools.simulator.robot import ActionServer, SimulatedTopic
+from app.tools.simulator.zenoh import ANY_PORT, Simulator
 
 STATUSES: Final = 300
 STEP_S: Final = 0.1
@@ -25,7 +24,7 @@ BOOL: Final = "std_msgs/msg/Bool"
 
 
 class FloodRobot:
-    """See `app.simulator.simulated.SimulatedRobot`."""
+    """See `app.tools.simulator.robot.SimulatedRobot`."""
 
     step_s = STEP_S
     services: Mapping[str, str] = {}

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
-from app.interfaces.cdr.reader import MAX_TEXT
+from app.ros.cdr.reader import MAX_TEXT
 
 LITTLE: Final = b"\0\1\0\0"
 TEN_MB: Final = 10_000_000

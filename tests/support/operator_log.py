@@ -5,7 +5,9 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
-from app.audit import Entry, Limits, OperatorLog, Origin, audit_log, new_entry
+from app.records import Entry, Limits, OperatorLog, Origin, new_entry
+from app.records import log as audit_log
+from tests.support.waiting import when
 
 LIMITS: Final = Limits()
 DISK_WITHIN_S: Final = 8.0
@@ -35,9 +37,7 @@ def run(
 
 async def until_good(log: OperatorLog) -> None:
     """Waits until the log can be written."""
-    async with asyncio.timeout(10):
-        while log.fault:
-            await asyncio.sleep(0.01)
+    await when(lambda: not log.fault)
 
 
 def pressed(number: int = 1) -> Entry:

@@ -23,27 +23,17 @@ import httpx
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from tests.support import domains
+from tests.support import domains, places
 from tests.support.processes.commanded import Commanded
 from tests.support.processes.forked import Forked, can_fork
 from tests.support.processes.signals import send_signal
 
 # Without scripts, a press within 700 ms of its page counts as a second tap. Longer, for busy machines.
 TAP_AGAIN_MS = 1000
-ROOT = Path(__file__).resolve().parent.parent.parent
-TESTS = ROOT / "tests"
-SHIPPED = ROOT / "app/panel.toml"
-# The page of the reference system alone: its robot permits and forbids in turns.
-REFERENCE = TESTS / "reference.toml"
-BRIDGE = Path(
-    os.environ.get("TEST_BRIDGE") or Path.home() / ".cache/operator-panel/bridge/release/test-bridge"
-)
-# A node on hiroz, beside the bridge: `tests/rmw_crate/`.
-RMW_ROBOT = BRIDGE.with_name("test-rmw-robot")
-ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
-CHROMIUM = "/usr/bin/chromium"
-# The same engine without windows: a page takes a quarter of the CPU time.
-HEADLESS = "/usr/bin/chromium-headless-shell"
+ROOT, TESTS = places.ROOT, places.TESTS
+SHIPPED, REFERENCE = places.SHIPPED, places.REFERENCE
+BRIDGE, RMW_ROBOT, ROS_PYTHON = places.BRIDGE, places.RMW_ROBOT, places.ROS_PYTHON
+CHROMIUM, HEADLESS = places.CHROMIUM, places.HEADLESS
 CHROMIUM_FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -237,11 +227,11 @@ class Bridge:
 
 
 class RosNode(Commanded):
-    """A real rclpy node in its own environment; see `tests/ros/node.py` for its commands."""
+    """A real rclpy node in its own environment; see `tests/ros_nodes/node.py` for its commands."""
 
     def __init__(self, domain: int, name: str = "system_controller", **options: Any) -> None:
         super().__init__(
-            [ROS_PYTHON, TESTS / "ros/node.py", name],
+            [ROS_PYTHON, TESTS / "ros_nodes/node.py", name],
             {
                 "ROS_DOMAIN_ID": str(domain),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",

@@ -3,6 +3,7 @@ as the bridge and the rclpy nodes of `tests/support/parts.py`."""
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from tests.support.parts import ORDERS, ROOT, Bridge, Process, RosNode, until
@@ -24,6 +25,15 @@ class Router(Bridge):
         process = self._process
         until(lambda: "running" in process.text or not process.running, "the router runs")
         assert process.running, process.text
+
+
+def router_without_admin_space(folder: Path) -> Router:
+    """A router as it is without a configuration of rmw_zenoh's; it has not started."""
+    mine, file = Router(), folder / "router.json5"
+    scouting = "scouting: { multicast: { enabled: false } }"
+    file.write_text(f'{{ mode: "router", listen: {{ endpoints: ["{mine.endpoint}"] }}, {scouting} }}')
+    mine.configure(file)
+    return mine
 
 
 class RmwNode(RosNode):

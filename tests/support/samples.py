@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 
 import numpy
 
-from app.interfaces.definitions import INTEGER_RANGES, Structure, Type
+from app.ros.messages.definitions import INTEGER_RANGES, Structure, Type
 
 Edge = Literal["random", "least", "most"]
 

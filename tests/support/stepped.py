@@ -2,10 +2,10 @@
 
 from typing import Any, Final
 
-from app.interfaces import load_interfaces
 from app.panel import Panel
-from app.simulator.panel_robot import PanelRobot
-from app.simulator.values.known_types import Moment
+from app.ros.messages import load_interfaces
+from app.tools.simulator.known_types import Moment
+from app.tools.simulator.panel_robot import PanelRobot
 
 STEP_S: Final = 0.1
 

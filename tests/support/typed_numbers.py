@@ -1,11 +1,11 @@
 """What is read of typed texts, for the server and the scripts alike."""
 
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from app.i18n.locales import number_in
-from app.panel.number_range import decimal_text
+from app.panel.numbers import decimal_text
+from app.system.texts.locales import number_in
 
 LANGUAGES: Final = ("en", "de", "ja")
 SIGNS: Final = "0123456789.,-−+e '０１５９．，－＋　ー。、٣x\xa0\u202f"
@@ -49,6 +49,38 @@ WHOLE: Final[Mapping[str, int]] = {
     "1" * 40: int("1" * 40), "5.0": 5, "1,500": 1500,
 }  # fmt: skip
 NOT_WHOLE: Final = ("5.5", "1e+22", "007", "", "1" * 41)
+
+
+# A text with the limits, step and wholeness of an input, and what is read there; None: unclear.
+WIDE: Final = ("0", "5000", "", False)
+UNCLEAR: Final[Sequence[tuple[str, str, tuple[str, str, str, bool], float | None]]] = (
+    ("1.000", "de", WIDE, None),
+    ("1.000", "en", WIDE, None),
+    ("1,000", "de", WIDE, None),
+    ("1,000", "ja", WIDE, None),
+    ("1,234", "de", WIDE, None),
+    ("１．２５０", "de", WIDE, None),
+    ("+1.250", "en", WIDE, None),
+    ("-1.250", "en", ("-5000", "5000", "", False), None),
+    ("1.000", "de", ("0", "5000", "1", True), None),
+    ("1,000", "en", ("0", "5000", "1", True), None),
+    # Only one of both is permitted.
+    ("1.000", "de", ("10", "5000", "", False), 1000),
+    ("1.250", "de", ("0", "5000", "1", True), 1250),
+    ("1.250", "en", ("0", "10", "", False), 1.25),
+    ("1.250", "en", ("0", "9.999", "0.001", False), 1.25),
+    ("1,250", "de", ("0", "9.999", "0.001", False), 1.25),
+    ("1.255", "en", ("0", "5000", "0.005", False), None),
+    ("1,000", "en", ("0", "5000", "100", True), 1000),
+    # No lone group.
+    ("1.2500", "en", WIDE, 1.25),
+    ("1,2500", "de", WIDE, 1.25),
+    ("1.25", "en", WIDE, 1.25),
+    ("0.125", "en", WIDE, 0.125),
+    ("1000", "de", WIDE, 1000),
+    ("1.000,5", "de", WIDE, 1000.5),
+    ("1,000.0", "en", WIDE, 1000),
+)
 
 
 def _table() -> Iterator[Typed]:

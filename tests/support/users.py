@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
@@ -9,10 +10,10 @@ from unittest.mock import patch
 
 import httpx
 
-from app.access.secrets_hash import Cost, badge_hash, hashed, new_api_token, token_hash
-from app.access.users import ApiToken, User, UserBook
-from app.access.users_file import UsersFile
-from app.cli.users import main
+from app.cell.people.secrets_hash import Cost, badge_hash, hashed, new_api_token, token_hash
+from app.cell.people.users import ApiToken, User, UserBook
+from app.cell.people.users_file import UsersFile
+from app.tools.cli.users import main
 
 QUICK: Final = Cost(8, 1)
 OPENED: Final = {"sec-fetch-dest": "document"}
@@ -39,7 +40,7 @@ def add_user(
             hashed(password, QUICK) if password else "",
             badge_hash(badge, book.badge_salt) if badge else "",
         )
-        return book.with_user(user, "now").noted("now", "add", name, role, "test")
+        return book.with_user(user, "now").with_change("now", "add", name, role, "test")
 
     UsersFile(folder).edit(edit)
 
@@ -94,3 +95,8 @@ def log_rows(client: httpx.Client) -> list[dict[str, str]]:
     answer = client.get("/log.csv").raise_for_status()
     rows = csv.DictReader(io.StringIO(answer.text.removeprefix("\ufeff")))
     return sorted(rows, key=lambda row: int(row["seq"]))
+
+
+def says(data: object, pin: str) -> bool:
+    """Whether a PIN stands anywhere in the data: not as a part of a hash, an id or a time."""
+    return re.search(rf"(?<![0-9a-f.]){pin}(?![0-9a-f])", str(data)) is not None

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from app.commands.reason_codes import ADVICE, FRAMES
-from app.i18n import BETWEEN, Text, TextLike, localized, render
+from app.cell.commands.receipts import ADVICE, FRAMES
+from app.system.texts import BETWEEN, Text, TextLike, localized, render
 
 
 def english(value: Any) -> Any:

@@ -2,8 +2,8 @@
 
 from typing import Any, cast
 
-from app.alarms.rows import AlarmRow
-from app.web.rendering.alarm_choice import AlarmChoice, shows
+from app.cell.alarms.shown import AlarmRow
+from app.web.pages.alarms import AlarmChoice, shows
 
 
 def row(name: str, **more: Any) -> AlarmRow:

@@ -16,6 +16,8 @@ import pytest
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
+pytestmark = pytest.mark.promise("alarms")
+
 PANEL = """
 title = "Cell"
 language = "en"
@@ -65,6 +67,15 @@ def cell(tmp_path: Path) -> Iterator[Server]:
     """Its alarms are active."""
     with server_with(tmp_path) as server:
         until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        yield server
+
+
+@pytest.fixture(scope="module")
+def acknowledged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Its alarms are active, and one is acknowledged; no test changes them."""
+    with server_with(tmp_path_factory.mktemp("cell")) as server:
+        until(lambda: len(listed(server)) == 2, "the alarms are raised")
+        assert act(server, "air_low", "acknowledge", occurrence=1).status_code == 200
         yield server
 
 
@@ -126,9 +137,8 @@ def test_an_act_is_idempotent_checked_and_logged(cell: Server) -> None:
     assert "Acknowledged: Air pressure low." in page
 
 
-def test_metrics_count_alarms_raises_and_times_to_acknowledge(cell: Server) -> None:
-    act(cell, "air_low", "acknowledge", occurrence=1)
-    text = cell.http.get("/metrics").text
+def test_metrics_count_alarms_raises_and_times_to_acknowledge(acknowledged: Server) -> None:
+    text = acknowledged.http.get("/metrics").text
     assert 'kiosk_alarms{priority="1",state="active"} 1.0' in text
     assert 'kiosk_alarms{priority="4",state="shelved"} 0.0' in text
     assert 'kiosk_alarms_raised_total{priority="1"} 1.0' in text
@@ -172,9 +182,8 @@ def test_a_form_without_scripts_goes_back_to_its_page(cell: Server) -> None:
         "/alarms/acknowledge", data={"occurrence.air_latched": "1"}, headers=referring
     )
     assert several.headers["location"] == "/alarms?group=Air"
-    elsewhere = cell.http.post(
-        "/alarms/acknowledge", data={**fields, "occurrence.air_low": "1", "page": "//x.y"}
-    )
+    away = {"occurrence.air_low": "1", "id": "f1", "page": "//x.y", "_since": "0"}
+    elsewhere = cell.http.post("/alarms/acknowledge", data=away)
     assert elsewhere.headers["location"].startswith("/?act=") or elsewhere.headers["location"] == "/"
 
 
@@ -256,39 +265,36 @@ def test_every_row_is_json_that_the_description_has(cell: Server) -> None:
     json.dumps(alarm, allow_nan=False)
 
 
-def test_the_history_says_what_happened_and_is_filtered(cell: Server) -> None:
-    act(cell, "air_low", "acknowledge", occurrence=1)
-    newest, *raises = history(cell)["history"]
+def test_the_history_says_what_happened_and_is_filtered(acknowledged: Server) -> None:
+    newest, *raises = history(acknowledged)["history"]
     assert (newest["event"], newest["id"], newest["limit"]) == ("acknowledged", "air_low", 5.0)
     assert 0 < newest["lasted_s"] < 600
     assert {(row["event"], row["lasted_s"], row["clock_back_s"]) for row in raises} == {
         ("raised", None, 0.0)
     }
-    of_priority = history(cell, priority=1)["history"]
+    of_priority = history(acknowledged, priority=1)["history"]
     assert [row["id"] for row in of_priority] == ["air_latched"]
-    assert len(history(cell, group="Air")["history"]) == 2
-    assert history(cell, alarm="air_latched", text="air")["history"] == of_priority
-    assert history(cell, robot="right")["history"] == []
+    assert len(history(acknowledged, group="Air")["history"]) == 2
+    assert history(acknowledged, alarm="air_latched", text="air")["history"] == of_priority
+    assert history(acknowledged, robot="right")["history"] == []
 
 
-def test_the_page_of_the_history_is_read_in_the_readers_language(cell: Server) -> None:
-    act(cell, "air_low", "acknowledge", occurrence=1)
-    page = cell.http.get("/alarms/history", headers={"accept-language": "ja"}).text
+def test_the_page_of_the_history_is_read_in_the_readers_language(acknowledged: Server) -> None:
+    page = acknowledged.http.get("/alarms/history", headers={"accept-language": "ja"}).text
     assert "空気圧低下" in page
     assert "後に確認" in page
     assert "3 件中 1–3 件" in page
     assert "時計は戻されていません" in page
-    searched = cell.http.get("/alarms/history", params={"text": "latched", "span": "all"}).text
+    searched = acknowledged.http.get("/alarms/history", params={"text": "latched", "span": "all"}).text
     assert "Events 1–1 of 1, newest first" in searched
     assert "raised, 4.5 bar, limit 5.0 bar" not in searched  # it has no unit
-    nothing = cell.http.get("/alarms/history?until=2020-01-01T00:00").text
+    nothing = acknowledged.http.get("/alarms/history?until=2020-01-01T00:00").text
     assert "No event has this." in nothing
-    assert cell.http.get("/alarms/history?since=2020-02-31T00:00").status_code == 422
+    assert acknowledged.http.get("/alarms/history?since=2020-02-31T00:00").status_code == 422
 
 
-def test_the_history_is_exported_as_the_page_shows_it(cell: Server) -> None:
-    act(cell, "air_low", "acknowledge", occurrence=1)
-    answer = cell.http.get("/alarms/history.csv?group=Air", headers={"accept-language": "ja"})
+def test_the_history_is_exported_as_the_page_shows_it(acknowledged: Server) -> None:
+    answer = acknowledged.http.get("/alarms/history.csv?group=Air", headers={"accept-language": "ja"})
     assert answer.headers["content-type"].startswith("text/csv")
     assert re.fullmatch(
         r'attachment; filename="alarms-\d{8}-\d{6}\.csv"', answer.headers["content-disposition"]
@@ -298,6 +304,7 @@ def test_the_history_is_exported_as_the_page_shows_it(cell: Server) -> None:
     assert (rows[0]["text"], rows[0]["unit"], rows[0]["limit"]) == ("空気圧低下", "bar", "5.0")
 
 
+@pytest.mark.long("detail")
 def test_the_header_has_the_state_of_an_active_alarm(tmp_path: Path) -> None:
     state = """
 [state]
@@ -322,9 +329,10 @@ values = ["RUNNING"]
         assert listed(server)["air_latched"]["state"] == "latched"
 
 
-def test_figures_of_the_history_are_json(cell: Server) -> None:
-    act(cell, "air_low", "acknowledge", occurrence=1)
-    figures = cell.http.get("/alarms/figures?span=24h", headers={"accept-language": "ja"}).json()
+def test_figures_of_the_history_are_json(acknowledged: Server) -> None:
+    figures = acknowledged.http.get(
+        "/alarms/figures?span=24h", headers={"accept-language": "ja"}
+    ).json()
     assert (figures["raised"], figures["worst_10_min"], figures["standing_24_h"]) == (2, 2, 0)
     assert figures["by_priority"] == {"1": 1, "2": 1, "3": 0, "4": 0}
     assert figures["per_hour"] == pytest.approx(2 / 24)
@@ -336,9 +344,9 @@ def test_figures_of_the_history_are_json(cell: Server) -> None:
     }
     assert "空気圧低下" in {row["text"] for row in figures["top"]}
     assert figures["chattering"] == []
-    past = cell.http.get("/alarms/figures?until=2020-01-01T00:00").json()
+    past = acknowledged.http.get("/alarms/figures?until=2020-01-01T00:00").json()
     assert (past["raised"], past["top"]) == (0, [])
-    described = cell.http.get("/openapi.json").json()["components"]["schemas"]["FiguresAnswer"]
+    described = acknowledged.http.get("/openapi.json").json()["components"]["schemas"]["FiguresAnswer"]
     assert set(figures) == set(described["properties"])
 
 
@@ -359,6 +367,7 @@ def test_an_alarm_that_follows_another_of_its_group_says_so(tmp_path: Path) -> N
         assert page.count('data-first="true"') == 1
 
 
+@pytest.mark.long("detail")
 def test_a_value_has_the_sign_of_its_most_urgent_active_alarm(tmp_path: Path) -> None:
     with server_with(tmp_path, "values = [4.5, 6.0], period_s = 6.0") as server:
         until(lambda: server.widget("air")["alarmed"] == "1", "the alarm of high priority is active")

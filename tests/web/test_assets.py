@@ -2,16 +2,26 @@
 
 import gzip
 import shutil
+from itertools import chain
 from pathlib import Path
 
 import pytest
 
-from app.errors import KindError
 from app.panel.widgets.families import EntryWidget
 from app.panel.widgets.kinds import KINDS
-from app.panel.widgets.step import Step
-from app.settings import shipped_path
-from app.web.assets import LATER, LAYERS, OWN_PAGES, SHARED, Assets, load_assets, require_files
+from app.panel.widgets.publish import Step
+from app.system.errors import KindError
+from app.system.settings import shipped_path
+from app.web.assets import (
+    COMMON,
+    LATER,
+    LAYERS,
+    OWN_PAGES,
+    SHARED,
+    Assets,
+    load_assets,
+    require_files,
+)
 from tests.support.parts import ROOT
 
 
@@ -20,7 +30,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, *SHARED, *OWN_PAGES, LATER):
+    for layer in {*LAYERS, *SHARED, *OWN_PAGES, LATER, *chain(*COMMON.values())}:
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")
@@ -67,19 +77,34 @@ def test_every_input_has_the_styles_of_entries() -> None:
             assert "entries" in kind.styles, name
 
 
-def test_the_styles_and_the_script_of_a_kind_are_files_of_its_name(
+def test_the_styles_of_a_kind_are_in_the_stylesheet_of_pages_with_it(
     static: Path, templates: Path
 ) -> None:
-    for suffix in ("css", "js"):
-        (static / suffix / "kinds").mkdir()
-    (static / "css/kinds/gauge.css").write_text(".gauge {}\n")
-    (static / "js/kinds/gauge.js").write_text("gauge();\n")
-    assets = loaded(static, templates, 0.25, "gauge")
-    assert b".gauge" not in assets.files["kiosk.css"].content
-    assert assets.files["kinds/gauge.css"].content == b".gauge{}"
+    (static / "css/kinds").mkdir()
+    for kind in ("camera", "gauge", "table"):
+        (static / f"css/kinds/{kind}.css").write_text(f".{kind} {{}}\n")
+    (static / "own.css").write_text("b { top: 1px }\n")
+    assets = load_assets(static, templates, 0.25, KINDS, styles=[static / "own.css"])
+    without = assets.files[f"{assets.sheet(['hold'])}.css"]
+    assert without == assets.files["kiosk.css"]
+    assert b".gauge" not in without.content
+    sheet = assets.files[f"{assets.sheet(['table', 'hold', 'gauge'])}.css"]
+    assert assets.sheet(["gauge", "table"]) == "kiosk-gauge-table"
+    assert sheet.content.startswith(assets.layers.content)
+    assert sheet.content.endswith(b".gauge{}\n.table{}\nb { top: 1px }\n")
+    assert gzip.decompress(sheet.packed) == sheet.content
+
+
+def test_the_script_of_a_kind_is_a_file_of_its_name_or_shared(static: Path, templates: Path) -> None:
+    (static / "js/kinds").mkdir()
+    for script in ("gauge", "holds"):
+        (static / f"js/kinds/{script}.js").write_text(f"{script}();\n")
+    assets = loaded(static, templates, 0.25, "gauge", "hold", "joystick")
     assert assets.files["kinds/gauge.js"].content == b"gauge();\n"
-    assert "gauge" in assets.styles & assets.scripts
-    assert "publish" not in assets.styles | assets.scripts
+    kinds = ["gauge", "hold", "joystick", "publish"]
+    assert assets.modules([], kinds) == ["kinds/gauge", "kinds/holds"]
+    assert "gauge" in assets.styles
+    assert "publish" not in assets.styles
 
 
 PART_FILES = {
@@ -195,3 +220,12 @@ def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
         assert b"http:" not in asset.content, name
         assert b"https:" not in asset.content, name
         assert b"@import" not in asset.content, name
+
+
+def test_each_script_that_another_imports_is_there() -> None:
+    assets = load_assets(shipped_path("static"), shipped_path("templates"), 0.22, KINDS)
+    imports = {name for scripts in assets.imports.values() for name in scripts}
+    assert len(imports) > 10
+    assert {
+        name for name in imports if f"js/{name}" not in assets.files and name not in assets.files
+    } == set()

@@ -5,6 +5,7 @@ Another machine is another loopback address here: the kiosk's own is 127.0.0.1 a
 
 import json
 import socket
+import statistics
 import subprocess
 import sys
 import threading
@@ -20,12 +21,14 @@ from websockets.exceptions import ConnectionClosed
 from websockets.protocol import State
 from websockets.sync.client import ClientConnection, connect
 
-from app.runtime.frames import VIEWERS
+from app.cell.session.frames import VIEWERS
 from app.web.turns import READ_QUOTA
 from tests.support.holds import PANEL
 from tests.support.parts import ENOUGH_S, ROOT, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_hold_socket import Socket, held
+
+pytestmark = pytest.mark.promise("security")
 
 KIOSK: Final = "127.0.0.1"
 OTHER: Final = "127.0.0.2"
@@ -126,7 +129,7 @@ def page_s(server: Server, address: str = KIOSK) -> float:
     return time.monotonic() - began
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 @pytest.mark.parametrize(
     ("address", "path"),
     [
@@ -140,11 +143,13 @@ def page_s(server: Server, address: str = KIOSK) -> float:
 def test_a_hold_lives_through_many_connections_that_ask_without_a_pause(
     cell: Server, address: str, path: str
 ) -> None:
-    """A page takes 15 ms of the event loop or more: all of them in a row, longer than a lease."""
+    """A page takes 15 ms of the event loop or more: all of them in a row, longer than a lease. A page
+    waits for two requests of each connection at most, however busy the machine is."""
+    in_turn_s = 2 * CONNECTIONS * statistics.median(page_s(cell) for _ in range(5))
     with a_hold_that_lasts(cell), flooding(cell, address, path, CONNECTIONS) as answers:
         time.sleep(ATTACK_S / 4)
-        assert page_s(cell) < 5
-        assert page_s(cell, ANOTHER) < 10
+        assert page_s(cell) < max(5, in_turn_s)
+        assert page_s(cell, ANOTHER) < max(5, in_turn_s)
     assert sum(answers.values()) > 10, answers
 
 
@@ -158,7 +163,7 @@ def refusal(program: httpx.Client, **headers: str) -> httpx.Response:
     return refused[0]
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_client_with_too_many_requests_is_told_when_to_ask_again(cell: Server) -> None:
     with client(cell, OTHER) as program, client(cell, ANOTHER) as another:
         answer = refusal(program)
@@ -211,7 +216,7 @@ def refused(socket: ClientConnection) -> bool:
     return True
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) -> None:
     with a_hold_that_lasts(cell), looking(cell, OTHER, 40) as silent:
         assert len(silent) == VIEWERS.client
@@ -228,6 +233,7 @@ def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) 
             assert len(own) == 1
 
 
+@pytest.mark.long("detail")
 def test_a_viewer_that_asks_for_nothing_is_closed(cell: Server) -> None:
     with looking(cell, OTHER, 1) as silent:
         with pytest.raises(ConnectionClosed):

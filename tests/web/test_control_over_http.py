@@ -15,10 +15,12 @@ from typing import Final
 import httpx
 import pytest
 
-from app.web.client_cookie import COOKIE
-from tests.runtime.test_several_robots import entry, panel_file
+from app.web.client import COOKIE
+from tests.cell.session.test_several_robots import entry, panel_file
 from tests.support.parts import REFERENCE, ROOT, Server, http_client, until
 from tests.support.servers import ready
+
+pytestmark = pytest.mark.promise("control")
 
 FAST_S = 2.0
 PROXY = "127.0.0.1"  # through which those who are not at the cell come
@@ -228,7 +230,7 @@ def test_asking_granting_and_giving_up(own_client: Callable[..., Client], own_ki
         (rb'{"\ud800": 1}', "the body has half of a surrogate pair, which is not Unicode text"),
         (rb'{"to": "\ud800"}', "the body has half of a surrogate pair, which is not Unicode text"),
         ('{"to": ""}'.encode("utf-16"), "the body is not JSON: "),
-        (b"[]", "the body: Input should be a valid dictionary"),
+        (b"[]", "the body must be an object"),
         (b"[" * 30_000, "the body is not JSON: "),
     ],
 )
@@ -277,6 +279,7 @@ def test_a_denied_request(client: Callable[..., Client]) -> None:
     assert again.json()["code"] == "control_denied"
 
 
+@pytest.mark.long("detail")
 def test_a_request_goes_through_without_a_touch_of_the_holder(
     client: Callable[..., Client], kiosk: Server
 ) -> None:

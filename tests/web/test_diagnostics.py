@@ -11,9 +11,9 @@ from typing import Any
 import httpx
 import pytest
 
-from app.i18n import render, say
-from app.runtime.live_look import LINGER_S, MOST_AT_ONCE
-from app.web.diagnostics_answer import DiagnosticsAnswer, LookAnswer
+from app.cell.session.looks import LINGER_S, MOST_AT_ONCE
+from app.system.texts import render, say
+from app.web.pages.diagnostics import DiagnosticsAnswer, LookAnswer
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 
@@ -137,6 +137,7 @@ def test_links_have_round_trips_and_the_sentences_of_the_lamps(cell: Server) -> 
     assert (links["server"]["round_trips"], links["bridge"]["trip_note"]) == (None, "")
 
 
+@pytest.mark.long("detail")
 def test_the_round_trip_to_a_node_is_measured_while_someone_asks(cell: Server) -> None:
     def node() -> Any:
         return diagnostics(cell)["links"][2]
@@ -159,11 +160,11 @@ def test_a_robot_without_a_node_that_can_be_asked_has_the_reason(tmp_path: Path)
 def test_a_browser_has_its_own_round_trips(cell: Server) -> None:
     with httpx.Client(base_url=cell.url, headers=HTML) as browser, httpx.Client() as other:
         browser.get("/diagnostics")
-        for ms in ("12", "30", "18"):
+        for ms in ("1203", "3004", "1805"):
             text = browser.get("/diagnostics", params={"part": "content", "rtt": ms}).text
-        assert "12 ms to 30 ms" in text
-        assert "18 ms" in text
-        assert "12 ms to" not in other.get(f"{cell.url}/diagnostics", headers=HTML).text
+        assert "1203 ms to 3004 ms" in text
+        assert "1805 ms" in text
+        assert "1203 ms" not in other.get(f"{cell.url}/diagnostics", headers=HTML).text
 
 
 def test_graph_has_the_robots_topics_and_what_the_panel_uses(cell: Server) -> None:
@@ -213,6 +214,7 @@ def test_a_look_shows_messages_and_ends_when_no_one_asks(cell: Server) -> None:
     until(lambda: not diagnostics(cell)["looks"], "the look has ended", within_s=LINGER_S + 30)
 
 
+@pytest.mark.long("detail")
 def test_a_few_looks_at_once_and_only_into_topics_that_exist(cell: Server) -> None:
     keys = ["air", "count", "name", "last"]
     answers = [look(cell, key) for key in keys]

@@ -6,7 +6,7 @@ from typing import Final
 
 import pytest
 
-from app.web.rendering.display_choice import KEPT_S
+from app.web.pages.display_choice import KEPT_S
 from tests.support.parts import REFERENCE, ROOT, Server
 from tests.support.servers import ready
 

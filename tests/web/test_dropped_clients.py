@@ -13,8 +13,8 @@ from typing import Final
 
 import pytest
 
-from app.repeated_records import COUNTED_FOR_S, RepeatedRecords
-from app.web.server_log import CLIENT_FAULTS, ClientFaults
+from app.system.log import COUNTED_FOR_S, RepeatedRecords
+from app.web.server import CLIENT_FAULTS, ClientFaults
 from tests.support.holds import PANEL
 from tests.support.parts import ROOT, Server
 from tests.support.servers import demo_server, ready

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from starlette.requests import HTTPConnection
 
 from app.panel.rules import EmbedRules
-from app.web.embedding import frame_ancestors, from_frame, is_embedded, only_shows
+from app.web.client import frame_ancestors, from_frame, is_embedded, only_shows
 from tests.support.holds import PANEL
 from tests.support.parts import Server
 from tests.support.servers import demo_server

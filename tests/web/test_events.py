@@ -10,15 +10,17 @@ import pytest
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from app.robot.state import RobotState
-from app.view.publisher import ViewPublisher
-from app.view.view import View, build_view
+from app.cell.robot.state import RobotState
+from app.cell.view.publisher import ViewPublisher
+from app.cell.view.view import View, build_view
 from app.web.asgi import Application, KeepServerSend, server_send
 from app.web.metrics import Open
 from app.web.routes.events import EventStream
 from tests.support.builders import NOW, permits, robot_there, says, small_panel
 from tests.support.parts import events_in
 from tests.support.words import english
+
+pytestmark = pytest.mark.promise("reconnect")
 
 PANEL = small_panel()
 SCOPE: dict[str, Any] = {"type": "http"}

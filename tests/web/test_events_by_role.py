@@ -7,15 +7,20 @@ from typing import Any
 
 import pytest
 
-from app.i18n import ENGLISH
+from app.cell.permission.control import ControlAuthority
+from app.cell.view import publisher as module
+from app.cell.view.publisher import ViewPublisher
+from app.cell.view.view import (
+    Audience,
+    ViewContext,
+    ViewWithDeadlines,
+    audience,
+    audience_of,
+    build_view,
+)
 from app.panel.rules import ControlRules
-from app.permission.clients import Clients
-from app.permission.control_authority import ControlAuthority
-from app.permission.principal import Principal
-from app.view import publisher as module
-from app.view.audience import Audience, audience, audience_of
-from app.view.publisher import ViewPublisher
-from app.view.view import ViewContext, ViewWithDeadlines, build_view
+from app.records.principal import Clients, Principal
+from app.system.texts import ENGLISH
 from app.web.metrics import Open
 from app.web.routes.events import EventStream
 from tests.support.builders import (

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from app.diagnose.findings import KINDS, Report
-from app.i18n import render, say
-from app.runtime.doctor_process import FoundFault
-from app.web.rendering.diagnostics_texts import finding_text, remedy_text
+from app.cell.session.doctor_process import FoundFault
+from app.system.texts import render, say
+from app.tools.doctor.findings import KINDS, Report
+from app.web.pages.diagnostics import finding_text, remedy_text
 
 LANGUAGES = ("ja", "de")
 

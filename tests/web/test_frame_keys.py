@@ -30,4 +30,4 @@ title = "One"
 def test_the_script_of_a_frames_hold_is_loaded_on_every_page(tmp_path: Path) -> None:
     with demo_server(tmp_path, PANEL) as server:
         html = server.http.get("/pages/one").text
-        assert re.findall(r'"kinds":(\[[^]]*\])', html) == ['["hold"]']
+        assert re.findall(r'"kinds":({[^}]*})', html) == ['{"hold":"holds"}']

@@ -6,12 +6,12 @@ from typing import get_args
 
 import pytest
 
-from app.i18n import render, say, time_of_day
+from app.cell.view.displays import State
 from app.panel.widgets.displays import Indicator
+from app.panel.widgets.key_parts import KeyRole
 from app.panel.widgets.kinds import KINDS
-from app.panel.widgets.roles import KeyRole
-from app.view.display_values import State
-from app.web.gallery import PARTS
+from app.system.texts import render, say, time_of_day
+from app.tools.gallery import PARTS
 from tests.support.parts import ROOT, Server
 
 EXAMPLES = [example for part in PARTS for example in part.examples]

@@ -20,12 +20,14 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from app.audit.database import NAME
-from app.web.client_cookie import COOKIE
+from app.records.database import NAME
+from app.web.client import COOKIE
 from tests.support.holds import PANEL, PATIENT, TRIES, jogging, permit
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, events_in, http_client, until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers, add_user, command
+
+pytestmark = pytest.mark.promise("hold")
 
 
 @pytest.fixture(scope="module")
@@ -175,6 +177,7 @@ def handed_over(client: httpx.Client, _: Path) -> None:
     client.post("/session", json={"user": "A. Weber", "pin": "2580"}).raise_for_status()
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("change", [signed_out, disabled, handed_over])
 def test_a_hold_ends_with_the_sign_in_of_who_holds(
     tmp_path: Path, change: Callable[[httpx.Client, Path], None]
@@ -224,7 +227,7 @@ def test_release_before_a_hold_begins_is_answered_with_not_started(demo: Server)
         assert socket.closed() == 4409
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_heartbeat_for_a_hold_that_is_over_gets_that_answer_and_revives_nothing(
     prompt: Server,
 ) -> None:
@@ -301,7 +304,7 @@ def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
     assert nonsense["of"] == ""
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_release_while_the_entry_is_written_starts_no_hold(prompt: Server) -> None:
     """The disk takes the entry only after the finger was lifted."""
     for _ in range(TRIES):
@@ -321,7 +324,7 @@ def test_release_while_the_entry_is_written_starts_no_hold(prompt: Server) -> No
         assert prompt.widget("jog")["held"] is False
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_a_begin_that_was_long_on_its_way_is_refused(prompt: Server) -> None:
     with opened(prompt) as socket:
         time.sleep(0.3)
@@ -426,7 +429,7 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
     assert said["reason"] in kiosk.http.get("/log.csv").text
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_stalled_server_has_ended_the_hold_when_it_resumes(prompt: Server) -> None:
     with held(prompt) as socket:
         prompt.process.send(signal.SIGSTOP)
@@ -472,6 +475,7 @@ def test_ending_server_reports_the_end_of_a_hold_despite_a_pending_query(
     kiosk.process.wait(ENOUGH_S)
 
 
+@pytest.mark.long("detail")
 def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
     tmp_path: Path,
 ) -> None:

@@ -17,12 +17,14 @@ from typing import Final
 
 import pytest
 
-from app.web.connections import raise_file_limit
-from tests.audit.test_exports import large
+from app.web.server import raise_file_limit
+from tests.records.test_exports import large
 from tests.support.holds import PANEL
 from tests.support.parts import ROOT, Server
 from tests.support.servers import demo_server
 from tests.web.test_client_limits import a_hold_that_lasts
+
+pytestmark = pytest.mark.promise("security")
 
 ENTRIES: Final = 20_000  # an export of so many is longer than the buffers of a connection
 REQUESTS_PER_S: Final = 1000
@@ -111,7 +113,7 @@ def opened(server: Server, address: str, head: bytes) -> socket.socket:
     return way
 
 
-@pytest.mark.real_time
+@pytest.mark.long("real time")
 def test_the_kiosks_presses_and_holds_keep_their_share(cell: Server) -> None:
     press_times(cell)  # the first ones load what presses need
     quiet = press_times(cell)

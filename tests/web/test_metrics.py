@@ -5,15 +5,16 @@ from collections.abc import Callable
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from app.audit import NullLog
-from app.dialect.bridge_dialect import bridge_token
-from app.robot.state import Sample
-from app.runtime.fleet import Fleet
-from app.runtime.robot_session import RobotSession
-from app.transport.zenoh_config import config_to
+from app.cell.robot.state import Sample
+from app.cell.session.fleet import Fleet
+from app.cell.session.session import RobotSession
+from app.panel.model import Panel
+from app.records import NullLog
+from app.ros.dialects.bridge_dialect import bridge_token
+from app.ros.zenoh.config import config_to
 from app.web.metrics import Metrics
 from app.web.prometheus import exposition
-from tests.support.builders import BRIDGE, small_panel
+from tests.support.builders import BRIDGE, panel_of, small_panel
 
 Samples = dict[tuple[str, tuple[str, ...]], float]
 
@@ -29,15 +30,15 @@ def read(metrics: Metrics) -> Samples:
     return values
 
 
-def nowhere() -> Fleet:
-    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1", NullLog())
+def nowhere(panel: Panel) -> Fleet:
+    return Fleet(panel, lambda _: config_to(NOWHERE), "r1", NullLog())
 
 
-def of_kiosk(change: Callable[[RobotSession], None]) -> Samples:
+def of_kiosk(change: Callable[[RobotSession], None], panel: Panel | None = None) -> Samples:
     """What is read of a kiosk after a change."""
 
     async def followed() -> Samples:
-        fleet = nowhere()
+        fleet = nowhere(panel or small_panel())
         try:
             metrics = Metrics(fleet)
             change(fleet.first)
@@ -74,6 +75,13 @@ def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
             session.robot.reading("/heard")
 
     assert of_kiosk(hear)["kiosk_undecodable_total", ("heard", "")] == 2
+
+
+def test_a_list_of_options_that_is_not_known_is_counted() -> None:
+    source = {"topic": "/joints", "type": "sensor_msgs/msg/JointState", "field": "name"}
+    select = {"id": "program", "kind": "select", "label": "Program", "options_from": source}
+    samples = of_kiosk(lambda kiosk: None, panel_of(select))
+    assert samples["kiosk_options_known", ("", "program")] == 0
 
 
 def test_presses_are_counted_by_outcome() -> None:

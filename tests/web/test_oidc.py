@@ -13,6 +13,8 @@ from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 from tests.support.users import Browsers, add_user, log_rows
 
+pytestmark = pytest.mark.promise("neighbours")
+
 PAGE = {"accept": "text/html"}
 PANEL = """
 title = "Cell"

@@ -5,9 +5,12 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import pytest
 
+from app.web.requests import FORM
+from app.web.server import HEAD_MOST
 from tests.support.form import LONG, several
 from tests.support.parts import REFERENCE, ROOT, Server
 from tests.support.servers import ready
@@ -105,6 +108,53 @@ def test_invalid_request_gets_a_regular_error(kiosk: Server) -> None:
     assert answer.json()["error"].startswith("once: Input should be a valid boolean")
 
 
+@pytest.mark.parametrize(
+    ("path", "fields", "status"),
+    [
+        ("/alarms/report", {}, 303),
+        ("/alarms/drive/shelve", {"for_s": "", "occurrence": "", "_since": ""}, 303),
+        ("/alarms/acknowledge", {"id": "", "page": "", "_since": ""}, 303),
+        ("/alarms/acknowledge", {"other": ""}, 422),
+        ("/session/pad", {}, 303),
+        ("/session/pad", {"other": ""}, 422),
+        ("/users/remove", {"name": "nobody", "version": "", "_since": ""}, 303),
+        ("/users/remove", {"name": "nobody", "_since": "nan"}, 422),
+        ("/control/take", {"id": "", "to": "", "page": ""}, 303),
+    ],
+)
+def test_an_empty_field_of_a_form_is_none(
+    kiosk: Server, path: str, fields: dict[str, str], status: int
+) -> None:
+    content = urlencode(fields)
+    answer = kiosk.http.post(path, content=content, headers={"content-type": FORM})
+    assert answer.status_code == status, answer.text
+
+
+def test_a_number_is_no_time(kiosk: Server) -> None:
+    assert kiosk.http.get("/alarms?until=0.5").status_code == 422
+    assert kiosk.http.post("/alarms/drive/acknowledge", json={"at": 5}).status_code == 422
+    assert kiosk.http.get("/alarms?until=2026-11-21T10:00:00Z").status_code == 200
+
+
+def test_an_act_over_a_limit_is_described(described: dict[str, Any]) -> None:
+    """As a receipt, or as the error of a limit of all requests."""
+    for path, methods in described["paths"].items():
+        if "post" not in methods:
+            continue
+        responses = methods["post"]["responses"]
+        if "Receipt" in str(responses.get("200", "")):
+            assert "Receipt" in str(responses["429"]), path
+            assert "ErrorAnswer" in str(responses["429"]), path
+
+
+def test_the_longest_return_of_a_provider_is_no_request_too_long(described: dict[str, Any]) -> None:
+    back = described["paths"]["/session/oidc/back"]["get"]["parameters"]
+    texts = [parameter["schema"] for parameter in back if parameter["schema"]["type"] == "string"]
+    assert all(text["pattern"] == r"^[\x20-\x7e]*$" for text in texts)
+    assert sum(3 * text["maxLength"] for text in texts) < HEAD_MOST
+
+
+@pytest.mark.long("random")
 def test_schemathesis_finds_nothing(kiosk: Server, described: dict[str, Any], tmp_path: Path) -> None:
     """All of its checks, on everything but the stream that never ends."""
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Schemathesis on a server with users, as nobody, as a viewer and as an operator: no error of the
+"""Schemathesis on a server with users, unauthenticated, as a viewer and as an operator: no error of the
 server, and nothing done beyond the role. In the short form what is posted only."""
 
 import json
@@ -16,6 +16,8 @@ from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 from tests.support.users import add_user, log_rows, token_of
 from tests.web.test_roles import PANEL
+
+pytestmark = [pytest.mark.long("random"), pytest.mark.promise("security")]
 
 ROLES: Final = ("viewer", "operator", "engineer")
 EXAMPLES: Final = several(6, 40)  # of each operation

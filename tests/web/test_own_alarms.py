@@ -12,7 +12,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.x509.oid import NameOID
 
-from app.certificates.issuing import new_key, pem
+from app.system.certificates import new_key, pem
 from tests.faults.clock import Clock
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server
@@ -94,6 +94,7 @@ def test_with_several_robots_it_is_of_none(tmp_path: Path) -> None:
         assert server.http.post("/alarms/panel_disk/acknowledge", json={"occurrence": 1}).json()["done"]
 
 
+@pytest.mark.long("detail")
 def test_a_clock_that_is_set_is_raised_once_and_returns(tmp_path: Path) -> None:
     clock = Clock(tmp_path)
     with demo_server(tmp_path, PAGE, **clock.environment) as server:

@@ -29,7 +29,7 @@ def test_widgets_stand_where_the_template_places_them(server: Server, folder: Pa
     html = server.http.get("/").text
     inside = html.partition('<div class="own page-plan">')[2].partition("</main>")[0]
     assert re.findall('data-widget="([a-z]+)"', inside) == ["robot", "heard", "start"]
-    assert re.findall('data-widget="([a-z]+)"', html) == ["robot", "heard", "start", "stop"]
+    assert re.findall('data-widget="([a-z]+)"', html) == ["stop", "robot", "heard", "start"]
     assert 'class="at-robot"><div class="cell" id="at-robot" data-cell="indicator">' in inside
     assert "<p>Plan a &lt; b <svg" in inside
     assert inside.count('<p class="why"') == 1  # macros with the icons and texts of every other page

@@ -1,6 +1,6 @@
 """Round trips of browsers, in memory that no number of browsers fills."""
 
-from app.web.page_trips import MOST_BROWSERS, PageTrips
+from app.web.metrics import MOST_BROWSERS, PageTrips
 
 BEGAN = 1000.0
 

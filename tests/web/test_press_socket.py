@@ -12,8 +12,8 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 
-from app.web.routes.press_socket import MOST_AT_ONCE
-from tests.runtime.test_nothing_grows import MUTE, Robot, widget
+from app.web.routes.presses import MOST_AT_ONCE
+from tests.cell.session.test_nothing_grows import MUTE, Robot, widget
 from tests.support.browser.pages import HIDE
 from tests.support.parts import (
     ENOUGH_S,
@@ -25,6 +25,8 @@ from tests.support.parts import (
     zenoh_file,
 )
 from tests.web.test_server import reads_nothing
+
+pytestmark = pytest.mark.promise("offline")
 
 WAITS_S: Final = 3.0  # long enough to see a press that is under way
 LONG_S: Final = 2 * ENOUGH_S
@@ -123,7 +125,7 @@ def stopping(socket: PressSocket) -> bool:
     return said["status"] == 409 and "the panel server is shutting down" in said["reason"]
 
 
-@pytest.mark.parametrize("way", ["socket", "post"])
+@pytest.mark.parametrize("way", ["socket", pytest.param("post", marks=pytest.mark.long("detail"))])
 def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str) -> None:
     with (
         slow(tmp_path, LONG_S) as mine,
@@ -149,6 +151,7 @@ def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str
     assert said["reason"] in logged(mine, "long")
 
 
+@pytest.mark.long("detail")
 def test_unread_socket_does_not_delay_shutdown(tmp_path: Path) -> None:
     with (
         slow(tmp_path, LONG_S, LONG_SHUTDOWN) as mine,
@@ -226,12 +229,13 @@ def test_a_page_presses_on_its_socket_and_gets_a_late_answer_there(kiosk: Server
     page.get_by_role("button", name=MUTE[2], exact=True).click()
     expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("Waiting for the robot")
     publish(page).click()
-    expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")
+    expect(page.locator("#receipt-free")).to_contain_text("Sent at")
     expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("No response within")
     assert posts == []
     assert not socket.is_closed()
 
 
+@pytest.mark.long("detail")
 def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, own_page: Page) -> None:
     page = own_page
     sockets: list[WebSocket] = []
@@ -253,6 +257,7 @@ def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, own_page: Pa
     expect(publish(page)).to_be_enabled()
 
 
+@pytest.mark.long("table")
 @pytest.mark.parametrize("fault", ["it does not open", "it breaks", "it hangs"])
 def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
     kiosk: Server, own_page: Page, fault: str
@@ -286,13 +291,13 @@ def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
     publish(page).click()
     receipt = page.locator("#receipt-free")
     if fault == "it does not open":
-        expect(receipt).to_contain_text("Sent on /free at")
+        expect(receipt).to_contain_text("Sent at")
         return
     expect(receipt).to_contain_text("may or may not have been sent", timeout=10_000)
     page.wait_for_timeout(1000)  # long enough for a repetition to show, were there one
     assert (len(said), posts, len(sockets)) == (1, [], 1)
     publish(page).click()
-    expect(receipt).to_contain_text("Sent on /free at")
+    expect(receipt).to_contain_text("Sent at")
     assert (len(said), len(sockets)) == (1, 2)
 
 
@@ -305,5 +310,5 @@ def test_a_hidden_page_gives_its_socket_back(kiosk: Server, page: Page) -> None:
     page.evaluate(HIDE, False)
     second = touched(page)
     publish(page).click()
-    expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")
+    expect(page.locator("#receipt-free")).to_contain_text("Sent at")
     assert (first.is_closed(), second.is_closed()) == (True, False)

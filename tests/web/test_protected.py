@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from uvicorn import Config
 
-from app.cli.command import main
-from app.errors import SettingsError
-from app.settings import Settings
-from app.web.serving import check_protected
+from app.system.errors import SettingsError
+from app.system.settings import Settings
+from app.tools.cli.command import main
+from app.web.server import check_protected
 from tests.support.panel_text import CELL
 from tests.support.parts import ROOT, Process, free_port, until
 from tests.support.users import add_user
@@ -37,7 +37,7 @@ def with_certificate(panel: Path) -> tuple[str, ...]:
     return "--ssl-certfile", str(folder / "web.pem"), "--ssl-keyfile", str(folder / "web.key")
 
 
-@pytest.mark.parametrize("tls", [False, True])
+@pytest.mark.parametrize("tls", [False, pytest.param(True, marks=pytest.mark.long("detail"))])
 def test_a_live_panel_without_protection_does_not_start(panel: Path, tls: bool) -> None:
     options = with_certificate(panel) if tls else ()
     done = subprocess.run(
@@ -57,7 +57,13 @@ def test_a_live_panel_with_tls_and_users_is_open(panel: Path) -> None:
     opens(command(panel, *with_certificate(panel)), "the panel is at https://")
 
 
-@pytest.mark.parametrize("options", [("--without", "tls", "--without", "users"), ("--mode", "demo")])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--without", "tls", "--without", "users"),
+        pytest.param(("--mode", "demo"), marks=pytest.mark.long("detail")),
+    ],
+)
 def test_a_panel_that_goes_without_is_open(panel: Path, options: tuple[str, ...]) -> None:
     opens(command(panel, *options), "the panel is at http://")
 

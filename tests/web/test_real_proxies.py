@@ -14,12 +14,14 @@ import httpx
 import pytest
 from websockets.sync.client import connect
 
-from app.cli.command import main
+from app.tools.cli.command import main
 from tests.support.holds import PANEL, PATIENT, TRIES
 from tests.support.parts import ENOUGH_S, ROOT, Process, Server, Stream, events_in, free_port, until
 from tests.support.servers import demo_server
 from tests.support.users import OPENED, add_user, log_rows, token_of
 from tests.web.test_hold_socket import Socket
+
+pytestmark = pytest.mark.promise("neighbours")
 
 PATH: Final = "/cell1"
 CLIENT: Final = "127.0.0.5"
@@ -99,7 +101,9 @@ def started(kind: str, folder: Path, port: int, target: int) -> Process:
 
 
 @pytest.fixture(scope="module", params=["nginx", "caddy"])
-def panel(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Panel]:
+def panel(
+    request: pytest.FixtureRequest, proxies: None, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Panel]:
     folder = tmp_path_factory.mktemp("proxied")
     assert main(["certificate", str(folder / "tls"), "--host", "localhost"]) == 0
     add_user(folder / "data", "M. Sato", "operator", pin="2580")

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.log import main as log_main
-from app.cli.recipes import main
-from app.recipes.command_line import account
-from app.recipes.folder import FOLDER
-from tests.recipes.panels import CARTON, PANEL, TRAY
+from app.cell.recipes.book import FOLDER
+from app.cell.recipes.command_line import account
+from app.tools.cli.log import main as log_main
+from app.tools.cli.recipes import main
+from tests.cell.recipes.panels import CARTON, PANEL, TRAY
 from tests.support.parts import Server, until
 from tests.web.test_recipes import act, entries, exported, load, make, server_with
 
@@ -32,7 +32,8 @@ def imported(data: Path, rows: str) -> int:
     """The exit status of an import by the command line."""
     file = data.parent / "boxes.csv"
     file.write_text(HEAD + rows)
-    return main(["import", "boxes", str(file), str(data.parent / "line.toml"), "--data", str(data)])
+    place = [str(data.parent / "line.toml"), "--data", str(data)]
+    return main(["import", "boxes", str(file), *place, "--yes"])
 
 
 def logged(server: Server) -> list[dict[str, str]]:
@@ -62,6 +63,7 @@ def test_a_running_server_takes_an_import_and_logs_it(data: Path) -> None:
     assert log_main(["verify", "--data", str(data)]) == 0
 
 
+@pytest.mark.long("detail")
 def test_an_import_while_the_server_is_stopped_is_logged_once_at_its_start(data: Path) -> None:
     assert imported(data, "Carton,450,80,vacuum,false,-\n") == 0
     for _ in range(2):
@@ -72,6 +74,7 @@ def test_an_import_while_the_server_is_stopped_is_logged_once_at_its_start(data:
     assert log_main(["verify", "--data", str(data)]) == 0
 
 
+@pytest.mark.long("detail")
 def test_a_change_that_was_cut_off_is_not_logged(data: Path) -> None:
     assert imported(data, "Carton,450,80,vacuum,false,-\n") == 0
     (data / FOLDER / "boxes" / "carton.toml").unlink()  # its process ended before it was written

@@ -9,7 +9,7 @@ from typing import Any, Final
 import httpx
 import pytest
 
-from tests.recipes.panels import CARTON, PANEL, TRAY
+from tests.cell.recipes.panels import CARTON, PANEL, TRAY
 from tests.support.confirmed import add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server

@@ -7,11 +7,11 @@ from typing import Any, Final
 import httpx
 import pytest
 
-from tests.recipes.panels import CARTON, PANEL
+from tests.cell.recipes.panels import CARTON, PANEL
 from tests.support.confirmed import add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
-from tests.support.users import Browsers, log_rows, token_of
+from tests.support.users import Browsers, log_rows, says, token_of
 from tests.web.test_confirm import form_fields
 from tests.web.test_recipes_confirmed import plain
 
@@ -96,7 +96,7 @@ def test_a_recipe_is_changed_with_the_right_pin_only_and_the_log_says_so(
     assert [(row["who"], row["outcome"]) for row in rows] == [("K. Novak", "succeeded")]
     assert "Length 450 mm → 500 mm" in rows[0]["reason"]
     assert "Confirmed by K. Novak with the PIN." in rows[0]["reason"]
-    assert "1470" not in str(log_rows(client))
+    assert not says(log_rows(client), "1470")
 
 
 def test_a_second_person_confirms_a_change(browsers: Browsers, cell: Server) -> None:

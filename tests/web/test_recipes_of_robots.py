@@ -7,7 +7,7 @@ import pytest
 
 from app.panel import load_panel
 from app.panel.robot_panels import panel_of
-from tests.recipes.panels import CARTON, PANEL
+from tests.cell.recipes.panels import CARTON, PANEL
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server, panel_file
 

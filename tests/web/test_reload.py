@@ -118,6 +118,7 @@ def checkout(tmp_path: Path) -> Iterator[Checkout]:
     mine.server.end(signal.SIGINT)
 
 
+@pytest.mark.long("detail")
 def test_open_browser_shows_the_saved_panel_or_its_fault(checkout: Checkout, page: Page) -> None:
     page.goto(checkout.server.url)
     check_panels_fault(checkout, page)
@@ -134,7 +135,7 @@ def test_open_browser_shows_the_saved_panel_or_its_fault(checkout: Checkout, pag
         checkout.edit(SCREEN, ">{{ page.title }}</h2>", ">A new heading</h2>")
         checkout.edit(PANEL, 'label = "Publish1"', 'label = "Pick up"')
         checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
-        checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
+        checkout.edit("app/system/texts/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
     expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
     expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
     expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)

@@ -13,11 +13,13 @@ import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 
 import app.web.routes
-from app.roles import ANYBODY, ROLES
+from app.panel.roles import ANYBODY, ROLES
 from app.web.route_needs import LOCAL_ONLY, ROUTE_NEEDS
 from tests.support.parts import ROOT, Server, events_in, until
 from tests.support.servers import ready
 from tests.support.users import Browsers, add_user, token_of
+
+pytestmark = pytest.mark.promise("users")
 
 PANEL: Final = """
 title = "Cell"
@@ -210,8 +212,9 @@ def test_acts_need_their_role(browsers: dict[str, httpx.Client]) -> None:
 
 def routes() -> Iterator[APIRoute | APIWebSocketRoute]:
     """The routes of all modules."""
-    for module in pkgutil.iter_modules(app.web.routes.__path__):
-        router = getattr(importlib.import_module(f"app.web.routes.{module.name}"), "router", None)
+    modules = pkgutil.iter_modules(app.web.routes.__path__)
+    for name in (*(f"app.web.routes.{module.name}" for module in modules), "app.tools.gallery.page"):
+        router = getattr(importlib.import_module(name), "router", None)
         for route in router.routes if router else ():
             assert isinstance(route, APIRoute | APIWebSocketRoute)
             yield route

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from app.errors import SettingsError
-from app.settings import LOOPBACK_HOSTS, Settings, parse_root_path
+from app.system.errors import SettingsError
+from app.system.settings import LOOPBACK_HOSTS, Settings, parse_root_path
 from app.web.root_path import OWN_PATHS, RootPath, path_of, root_path_of
 from app.web.security import RequestGuard
 from docs._generate import places

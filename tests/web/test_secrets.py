@@ -16,6 +16,8 @@ from tests.support.parts import until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers, add_user, token_of
 
+pytestmark = pytest.mark.promise("security")
+
 PIN_CANARY = "830461957"
 PASSWORD_CANARY = "canary-password-7f3a"
 BADGE_CANARY = "CANARYBADGE04A2"

@@ -8,8 +8,10 @@ import pytest
 from starlette.responses import PlainTextResponse
 from starlette.types import Receive, Scope, Send
 
-from app.settings import LOOPBACK_HOSTS
+from app.system.settings import LOOPBACK_HOSTS
 from app.web.security import SECURITY_HEADERS, RequestGuard
+
+pytestmark = pytest.mark.promise("security")
 
 GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
@@ -96,7 +98,7 @@ def test_a_host_that_is_no_name_of_the_panel_is_refused(path: str, host: str) ->
     [
         ("localhost:8000", "http://localhost:8000"),
         ("localhost:8000", "http://LOCALHOST:8000"),
-        ("cell1.local", "https://cell1.local"),
+        ("cell1.local", "http://cell1.local"),
         ("127.0.0.1:8000", "http://127.0.0.1:8000"),
         ("[::1]:8000", "http://[::1]:8000"),
     ],
@@ -141,6 +143,25 @@ def test_a_page_of_another_site_may_neither_press_nor_listen(method: str, path: 
     answer = answer_to(method, path, {**OWN, "sec-fetch-site": site})
     assert answer.status_code == 403
     assert answer.json() == {"error": f"a page of another site ({site}) asked for this"}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "origin", "enters"),
+    [
+        ("http", "http://localhost:8000", True),
+        ("http", "https://localhost:8000", False),
+        ("https", "https://localhost:8000", True),
+        ("https", "http://localhost:8000", False),
+        ("http", "chrome-extension://localhost:8000", False),
+        ("http", "//localhost:8000", False),
+    ],
+)
+def test_a_page_of_the_same_host_with_another_scheme_is_another_one(
+    scheme: str, origin: str, enters: bool
+) -> None:
+    answer = answer_to("POST", "/widgets/x", {**OWN, "origin": origin}, scheme=scheme)
+    assert (answer.status_code == 200) is enters
+    assert ("KIOSK_PROXIES" in answer.text) is ((scheme, origin[:5]) == ("http", "https"))
 
 
 def test_an_own_origin_does_not_excuse_another_site() -> None:

@@ -12,10 +12,11 @@ import httpx
 import pytest
 from mcap.reader import make_reader
 
-from app.web.shared_recordings import BYTES_MOST, COUNT_MOST, SharedRecordings, links_of
+from app.web.downloads import BYTES_MOST, COUNT_MOST, SharedRecordings, links_of
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers, add_user, log_rows
+from tests.support.waiting import pass_time
 from tests.web.test_recordings import PANEL, RECORD, topics
 
 FOXGLOVE: Final = "https://app.foxglove.dev"
@@ -189,7 +190,7 @@ def test_a_recording_ends_and_large_ones_end_the_oldest() -> None:
         recordings = SharedRecordings(valid_s=0.05)
         recording = recordings.share(b"abc", "", "a1")
         assert recordings.by_token(recording.token) is recording
-        await asyncio.sleep(0.2)
+        await pass_time(0.2)
         assert recordings.by_token(recording.token) is None
         assert recordings.by_act("a1") is None
         assert recordings.latest("") is None

@@ -9,7 +9,7 @@ from typing import Final, get_args
 import pytest
 
 from app.panel.layout import Theme
-from app.settings import shipped_path
+from app.system.settings import shipped_path
 
 SHEET: Final = (shipped_path("static") / "css/tokens.css").read_text()
 TEXT, COLOURED, GRAPHIC = 7.0, 4.5, 3.0

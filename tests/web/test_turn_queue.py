@@ -1,6 +1,6 @@
 """Whose request is next."""
 
-from app.web.turn_queue import Lane, TurnQueue, lane_of
+from app.web.turns import Lane, TurnQueue, lane_of
 
 KIOSK = "127.0.0.1"
 

@@ -7,9 +7,9 @@ from typing import Any, Final
 import httpx
 import pytest
 
-from app.access.secrets_hash import matches
-from app.access.users import User
-from app.access.users_file import UsersFile
+from app.cell.people.secrets_hash import matches
+from app.cell.people.users import User
+from app.cell.people.users_file import UsersFile
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 from tests.support.users import OPENED, Browsers, add_user, command, log_rows, token_of
@@ -28,21 +28,37 @@ def browsers() -> Iterator[Browsers]:
     every.close()
 
 
-@pytest.fixture
-def kiosk(tmp_path: Path) -> Iterator[Server]:
-    data = tmp_path / "data"
+def with_users(folder: Path) -> Server:
+    data = folder / "data"
     data.mkdir(mode=0o700)
-    panel = tmp_path / "cell.toml"
+    panel = folder / "cell.toml"
     panel.write_text(PANEL)
     add_user(data, "J. Brandt", "engineer", password=PASSWORD)
     add_user(data, "M. Sato", "operator", pin="2580", badge="04A2")
-    with ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel))) as mine:
+    return ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel)))
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One for tests that change no user."""
+    with with_users(tmp_path_factory.mktemp("kiosk")) as mine:
         yield mine
 
 
 @pytest.fixture
 def engineer(browsers: Browsers, kiosk: Server) -> httpx.Client:
     return browsers.signed_in(kiosk.url, "J. Brandt", password=PASSWORD)
+
+
+@pytest.fixture
+def own_kiosk(tmp_path: Path) -> Iterator[Server]:
+    with with_users(tmp_path) as mine:
+        yield mine
+
+
+@pytest.fixture
+def own_engineer(browsers: Browsers, own_kiosk: Server) -> httpx.Client:
+    return browsers.signed_in(own_kiosk.url, "J. Brandt", password=PASSWORD)
 
 
 def act(client: httpx.Client, act_name: str, status: int = 200, /, **body: Any) -> dict[str, Any]:
@@ -60,31 +76,31 @@ def user(kiosk: Server, name: str) -> User:
 
 
 def test_a_user_is_added_changed_and_removed(
-    browsers: Browsers, kiosk: Server, engineer: httpx.Client
+    browsers: Browsers, own_kiosk: Server, own_engineer: httpx.Client
 ) -> None:
-    act(engineer, "add", name="K. Novak", role="maintenance", groups=["quality"], pin="1470")
-    novak = browsers.signed_in(kiosk.url, "K. Novak", pin="1470")
+    act(own_engineer, "add", name="K. Novak", role="maintenance", groups=["quality"], pin="1470")
+    novak = browsers.signed_in(own_kiosk.url, "K. Novak", pin="1470")
     assert novak.get("/session").json()["groups"] == ["quality"]
-    act(engineer, "role", name="K. Novak", role="operator", groups=[])
+    act(own_engineer, "role", name="K. Novak", role="operator", groups=[])
     assert novak.get("/session").json()["user"] == ""  # at once
-    act(engineer, "pin", name="K. Novak", pin="9753")
-    assert matches(user(kiosk, "K. Novak").pin, "9753")
-    act(engineer, "badge", name="K. Novak", badge="04A3")
-    act(engineer, "pin", name="K. Novak", none=True)
-    assert user(kiosk, "K. Novak").ways == ("badge",)
-    again = browsers.opened(kiosk.url)
+    act(own_engineer, "pin", name="K. Novak", pin="9753")
+    assert matches(user(own_kiosk, "K. Novak").pin, "9753")
+    act(own_engineer, "badge", name="K. Novak", badge="04A3")
+    act(own_engineer, "pin", name="K. Novak", none=True)
+    assert user(own_kiosk, "K. Novak").ways == ("badge",)
+    again = browsers.opened(own_kiosk.url)
     again.post("/session", json={"badge": "04A3"}).raise_for_status()
-    act(engineer, "disable", name="K. Novak")
+    act(own_engineer, "disable", name="K. Novak")
     assert again.get("/session").json()["user"] == ""
     assert again.post("/session", json={"badge": "04A3"}).status_code == 401
-    act(engineer, "enable", name="K. Novak")
-    listed = {row["name"]: row for row in engineer.get("/users").json()["users"]}
+    act(own_engineer, "enable", name="K. Novak")
+    listed = {row["name"]: row for row in own_engineer.get("/users").json()["users"]}
     assert listed["K. Novak"]["signs_in_with"] == ["badge"]
     assert listed["K. Novak"]["last_sign_in"]
     assert listed["M. Sato"]["last_sign_in"] is None
-    act(engineer, "remove", name="K. Novak")
-    assert UsersFile(kiosk.data).read().user("K. Novak") is None
-    rows = [row for row in log_rows(engineer) if row["action"].startswith("users_")]
+    act(own_engineer, "remove", name="K. Novak")
+    assert UsersFile(own_kiosk.data).read().user("K. Novak") is None
+    rows = [row for row in log_rows(own_engineer) if row["action"].startswith("users_")]
     mine = [(row["action"].removeprefix("users_"), row["who"]) for row in rows if row["who"] != "test"]
     acts = ("add", "role", "pin", "badge", "pin", "disable", "enable", "remove")
     assert mine == [(name, "J. Brandt") for name in acts]
@@ -117,16 +133,18 @@ def test_what_can_not_be_done_is_refused_with_its_reason(kiosk: Server, engineer
     assert logged == [(f"access_{name}", "J. Brandt") for name, _, _ in REFUSED]
 
 
-def test_a_change_by_the_command_line_is_not_overwritten(kiosk: Server, engineer: httpx.Client) -> None:
-    version = UsersFile(kiosk.data).read().version("M. Sato")
-    command(kiosk.data, "role", "M. Sato", "--role", "viewer")
-    command(kiosk.data, "add", "A", "--role", "operator", "--pin-stdin", stdin="1470\n")
-    receipt = act(engineer, "role", 409, name="M. Sato", role="maintenance", version=version)
+def test_a_change_by_the_command_line_is_not_overwritten(
+    own_kiosk: Server, own_engineer: httpx.Client
+) -> None:
+    version = UsersFile(own_kiosk.data).read().version("M. Sato")
+    command(own_kiosk.data, "role", "M. Sato", "--role", "viewer")
+    command(own_kiosk.data, "add", "A", "--role", "operator", "--pin-stdin", stdin="1470\n")
+    receipt = act(own_engineer, "role", 409, name="M. Sato", role="maintenance", version=version)
     assert receipt["code"] == "users_changed_since"
-    assert user(kiosk, "M. Sato").role == "viewer"
-    act(engineer, "role", name="M. Sato", role="maintenance", version=version + 2)
-    assert user(kiosk, "A").role == "operator"
-    until(lambda: "users_add" in str(log_rows(engineer)), "the command line's change is in the log")
+    assert user(own_kiosk, "M. Sato").role == "viewer"
+    act(own_engineer, "role", name="M. Sato", role="maintenance", version=version + 2)
+    assert user(own_kiosk, "A").role == "operator"
+    until(lambda: "users_add" in str(log_rows(own_engineer)), "the command line's change is in the log")
 
 
 def test_only_an_engineer_may(browsers: Browsers, kiosk: Server) -> None:
@@ -141,18 +159,18 @@ def test_only_an_engineer_may(browsers: Browsers, kiosk: Server) -> None:
 
 
 def test_a_token_is_made_once_used_and_revoked(
-    browsers: Browsers, kiosk: Server, engineer: httpx.Client
+    browsers: Browsers, own_kiosk: Server, own_engineer: httpx.Client
 ) -> None:
     body = {"name": "line", "role": "operator", "id": "made-once"}
-    token = act(engineer, "token", **body)["token"]
-    assert act(engineer, "token", **body)["token"] == ""  # the same act
-    assert token not in UsersFile(kiosk.data).path.read_text()
-    program = browsers.new(kiosk.url)
+    token = act(own_engineer, "token", **body)["token"]
+    assert act(own_engineer, "token", **body)["token"] == ""  # the same act
+    assert token not in UsersFile(own_kiosk.data).path.read_text()
+    program = browsers.new(own_kiosk.url)
     program.headers["authorization"] = f"Bearer {token}"
     assert program.get("/session").json()["role"] == "operator"
-    (listed,) = engineer.get("/users").json()["tokens"]
+    (listed,) = own_engineer.get("/users").json()["tokens"]
     assert listed["last_used"]
-    act(engineer, "revoke", name="line")
+    act(own_engineer, "revoke", name="line")
     assert program.get("/session").status_code == 401
 
 

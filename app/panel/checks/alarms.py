@@ -1,24 +1,75 @@
-"""Checks of alarms: one source each, with the keys, fields and limits that it needs."""
+"""Checks of alarms: their sources, limits and fields, and the controls that they lock."""
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, Final
 
-from app.errors import Fault, InterfaceError
-from app.interfaces import Interfaces, has_key
-from app.interfaces.validation import format_value
-from app.panel.alarm import DIAGNOSTIC_ARRAY, LIMIT_KEYS, Alarm, AlarmList, SourceKind
+from app.panel.alarm import (
+    DIAGNOSTIC_ARRAY,
+    EVERY_ROBOT,
+    LIMIT_KEYS,
+    Alarm,
+    AlarmList,
+    InhibitedName,
+    SourceKind,
+    inhibited_name,
+)
 from app.panel.checks.conditions import condition_faults
-from app.panel.checks.inhibits import inhibit_faults
 from app.panel.checks.types import field_faults, type_fault
 from app.panel.constants import NUMBERS
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
-from app.panel.faults.wording import list_names
+from app.panel.file.wording import closest_name, list_names
 from app.panel.model import Panel
+from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.values import number_text, same_value
+from app.panel.widgets.displays import format_fault
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
+from app.ros.messages import Interfaces, has_key
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault, InterfaceError
+
+# Checks of `inhibits`: the controls that an alarm locks, and the robots that they are of.
+
+
+def inhibit_faults(
+    place: str, alarm: Alarm, panel: Panel, controls: Collection[str]
+) -> Iterator[Fault]:
+    """Faults of names of no control, of a stop button, and of robots that do not have the control.
+    `controls` are the ids of all."""
+    stops = {widget.id for widget in panel.stops}
+    for i, written in enumerate(alarm.inhibits):
+        at, name = f"{place}.inhibits[{i}]", inhibited_name(written)
+        if name.control not in controls:
+            near = closest_name(name.control, controls)
+            hint = f'did you mean "{near}"?' if near else f"there is {list_names(controls)}"
+            cause = f"control {name.control}"
+            yield Fault(at, f'no control "{name.control}"; {hint}', cause=cause)
+        elif name.control in stops:
+            yield Fault(at, f'"{name.control}" stops the machine: an alarm may not lock it')
+        elif name.robot:
+            yield from _robot_faults(at, name, panel)
+
+
+def _robot_faults(at: str, name: InhibitedName, panel: Panel) -> Iterator[Fault]:
+    robots = [str(robot.id) for robot in panel.robots]
+    control, own = name.control, widget_robots(panel).get(name.control)
+    if not robots:
+        message = f'this panel has one robot, without an id: write "{control}"'
+        yield Fault(at, message, cause=f"robot {name.robot}")
+    elif len({*robots}) < len(robots):
+        return  # one of them has another id
+    elif name.robot != EVERY_ROBOT and name.robot not in robots:
+        near = closest_name(name.robot, robots)
+        hint = f'did you mean "{near}/{control}"?' if near else f"there is {list_names(robots)}"
+        yield Fault(at, f'no robot "{name.robot}"; {hint}', cause=f"robot {name.robot}")
+    elif own in robots and name.robot != own:
+        message = f'"{control}" is a control of "{own}" alone: write "{control}" or "{own}/{control}"'
+        yield Fault(at, message)
+
+
+# Checks of alarms: one source each, with the keys, fields and limits that it needs.
 
 RESERVED: Final = "panel_"  # begins the ids of the panel's own alarms
 NO_SOURCE: Final = (
@@ -29,7 +80,8 @@ TOPIC: Final = ("topic", "type", "qos")
 # The keys that only some sources read.
 OWN_KEYS: Final[Mapping[SourceKind, tuple[str, ...]]] = {
     "limits": (
-        *(*TOPIC, "field", "unit", "scale", "max_age_s", "deadband", "critical_priority"),
+        *(*TOPIC, "field", "unit", "scale", "offset", "format", "max_age_s"),
+        *("deadband", "critical_priority"),
         *LIMIT_KEYS,
     ),
     "condition": ("when",),
@@ -151,6 +203,8 @@ def _limit_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> I
     kind = None if faults else interfaces.field_type(alarm.type, alarm.field)
     if kind is not None and kind not in NUMBERS:
         yield Fault(f"{place}.field", f'"{alarm.field}" is {kind}: limits are for one number')
+    elif kind is not None:
+        yield from format_fault(place, alarm, kind)
     if alarm.scale == 0:
         yield Fault(f"{place}.scale", "is 0: every value would be the same")
     for (below, low), (above, high) in itertools.pairwise(alarm.limits.items()):

@@ -5,10 +5,6 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
-from app.errors import Fault, FieldError
-from app.i18n.values import each_language
-from app.interfaces import INTEGER_RANGES, Interfaces, Type, field_call
-from app.interfaces.validation import format_value, scalar_check, unknown_constant
 from app.panel.checks.types import field_faults
 from app.panel.condition import VALUE, Condition
 from app.panel.constants import (
@@ -20,6 +16,10 @@ from app.panel.constants import (
 from app.panel.model import Panel
 from app.panel.values import same_value
 from app.panel.widgets.displays import format_fault
+from app.ros.messages import INTEGER_RANGES, Interfaces, Type, field_call
+from app.ros.messages.validation import format_value, scalar_check, unknown_constant
+from app.system.errors import Fault, FieldError
+from app.system.texts.text import each_language
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "

@@ -4,17 +4,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
-from app.errors import Fault, FieldError, InterfaceError
-from app.interfaces import INTEGER_RANGES, Interfaces
-from app.interfaces.validation import format_value
 from app.panel.constants import NUMBERS, mismatch_at
 from app.panel.demo import DemoEntry
-from app.panel.faults.places import place_of
-from app.panel.faults.wording import closest_name, list_names
+from app.panel.file.keys import place_of
+from app.panel.file.wording import closest_name, list_names
 from app.panel.model import Panel
-from app.panel.used_names import used_names
+from app.panel.used import used_names
 from app.panel.values import join_list, number_text
 from app.panel.widgets.parameter import Parameter, is_valid_value
+from app.ros.messages import INTEGER_RANGES, Interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault, FieldError, InterfaceError
 
 Use = Literal["topic", "publication", "service", "action", "node"]
 

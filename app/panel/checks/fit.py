@@ -7,14 +7,15 @@ pixels. tests/browser/test_fit_in_browser.py holds all this against a browser.
 from collections.abc import Iterator
 from typing import Final
 
-from app.errors import Note
 from app.panel.layout import COLUMNS, Group, Page
 from app.panel.model import Panel
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, NARROW, TOUCH, Screen
+from app.system.errors import Note
 
 LOW_GAP_MM: Final = 4.0  # between the buttons of the frame of a low screen
+MANY_TABS: Final = 7
 GAP: Final = 12.0  # between groups, and between the rows of a group
 HEAD: Final = 48.0  # of a group
 TABS_OF_GROUPS: Final = TOUCH
@@ -64,7 +65,7 @@ def reason(panel: Panel, page: Page, screen: Screen) -> str:
 
 def page_height(panel: Panel, page: Page, screen: Screen) -> float:
     """What the frame leaves for the groups."""
-    return screen.height - frame_top(panel, screen) - 2 * screen.pad
+    return screen.height - frame_top(panel, screen) - 2 * screen.pad_above
 
 
 def frame_top(panel: Panel, screen: Screen) -> float:
@@ -83,8 +84,10 @@ def page_width(panel: Panel, screen: Screen) -> float:
 def long_rail(panel: Panel, screen: Screen) -> str:
     """Why not all tabs are seen beside the buttons of the frame; "" where they are."""
     more = panel.log.enabled + panel.has_alarms
-    tabs = len(panel.pages) + more if panel.has_rail else 0
+    tabs = len(panel.pages) + bool(panel.recipes) + more if panel.has_rail else 0
     low = screen.height <= LOW_SCREEN
+    if low and tabs >= MANY_TABS:
+        tabs -= panel.log.enabled  # it is in the menu there
     stops = {widget.id for widget in panel.stops}
     keys = [
         screen.touch(ENTRY_MM if low and widget.id not in stops else KEY_MM)
@@ -132,14 +135,14 @@ def group_height(group: Group, screen: Screen, page: Page, width: float) -> floa
     inside = sum(heights) + GAP * (len(heights) - 1)
     alone = not screen.is_wide and len(page.parts) > 1
     if not alone:
-        head = HEAD if group.title else screen.pad
+        head = HEAD if group.title else screen.pad_above
     elif screen.width < MIDDLE and not screen.is_upright:
-        head = TABS_OF_GROUPS + screen.pad
+        head = TABS_OF_GROUPS + screen.pad_above
     elif group is page.parts[0] or len(page.parts) == 2:
-        head = HEAD if group.title else screen.pad
+        head = HEAD if group.title else screen.pad_above
     else:
-        head = TABS_OF_GROUPS + screen.pad
-    return head + inside + screen.pad
+        head = TABS_OF_GROUPS + screen.pad_above
+    return head + inside + screen.pad_above
 
 
 def row_heights(group: Group, screen: Screen, width: float) -> list[float]:

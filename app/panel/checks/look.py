@@ -1,14 +1,21 @@
-"""Checks of how a panel looks: its brand, pictures of help, labels, and what grows on a page."""
+"""Checks of how a panel looks: brand, help, labels, layout, and pages with a template."""
 
 from collections.abc import Iterator
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from app.errors import Fault
-from app.i18n.values import each_language
-from app.panel.faults.wording import list_names
+from app.panel.file.wording import list_names
+from app.panel.layout import Page
 from app.panel.model import Panel
+from app.panel.widgets.displays import PageLink, Static
 from app.panel.widgets.families import BaseWidget, KeyCommand
-from app.panel.widgets.static import PageLink, Static
+from app.system.errors import Fault, Note
+from app.system.texts.text import each_language
+
+if TYPE_CHECKING:
+    from app.panel.page_template import PageParts, TemplateFault
+
+
+# Checks of how a panel looks: its brand, pictures of help, labels, and what grows on a page.
 
 WITH_FACE: Final = ("publish", "call", "action", "hold")  # kinds whose button has its label on it
 
@@ -69,3 +76,49 @@ def _needs_label(widget: BaseWidget) -> str:
     if isinstance(widget, Static) and not (isinstance(widget, PageLink) and widget.icon):
         return f'of a widget of the kind "{widget.kind}" nothing else is read: leave this key out'
     return ""
+
+
+# Checks of pages with a template of their own.
+
+
+def page_template_faults(panel: Panel) -> Iterator[Fault]:
+    """The first fault of each template, with its line there."""
+    for p, page in enumerate(panel.pages):
+        if page.template is None:
+            continue
+        place = f"page[{p}].template"
+        if page.groups:
+            yield Fault(place, "a page with a template has no groups: the template places its widgets")
+            continue
+        _, fault = _run(panel, page)
+        if fault is not None:
+            line = f"line {fault.line}: " if fault.line else ""
+            yield Fault(place, f"{page.template.name}: {line}{fault.message}", cause=fault.cause)
+
+
+def unplaced_notes(panel: Panel) -> Iterator[Note]:
+    """Widgets that are on a page and that its template never places."""
+    for p, page in enumerate(panel.pages):
+        if page.template is None:
+            continue
+        parts, _ = _run(panel, page)
+        never = [widget.id for widget in page.widgets if parts and not parts.placed(widget.id)]
+        if never:
+            named = ", ".join(f'"{name}"' for name in never)
+            message = f"{page.template.name} never places {named}: no one sees what is not placed"
+            yield Note(f"page[{p}].template", message)
+
+
+def page_parts(panel: Panel) -> "dict[str, PageParts]":
+    """What the templates of a panel without faults make, by the ids of their pages."""
+    made = {page.id: _run(panel, page)[0] for page in panel.pages if page.template is not None}
+    return {name: parts for name, parts in made.items() if parts is not None}
+
+
+def _run(panel: Panel, page: Page) -> "tuple[PageParts | None, TemplateFault | None]":
+    """Imported only where a page has a template: its process is needed by nothing else."""
+    from app.panel.page_template import TemplateFault, run_template
+
+    assert page.template is not None
+    result = run_template(page.template, page, panel.shown_pictures, panel.readers_languages)
+    return (None, result) if isinstance(result, TemplateFault) else (result, None)

@@ -3,16 +3,17 @@ across widgets."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
-from app.errors import Fault, InterfaceError
-from app.interfaces import Interfaces
 from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
-from app.panel.checks.languages import language_faults
-from app.panel.checks.look import brand_faults, grow_faults, help_faults, label_faults
-from app.panel.checks.names import spelling_faults
-from app.panel.checks.needs import confirmation_faults, needs_faults
-from app.panel.checks.page_templates import page_template_faults
+from app.panel.checks.look import (
+    brand_faults,
+    grow_faults,
+    help_faults,
+    label_faults,
+    page_template_faults,
+)
 from app.panel.checks.recipes import recipe_faults
+from app.panel.checks.robot_texts import robot_text_faults
 from app.panel.checks.robots import (
     choice_faults,
     duplicate_ids,
@@ -21,14 +22,17 @@ from app.panel.checks.robots import (
     robot_faults,
     robot_name_faults,
 )
-from app.panel.checks.story import story_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.condition import Condition
-from app.panel.faults.wording import list_names
-from app.panel.machine_state import STATE_ID
+from app.panel.demo import STORIES
+from app.panel.file.wording import closest_name, list_names
 from app.panel.model import Panel
+from app.panel.roles import ROLES
+from app.panel.rules import STATE_ID
 from app.panel.template import NOW
+from app.panel.texts import panel_texts
+from app.panel.used import used_names
 from app.panel.widgets.families import (
     BaseWidget,
     CheckContext,
@@ -40,10 +44,156 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.inputs import TextInput
+from app.panel.widgets.key_parts import confirmation_of
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.parts import parts_of
 from app.panel.widgets.publish import Confirm, PublishPress
+from app.panel.widgets.templated import is_stop
 from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
+from app.ros.messages import Interfaces
+from app.ros.messages.names import GLOBAL, key_of
+from app.system.errors import Fault, InterfaceError, Note
+from app.system.texts.catalogue import files
+
+# Faults of names that are written in two ways.
+
+NAME_KEYS = ("topic", "service", "action", "node")
+
+
+def spelling_faults(panel: Panel, widgets: Iterator[tuple[str, BaseWidget]]) -> Iterator[Fault]:
+    """Faults of names that are below the namespace and written as if they were not, beside the other
+    way: what the panel knows of a topic, it knows by one name."""
+    names = [(f"interlock[{i}].topic", interlock.topic) for i, interlock in enumerate(panel.interlocks)]
+    for c, condition in enumerate(panel.own_conditions):
+        names.append((f"condition[{c}].topic", condition.topic))
+    for i, alarm in enumerate(panel.alarms):
+        named = (("topic", alarm.topic), ("node", alarm.node))
+        names += [(f"alarm[{i}].{key}", name) for key, name in named if name]
+    for place, widget in widgets:
+        names += _names(place, widget)
+    if not any(name.startswith(GLOBAL) for _, name in names):
+        return
+    for namespace in {robot.namespace for robot in panel.robots} or {panel.namespace}:
+        firsts: dict[str, tuple[str, str]] = {}
+        for place, name in names:
+            above, first = firsts.setdefault(key_of(name, namespace), (place, name))
+            if name != first:
+                yield Fault(place, f'"{name}" is "{first}" at {above}: write it in the same way')
+
+
+def _names(place: str, widget: BaseWidget) -> Iterator[tuple[str, str]]:
+    """(place, name) of each topic, service, action and node of a widget."""
+    for key in NAME_KEYS:
+        if isinstance(name := getattr(widget, key, None), str):
+            yield f"{place}.{key}", name
+    if isinstance(widget, DisplayWidget | Command):
+        for source in widget.sources():
+            if source.place:
+                yield f"{place}.{source.place}.topic", source.topic
+    if isinstance(widget, PublishPress) and widget.confirm is not None:
+        yield f"{place}.confirm.topic", widget.confirm.topic
+
+
+# Checks of the roles and groups of users that a panel file names.
+
+
+def needs_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of `needs` that name neither a role nor a group of `[access]`."""
+    known = [*ROLES, *panel.access.groups]
+    for place, need in _needs(panel):
+        if need and need not in known:
+            meant = closest_name(need.lower(), known)
+            hint = f'; did you mean "{meant}"?' if meant else ""
+            message = f'"{need}" is neither a role nor a group: there is {list_names(known)}{hint}'
+            own = ', and groups of your own by `groups = ["…"]` in [access]' if not meant else ""
+            yield Fault(f"{place}.needs", message + own, cause=f"needs {need}")
+
+
+def confirmation_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of stop buttons that ask for a PIN."""
+    for place, widget in _commands(panel):
+        if is_stop(widget) and confirmation_of(widget):
+            message = "is not for a stop button: whoever stands at the screen can stop"
+            yield Fault(f"{place}.confirm_press", message)
+
+
+def _commands(panel: Panel) -> Iterator[tuple[str, Command]]:
+    """(place, command) of each command on a page and in the frame, once."""
+    for p, page in enumerate(panel.pages):
+        for place, widget in page.placed():
+            at = f"page[{p}].{place}"
+            if isinstance(widget, Command) and at not in panel.copies:
+                yield at, widget
+    for w, widget in enumerate(panel.frame.widgets):
+        if isinstance(widget, Command):
+            yield f"frame.widget[{w}]", widget
+
+
+def _needs(panel: Panel) -> Iterator[tuple[str, str | None]]:
+    """(place, what it needs) of all that may say so."""
+    for p, page in enumerate(panel.pages):
+        yield f"page[{p}]", page.needs
+        for g, group in enumerate(page.groups):
+            yield f"page[{p}].group[{g}]", group.needs
+    for place, widget in _commands(panel):
+        yield place, widget.needs
+    for a, alarm in enumerate(panel.alarms):
+        yield f"alarm[{a}]", alarm.needs
+
+
+# Checks of `demo_story`: names with other types than the story plays, or none that the panel uses.
+
+
+def story_faults(panel: Panel) -> Iterator[Fault]:
+    """The faults of a story. By their cause they are consequences of faults of subscriptions."""
+    if panel.demo_story is None:
+        return
+    names = used_names(panel)
+    played = list(STORIES[panel.demo_story].types)
+    used = False
+    for use, name, wanted in played:
+        panel_type = names[use].get(name)
+        if panel_type is None or name in panel.demo:
+            continue
+        used = True
+        if panel_type != wanted:
+            message = (
+                f"plays {name} as {wanted}, and the panel has {panel_type}; rename it or use that type"
+            )
+            yield Fault("demo_story", message, cause=f"listens {name}")
+    if not used:
+        some = list_names(sorted(name for _, name, _ in played))
+        yield Fault("demo_story", f"the panel uses no name of the story; there is {some}")
+
+
+# Checks of texts in several languages: each language has a catalogue, each text each language.
+
+
+def language_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of languages that no reader can choose, and of texts that the panel's own lacks."""
+    if panel.languages and panel.language not in panel.languages:
+        message = f'lacks the panel\'s own language, "{panel.language}"'
+        yield Fault("languages", message, cause="language")
+    for place, text in panel_texts(panel):
+        for tag in text.texts:
+            if tag not in files():
+                message = f"is no language with a catalogue; there is {list_names(files())}"
+                yield Fault(f"{place}.{tag}", message)
+        if panel.language not in text.texts:
+            message = f'has no text in the panel\'s language: add {panel.language} = "…"'
+            yield Fault(place, f"{message}, or set `language` of the panel to another one")
+
+
+def untranslated_notes(panel: Panel) -> Iterator[Note]:
+    """Texts that lack a language that other texts of the panel have. A text that is no table is meant
+    to be the same in every language."""
+    texts = list(panel_texts(panel))
+    known = {tag for _, text in texts for tag in text.texts}
+    wanted = sorted(known & set(panel.languages) if panel.languages else known)
+    for place, text in texts:
+        if missing := [tag for tag in wanted if tag not in text.texts]:
+            named = " and no ".join(missing)
+            yield Note(place, f'has no {named}; it is shown in "{panel.language}"')
 
 
 def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -57,6 +207,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from robot_name_faults(panel)
     yield from overview_faults(panel)
     yield from choice_faults(panel)
+    yield from robot_text_faults(panel)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
     yield from duplicate_ids("page", [page.id for page in panel.pages])

@@ -2,21 +2,23 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
-from app.errors import Fault
 from app.panel.base import Description
 from app.panel.checks.types import field_faults
-from app.panel.faults.wording import list_names
+from app.panel.constants import NUMBERS
+from app.panel.file.wording import list_names
 from app.panel.recipe import ParameterKind, RecipeReadback, RecipeSet
-from app.panel.widgets.families import CheckContext, Command
+from app.panel.widgets.families import CheckContext, Command, Input
 from app.panel.widgets.parameter import is_valid_value
 from app.panel.widgets.recipe_load import RecipeLoad
+from app.ros.messages import Type
+from app.system.errors import Fault
 
 # The keys of each way to load, by the key that chooses it.
 WAYS: Final[Mapping[str, tuple[str, ...]]] = {
     "topic": ("type", "message", "qos"),
-    "service": ("type", "request", "success", "timeout_s"),
+    "service": ("type", "request", "success", "answer", "timeout_s"),
     "node": ("parameters", "parameter_types", "timeout_s"),
 }
 NEEDED: Final = {"topic": ("type", "message"), "service": ("type", "request"), "node": ("parameters",)}
@@ -89,9 +91,33 @@ def _readback_faults(
     yield from _name_faults(place, "fields", readback.fields, table.fields)
     for name, path in readback.fields.items():
         at = f"{place}.fields.{name}"
-        for fault in field_faults(at, readback.type or "", path, checking.interfaces):
+        faults = list(field_faults(at, readback.type or "", path, checking.interfaces))
+        for fault in faults:
             moved = at if fault.place == f"{at}.field" else f"{place}.type"
             yield Fault(moved, fault.message, cause=fault.cause)
+        entry = next((field for field in load.fields if field.id == name), None)
+        if entry is not None and not faults:
+            kind = checking.interfaces.type_at(readback.type or "", path)
+            yield from _value_kind_faults(at, path, kind, entry)
+
+
+def _value_kind_faults(place: str, path: str, kind: Type, entry: Input) -> Iterator[Fault]:
+    """A fault of a field that can never have a value of its input: no load would be confirmed."""
+    examples = entry.examples()
+    if any(isinstance(value, list | tuple) for value in examples):
+        return
+    wanted = {_value_kind(value) for value in examples}
+    reported = "number" if kind.name in NUMBERS else "bool" if kind.name == "bool" else "text"
+    is_one = kind.container == "one" and not kind.is_nested
+    if wanted and not (is_one and reported in wanted):
+        message = f'"{path}" is {kind}: "{entry.id}" is a {" or a ".join(sorted(wanted))}'
+        yield Fault(place, message)
+
+
+def _value_kind(value: Any) -> str:
+    if isinstance(value, bool):
+        return "bool"
+    return "number" if isinstance(value, int | float) else "text"
 
 
 def _way_faults(

@@ -4,19 +4,19 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Final
 
-from app.dialect.dialect import WITH_OWN_DOMAIN
-from app.errors import Fault
-from app.i18n.values import alike
-from app.interfaces import Interfaces
-from app.interfaces.validation import format_value
 from app.panel.constants import NUMBERS
-from app.panel.faults.wording import closest_name, list_names
+from app.panel.file.wording import closest_name, list_names
 from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.times import TIME_FORMATS
 from app.panel.widgets.families import CheckContext, Command
 from app.panel.widgets.inputs import SelectInput
+from app.ros.dialects.dialect import WITH_OWN_DOMAIN
+from app.ros.messages import Interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
+from app.system.texts.text import alike
 
 OF_ONE_ROBOT: Final = "is of the one robot: with [[robot]] each has its own"
 

@@ -4,11 +4,11 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from app.errors import Fault, FieldError, InterfaceError
-from app.interfaces import Interfaces
-from app.panel.faults.wording import list_names
+from app.panel.file.wording import list_names
 from app.panel.template import NOW, TIME, add_now, fill, placeholders, value_at
 from app.panel.widgets.families import CheckContext, Input
+from app.ros.messages import Interfaces
+from app.system.errors import Fault, FieldError, InterfaceError
 
 NOW_RULE: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
 ON_OTHER_PAGE: Final = " on this page: an input is read from the page it is on"

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Final
 
-from app.errors import Fault, InterfaceError
-from app.interfaces import Interfaces
-from app.interfaces.definitions import Type
+from app.ros.messages import Interfaces
+from app.ros.messages.definitions import Type
+from app.system.errors import Fault, InterfaceError
 
 # The type that the server needs for its log.
 ROSOUT: Final = "rcl_interfaces/msg/Log"

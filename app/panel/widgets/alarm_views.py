@@ -5,10 +5,10 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from app.errors import Fault
-from app.interfaces.validation import format_value
-from app.panel.faults.wording import list_names
+from app.panel.file.wording import list_names
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
 
 MOST_LINES: Final = 50
 

@@ -1,22 +1,49 @@
-"""The descriptions of displays: readouts and lamps."""
+"""The descriptions of displays: readouts, lamps, cameras, logs, pallets, check lists, and static
+parts."""
 
 from collections.abc import Collection, Iterator, Mapping
+from math import isfinite
 from typing import Annotated, Any, ClassVar, Final, Literal, Protocol, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 
-from app.errors import Fault
-from app.i18n import TextLike
-from app.i18n.values import alike
-from app.interfaces import INTEGER_RANGES, Interfaces, Type
-from app.interfaces.validation import fitting_constants, format_value, unknown_constant
-from app.panel.base import Description, Label, Span, non_empty
+from app.panel.base import (
+    Description,
+    Icon,
+    Id,
+    Interlocks,
+    Label,
+    Seconds,
+    Span,
+    TopicName,
+    TopicQos,
+    non_empty,
+)
+from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS, HasField, parent_type, value_mismatch
-from app.panel.faults.wording import list_names
-from app.panel.number_format import FORMAT, Factor
+from app.panel.file.wording import list_names
+from app.panel.numbers import FORMAT, Factor
 from app.panel.times import DEFAULT_FORMATS, time_faults
-from app.panel.widgets.families import Display
-from app.panel.widgets.numbers import Unit
+from app.panel.widgets.families import (
+    BaseWidget,
+    CheckContext,
+    Display,
+    DisplayWidget,
+    TopicField,
+    TopicSource,
+    TopicWidget,
+)
+from app.panel.widgets.numbers import MAX_EXACT_NUMBER, Unit
+from app.panel.widgets.templated import TemplateCommand
+from app.ros.messages import INTEGER_RANGES, Interfaces, Type
+from app.ros.messages.validation import fitting_constants, format_value, unknown_constant
+from app.system.errors import Fault
+from app.system.pictures import PICTURE
+from app.system.texts import TextLike
+from app.system.texts.text import alike
+
+# The descriptions of displays: readouts and lamps.
 
 CONSTANTS: Final = r"^([A-Z][A-Z0-9_]*)?$"  # what names begin with; "" for all
 # The same, or a time: see `app.panel.times`.
@@ -194,3 +221,242 @@ def state_faults(
             )
         if (first := next((n for n in range(i) if _same_look(looks[n], looks[i])), None)) is not None:
             yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")
+
+
+# Fields that a widget reads beside its own: a number of the file or of a topic, and their checks.
+
+
+class OrNumber:
+    """A JSON schema that has a number beside the table."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "number"}, handler(schema)]}
+
+
+def number_or_table(value: Any, validate: Any) -> Any:
+    """A number, or the table of a field of a topic that has it."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if number and isfinite(value) and abs(value) <= MAX_EXACT_NUMBER:
+        return float(value)
+    if isinstance(value, Mapping):
+        return validate(value)
+    expected = 'a number, or a table like { topic = "/setpoint", type = "std_msgs/msg/Float64" }'
+    raise ValueError(f"must be {expected}, not {format_value(value)}")
+
+
+def number_field_faults(
+    place: str, source: TopicField, noun: str, interfaces: Interfaces
+) -> Iterator[Fault]:
+    """Faults of a field that must be one number; `noun` names it, with its article."""
+    faults = list(field_faults(place, source.type, source.field, interfaces))
+    yield from faults
+    if not faults and (field_type := interfaces.field_type(source.type, source.field)) not in NUMBERS:
+        yield Fault(f"{place}.field", f'"{source.field}" is {field_type}: {noun} is a number')
+
+
+# A lamp on a button: what the robot itself reports, whatever was pressed.
+
+
+class KeyLamp(TopicField):
+    """A state for each value of the field that the robot reports."""
+
+    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
+
+    def faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
+        """Faults of the table at `place`."""
+        faults = list(field_faults(place, self.type, self.field, interfaces))
+        yield from faults
+        if not faults:
+            kind = interfaces.field_type(self.type, self.field)
+            yield from state_faults(place, self, kind, interfaces, "a lamp")
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        """The lamp with values in place of constants' names."""
+        kind = interfaces.field_type(self.type, self.field)
+        constants = interfaces.constants(parent_type(self, interfaces))
+        states = tuple(
+            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
+            for state in self.states
+        )
+        return self.model_copy(update={"states": states})
+
+
+class LampCommand(TemplateCommand):
+    """A press whose button may have a lamp."""
+
+    lamp: KeyLamp | None = None
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield from super().sources()
+        if self.lamp is not None:
+            yield self.lamp.source("lamp")
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        yield from super().faults(place, checking)
+        if self.lamp is not None:
+            yield from self.lamp.faults(f"{place}.lamp", checking.interfaces)
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        if self.lamp is None:
+            return self
+        return self.model_copy(update={"lamp": self.lamp.with_constants(interfaces)})
+
+
+# The newest picture of a camera.
+
+PictureType = Literal["sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"]
+
+
+class Camera(TopicWidget, DisplayWidget):
+    """Shows the newest picture of a topic, which is subscribed to only while a browser shows it.
+
+    One older than `max_age_s` is marked as old; of one with more than `max_bytes`, or more than
+    `max_side_px` pixels a side, nothing is shown.
+    Each browser gets at most `max_hz` pictures per second, and as few as it takes.
+    """
+
+    kind: Literal["camera"]
+    type: PictureType = "sensor_msgs/msg/CompressedImage"
+    qos: TopicQos = TopicQos(reliability="best_effort", durability="volatile", depth=1)
+    max_age_s: Seconds = 1.0
+    max_hz: Annotated[float, Field(ge=0.1, le=60)] = 15.0
+    max_bytes: Annotated[int, Field(ge=1_000, le=64_000_000)] = 8_000_000
+    max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 4096
+    span: Span = 6
+    rows: Annotated[int, Field(ge=1, le=8)] = 2
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield TopicSource(self.topic, self.type, self.qos, (), on_demand=True)
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        if self.topic in checking.types:
+            message = f"{self.topic} is listened to at all times by another part of the panel"
+            yield Fault(f"{place}.topic", f"{message}: a camera's topic is only a camera's")
+        yield from super().faults(place, checking)
+
+
+# What the robot's nodes write to their log.
+
+LEVELS: Final = ("debug", "info", "warn", "error", "fatal")
+Level = Literal["debug", "info", "warn", "error", "fatal"]
+
+
+class LogView(TopicWidget, DisplayWidget):
+    """The newest `lines` of a log, of at least a `level`, by nodes whose name has `node` in it.
+
+    The server keeps the newest `keep` lines. With `own`, the panel's own are among them.
+    """
+
+    kind: Literal["log"]
+    topic: TopicName = "/rosout"
+    type: Literal["rcl_interfaces/msg/Log"] = "rcl_interfaces/msg/Log"
+    level: Level = "info"
+    node: Annotated[str, Field(max_length=100)] = ""
+    lines: Annotated[int, Field(ge=5, le=200)] = 50
+    keep: Annotated[int, Field(ge=100, le=10_000)] = 1_000
+    own: bool = False
+    span: Span = 12
+    rows: Annotated[int, Field(ge=1, le=8)] = 3
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield TopicSource(self.topic, self.type, self.qos, ())
+
+
+# A plan of a pallet that a count fills, box by box and layer by layer.
+
+
+class Pallet(Display):
+    """Shows the layer that is filled: `across` boxes in a row, `along` rows, and `layers` of them."""
+
+    kind: Literal["pallet"]
+    across: Annotated[int, Field(ge=1, le=30)]
+    along: Annotated[int, Field(ge=1, le=30)]
+    layers: Annotated[int, Field(ge=1, le=100)] = 1
+    span: Span = 4
+
+    @property
+    def in_layer(self) -> int:
+        """The boxes of one layer."""
+        return self.across * self.along
+
+    def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
+        if field_type not in INTEGER_RANGES:
+            message = f'"{self.field}" is {field_type}: a pallet is filled by a whole number'
+            yield Fault(f"{place}.field", message)
+
+
+# What only stands on a page: texts, pictures, links to other pages.
+
+
+class Static(BaseWidget):
+    """A widget that never changes."""
+
+
+class TextLabel(Static):
+    """A text; its `label` is what it says."""
+
+    kind: Literal["label"]
+    size: Literal["small", "normal", "large"] = "normal"
+
+
+class Picture(Static):
+    """A picture from the panel's folder of pictures; its `label` says what it shows."""
+
+    kind: Literal["image"]
+    src: Annotated[str, Field(pattern=PICTURE)]
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        if self.src not in checking.pictures:
+            there = list_names(checking.pictures)
+            message = f'"{self.src}" is not among the pictures; there is {there}'
+            yield Fault(f"{place}.src", message, cause=f"picture {self.src}")
+
+
+class PageLink(Static):
+    """A key that opens another page of the panel."""
+
+    kind: Literal["link"]
+    page: Id
+    icon: Icon | None = None
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        if self.page not in checking.pages:
+            message = f'no page "{self.page}"; there is {list_names(checking.pages)}'
+            yield Fault(f"{place}.page", message, cause=f"page {self.page}")
+
+
+# A check list of interlocks and conditions.
+
+
+def name_faults(place: str, widget: DisplayWidget, checking: CheckContext) -> Iterator[Fault]:
+    """Faults of an id in a list at `place` that is of no condition."""
+    known = list_names(checking.conditions)
+    for name in widget.named_conditions:
+        if name not in checking.conditions:
+            message = f'no interlock or condition "{name}"; there is {known}'
+            yield Fault(place, message, cause=f"interlock {name}")
+
+
+class Conditions(DisplayWidget):
+    """Shows interlocks and conditions, those that are not met first; at most `rows_shown` of them."""
+
+    kind: Literal["conditions"]
+    conditions: Interlocks
+    rows_shown: Annotated[int, Field(ge=1, le=20)] = 4
+    span: Span = 6
+
+    @property
+    def rows_at_most(self) -> int:
+        return min(self.rows_shown, len(self.conditions))
+
+    @property
+    def named_conditions(self) -> tuple[str, ...]:
+        return self.conditions
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield from ()  # the panel listens to its conditions
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        yield from name_faults(f"{place}.conditions", self, checking)

@@ -11,13 +11,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field
 
-from app.dialect.endpoint import Role
-from app.errors import Fault
-from app.interfaces import Interfaces
-from app.interfaces.names import ROSOUT_TOPIC
-from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
+    FieldPath,
     Icon,
     Id,
     Interlocks,
@@ -30,11 +26,33 @@ from app.panel.base import (
     Type,
 )
 from app.panel.checks.types import field_faults, whole_field
-from app.panel.faults.wording import list_names
-from app.panel.field_paths import FieldPath
-from app.panel.widgets.confirmed import Confirmed
-from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, SIGNS, KeyColour, KeyRole
-from app.panel.widgets.sent_message import SentMessage
+from app.panel.file.wording import list_names
+from app.panel.widgets.key_parts import (
+    COLOURS,
+    ICONS,
+    OWN_COLOURS,
+    SIGNS,
+    ConfirmationKeys,
+    KeyColour,
+    KeyRole,
+)
+from app.ros.dialects.dialect import Role
+from app.ros.messages import Interfaces
+from app.ros.messages.names import ROSOUT_TOPIC
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
+
+# What a command sends, as previews and checks see it.
+
+
+class SentMessage(NamedTuple):
+    """A message that a command sends: when, its type ("" if the panel file names none), and its fields
+    with input ids; `comments` are by field (".seq")."""
+
+    when: str
+    type_name: str = ""
+    fields: Mapping[str, Any] = {}
+    comments: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,9 +276,9 @@ class KeyCommand(Command):
 
     @property
     def shown_icon(self) -> str:
-        """The icon of the file or the role; "" without one, and where the label is its sign."""
+        """The icon of the file or the role; "" without one, and where the shown label is its sign."""
         icon = self.icon or ICONS.get(self.role, "")
-        return "" if self.label in tuple(SIGNS.get(icon, "")) else icon
+        return "" if self.show_label and self.label in tuple(SIGNS.get(icon, "")) else icon
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.colour is not None and self.colour not in (allowed := COLOURS[self.role]):
@@ -269,7 +287,7 @@ class KeyCommand(Command):
         yield from super().faults(place, checking)
 
 
-class PressCommand(Confirmed, Command):
+class PressCommand(ConfirmationKeys, Command):
     """A command that one press sends."""
 
     @property

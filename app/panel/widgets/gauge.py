@@ -1,4 +1,4 @@
-"""A moving analog indicator: a number on its scale, with its normal range, limits and set-point."""
+"""One number: a gauge with its scale, and a figure with its target."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -6,24 +6,31 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
-from app.errors import Fault
-from app.i18n import TextLike, number
-from app.interfaces import Interfaces
-from app.interfaces.validation import format_value
-from app.panel.base import Span
+from app.panel.base import Label, Span
+from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
-from app.panel.number_format import FORMAT, Factor
+from app.panel.numbers import FORMAT, Factor
 from app.panel.values import number_text
-from app.panel.widgets.displays import format_fault
+from app.panel.widgets.displays import OrNumber, format_fault, number_field_faults, number_or_table
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.panel.widgets.numbers import Number, Unit
-from app.panel.widgets.topic_fields import OrNumber, number_field_faults, number_or_table
+from app.ros.messages import Interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
+from app.system.texts import TextLike
+from app.system.texts import number as text_number
+from app.system.texts.text import each_language
+
+# A moving analog indicator: a number on its scale, with its normal range, limits and set-point.
 
 APART: Final = 12.0  # percent of the scale between two figures
 
 
 class SetpointField(TopicField):
-    """A set-point that the robot reports, in the unit of the message."""
+    """A set-point that the robot reports. Without `scale` and `offset` it has those of the gauge."""
+
+    scale: Factor | None = None
+    offset: Factor | None = None
 
 
 if TYPE_CHECKING:
@@ -86,7 +93,7 @@ class Gauge(Display):
         for value in (self.min, self.max, *self.limits.values()):
             if all(abs(self.percent(value) - at) >= APART for at in shown):
                 shown[self.percent(value)] = value
-        return [(at, number(number_text(value))) for at, value in shown.items()]
+        return [(at, text_number(number_text(value))) for at, value in shown.items()]
 
     def sources(self) -> Iterator[TopicSource]:
         yield from super().sources()
@@ -140,3 +147,96 @@ def _on_scale(gauge: Gauge) -> str:
 
 def _off_scale(gauge: Gauge) -> str:
     return f"not {_on_scale(gauge)}"
+
+
+# The one number of a group that is read from afar, with its target and how far it is.
+
+VALUE: Final = "{value}"
+MAX_LINES: Final = 2
+
+
+class TargetField(TopicField):
+    """A target that the robot reports. Without `scale` and `offset` it has those of the figure."""
+
+    scale: Factor | None = None
+    offset: Factor | None = None
+
+
+if TYPE_CHECKING:
+    Target = float | TargetField
+else:
+    Target = Annotated[TargetField, WrapValidator(number_or_table), OrNumber()]
+
+
+class FigureLine(TopicField):
+    """A further value beside the number: `text` says it, with `{value}` in it."""
+
+    text: Label
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    scale: Factor = 1.0
+    offset: Factor = 0.0
+
+
+class Figure(Display):
+    """Shows a number large, and of `target` how far it is: a bar of `segments` parts, 0 for none."""
+
+    kind: Literal["figure"]
+    target: Target | None = None
+    segments: Annotated[int, Field(ge=0, le=24)] = 1
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    unit: Unit = ""
+    scale: Factor = 1.0
+    offset: Factor = 0.0
+    lines: Annotated[tuple[FigureLine, ...], Field(strict=False, max_length=MAX_LINES)] = Field(
+        (), alias="line"
+    )
+
+    @property
+    def has_bar(self) -> bool:
+        return self.target is not None and self.segments > 0
+
+    @property
+    def gaps(self) -> list[float]:
+        """Where the segments end, in percent of the bar, but for the last one."""
+        return [round(100 * end / self.segments, 2) for end in range(1, self.segments)]
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield from super().sources()
+        if isinstance(self.target, TargetField):
+            yield self.target.source("target")
+        for number, line in enumerate(self.lines):
+            yield line.source(f"line[{number}]")
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        yield from super().faults(place, checking)
+        interfaces = checking.interfaces
+        if isinstance(self.target, TargetField):
+            yield from number_field_faults(f"{place}.target", self.target, "a target", interfaces)
+        elif self.target is not None and self.target <= 0:
+            yield Fault(f"{place}.target", f"{number_text(self.target)} must be more than 0")
+        for number, line in enumerate(self.lines):
+            yield from _line_faults(f"{place}.line[{number}]", line, interfaces)
+
+    def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
+        if field_type not in NUMBERS:
+            yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a figure is a number')
+            return
+        yield from format_fault(place, self, field_type)
+
+
+def _line_faults(place: str, line: FigureLine, interfaces: Interfaces) -> Iterator[Fault]:
+    lacking = [text for text in each_language(line.text).values() if text.count(VALUE) != 1]
+    if lacking:
+        message = f'"{lacking[0]}" must have {VALUE} once, like "{VALUE} min left"'
+        yield Fault(f"{place}.text", message)
+    faults = list(field_faults(place, line.type, line.field, interfaces))
+    yield from faults
+    if faults:
+        return
+    kind = interfaces.type_at(line.type, line.field)
+    if kind.is_nested or kind.container != "one":
+        yield Fault(f"{place}.field", f'"{line.field}" is {kind}: a line shows one value of it')
+    elif line.format and str(kind) not in NUMBERS:
+        yield Fault(f"{place}.format", f'is for numbers; "{line.field}" is {kind}')
+    else:
+        yield from format_fault(place, line, str(kind))

@@ -1,4 +1,4 @@
-"""Hold-to-run commands, with the fields that the server fills in."""
+"""Hold-to-run commands, by a button or a joystick, with the fields that the server fills in."""
 
 import re
 from abc import abstractmethod
@@ -7,24 +7,24 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from app.errors import Fault, FieldError, InterfaceError
-from app.interfaces import Interfaces
-from app.panel.base import Interlocks, Span
+from app.panel.base import Description, Interlocks, Span, WrittenField
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.field_paths import WrittenField
 from app.panel.template import set_field
 from app.panel.values import number_text
-from app.panel.widgets.confirmed import Confirmed
-from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand
-from app.panel.widgets.roles import KeyRole
-from app.panel.widgets.sent_message import SentMessage
+from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand, SentMessage
+from app.panel.widgets.key_parts import ConfirmationKeys, KeyRole
+from app.panel.widgets.numbers import Unit
+from app.ros.messages import Interfaces
+from app.system.errors import Fault, FieldError, InterfaceError
+
+# Hold-to-run commands, with the fields that the server fills in.
 
 DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
 COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
-class HoldCommand(Confirmed, KeyCommand, PublishCommand):
+class HoldCommand(ConfirmationKeys, KeyCommand, PublishCommand):
     """Publishes a message `rate_hz` times a second while its key is held, and another one once after.
 
     `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
@@ -80,7 +80,7 @@ class HoldCommand(Confirmed, KeyCommand, PublishCommand):
         return {}
 
     @property
-    def checked(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    def checked_templates(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
         """(key, template) of all that is checked, at its limits."""
         yield "message", self.moving(0.0, 0.0)
         yield "release", self.stopping()
@@ -114,7 +114,7 @@ class HoldCommand(Confirmed, KeyCommand, PublishCommand):
         yield from fields or self._message_faults(place, checking)
 
     def _message_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        for part, template in self.checked:
+        for part, template in self.checked_templates:
             try:
                 whole = fill_own_fields(self, template, 0, 0)
             except FieldError as error:
@@ -163,7 +163,7 @@ def _own_field_faults(place: str, hold: HoldCommand, interfaces: Interfaces) -> 
         if not re.fullmatch(kinds, field_type):
             yield Fault(f"{place}.{key}", f'"{path}" is {field_type}: it must be {words}')
             continue
-        for part, template in hold.checked:
+        for part, template in hold.checked_templates:
             if _has_field(template, path):
                 message = f"is filled in by the panel server: it is the {key}"
                 yield Fault(f"{place}.{part}.{path}", message, cause=f"own {place} {key}")
@@ -179,3 +179,102 @@ def _has_field(template: Mapping[str, Any], path: str) -> bool:
             return False
         inner = inner[step]
     return True
+
+
+# Two axes that a finger holds.
+
+TWIST: Final[Mapping[str, Any]] = {"linear": {"x": "{y}"}, "angular": {"z": "{x}"}}
+TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+
+
+class Axis(Description):
+    """`max` is the value at full deflection; a negative one turns the axis around."""
+
+    max: Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)] = 1.0
+    unit: Unit = ""
+
+
+class SideAxis(Axis):
+    """The axis to the right. As ROS counts turns, its value is negative there."""
+
+    max: Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)] = -1.0
+
+
+class Joystick(HoldCommand):
+    """Publishes `message` with the values of its axes while it is held, and the same with zeros after.
+
+    In the messages `{x}` is the axis to the right and `{y}` that to the front. A Twist needs no
+    message: y drives and x turns, to the left where it is positive (REP 103).
+    """
+
+    kind: Literal["joystick"]
+    message: dict[str, Any] = Field(default_factory=dict)
+    release: dict[str, Any] = Field(default_factory=dict)
+    x_axis: SideAxis = SideAxis()
+    y_axis: Axis = Axis()
+    shape: Literal["circle", "square"] = "circle"
+    dead_zone: Annotated[float, Field(ge=0, le=0.9)] = 0.1
+    ramp_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    frame_id: Annotated[str, Field(max_length=100)] = "base_link"
+    rows: Annotated[int, Field(ge=1, le=8)] = 3
+
+    @property
+    def template(self) -> Mapping[str, Any]:
+        """The message with `{x}` and `{y}`."""
+        if self.message or self.type not in TWISTS:
+            return self.message
+        if self.type == TWISTS[0]:
+            return TWIST
+        return {"header": {"stamp": "{now}", "frame_id": self.frame_id}, "twist": TWIST}
+
+    def moving(self, x: float, y: float) -> Mapping[str, Any]:
+        fields: Mapping[str, Any] = _with_axes(self.template, x, y)
+        return fields
+
+    def stopping(self) -> Mapping[str, Any]:
+        return self.release or self.moving(0.0, 0.0)
+
+    def axes_at(self, x: float, y: float) -> tuple[float, float]:
+        # Zero has no sign.
+        return x * self.x_axis.max + 0.0, y * self.y_axis.max + 0.0
+
+    def texts_at(self, x: float, y: float) -> dict[str, str]:
+        values = zip("xy", self.axes_at(x, y), (self.x_axis.unit, self.y_axis.unit), strict=True)
+        return {axis: f"{value:.2f} {unit}".strip().replace("-", "−") for axis, value, unit in values}
+
+    @property
+    def previewed(self) -> Mapping[str, Any]:
+        return self.template
+
+    @property
+    def own_comments(self) -> Mapping[str, str]:
+        axes = (("x", "to the right", self.x_axis), ("y", "to the front", self.y_axis))
+        return {name: f"{number_text(axis.max)} when {where}" for name, where, axis in axes}
+
+    @property
+    def checked_templates(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        yield "message", self.moving(float(self.x_axis.max), float(self.y_axis.max))
+        if self.release:  # else the same message
+            yield "release", self.release
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        for name, axis in (("x", self.x_axis), ("y", self.y_axis)):
+            if axis.max == 0:
+                yield Fault(f"{place}.{name}_axis.max", "is 0: the axis would do nothing")
+            if name in checking.all_inputs:
+                message = f'"{name}" is the id of an input: in this message {{{name}}} is the axis'
+                yield Fault(f"{place}.{name}_axis", message)
+        if not self.template:
+            message = f'is missing: a message of {self.type} names its axes, as in {{ x = "{{x}}" }}'
+            yield Fault(f"{place}.message", message)
+            return
+        yield from super().faults(place, checking)
+
+
+def _with_axes(template: Any, x: float, y: float) -> Any:
+    """The template with the values of the axes in place of `{x}` and `{y}`."""
+    if isinstance(template, Mapping):
+        return {key: _with_axes(value, x, y) for key, value in template.items()}
+    if isinstance(template, list | tuple):
+        return [_with_axes(item, x, y) for item in template]
+    return {"{x}": x, "{y}": y}.get(template, template) if isinstance(template, str) else template

@@ -7,15 +7,15 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.dialect.endpoint import Role
-from app.errors import Fault, InputError
-from app.i18n import Text, say
-from app.i18n.values import alike
-from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, SaidLabel, Span, catalogue_default, non_empty
 from app.panel.values import same_value
 from app.panel.widgets.families import CheckContext, DisplayWidget, Input, TopicSource
 from app.panel.widgets.robot_options import KEY, RobotOptions
+from app.ros.dialects.dialect import Role
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault, InputError
+from app.system.texts import Text, say
+from app.system.texts.text import alike
 
 MISSING: Final = (
     'is missing: write options, like [{ value = 1, label = "One" }], or options_from, like '

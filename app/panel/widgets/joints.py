@@ -7,17 +7,16 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from app.errors import Fault
-from app.i18n import TextLike, number
-from app.interfaces import STRING_TYPES, Interfaces
-from app.panel.base import Description, Label, Seconds, Span, TopicName, Type, non_empty
+from app.panel.base import Description, Label, MessageField, Seconds, Span, TopicName, Type, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
-from app.panel.field_paths import MessageField
-from app.panel.number_format import FORMAT
+from app.panel.numbers import FORMAT
 from app.panel.values import number_text
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.numbers import Number
+from app.ros.messages import STRING_TYPES, Interfaces
+from app.system.errors import Fault
+from app.system.texts import TextLike, number
 
 MAX_JOINTS: Final = 24
 

@@ -7,34 +7,37 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Ty
 
 from pydantic import Field
 
-from app.errors import KindError
 from app.panel.widgets import tiles
 from app.panel.widgets.alarm_views import AlarmLineView, AlarmListView
-from app.panel.widgets.camera import Camera
-from app.panel.widgets.conditions import Conditions
-from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.displays import (
+    Camera,
+    Conditions,
+    Indicator,
+    LogView,
+    PageLink,
+    Pallet,
+    Picture,
+    Readout,
+    TextLabel,
+)
 from app.panel.widgets.families import BaseWidget
-from app.panel.widgets.figure import Figure
-from app.panel.widgets.gauge import Gauge
-from app.panel.widgets.hold import Hold
+from app.panel.widgets.gauge import Figure, Gauge
+from app.panel.widgets.hold import Hold, Joystick
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.widgets.joints import Joints
-from app.panel.widgets.joystick import Joystick
-from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import NumberInput, SliderInput
-from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import Publish
+from app.panel.widgets.publish import Publish, Step
 from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call
-from app.panel.widgets.static import PageLink, Picture, TextLabel
-from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.tiles import Tile
 from app.panel.widgets.trend import Trend
+from app.system.errors import KindError
 
 Stylesheet = Literal["entries", "marks", "facts", "alarm-rows", "own"]
+Script = Literal["entries", "facts", "holds"]
 
 
 class WidgetKind(NamedTuple):
@@ -42,37 +45,37 @@ class WidgetKind(NamedTuple):
 
     `model` has its keys and their checks, `tile` the size that it needs on a page. `styles` are the
     stylesheets of a page with the kind: "own" is `css/kinds/<kind>.css`, the others are shared by
-    several kinds. `script`: whether it has a script, `js/kinds/<kind>.js`. Its template is
-    `widgets/<kind>.html`. How a kind is shown, judged, sent and simulated is in a table of each of the
-    rooms above; `require_rows` checks them.
+    several kinds. `script`: whether it has a script, `js/kinds/<kind>.js`, or the name of one that
+    several kinds share. Its template is `widgets/<kind>.html`. How a kind is shown, judged, sent and
+    simulated is in a table of each of the rooms above; `require_rows` checks them.
     """
 
     model: type[BaseWidget]
     tile: Tile
     styles: tuple[Stylesheet, ...]
-    script: bool
+    script: bool | Script
 
 
 KINDS: Final[Mapping[str, WidgetKind]] = {
     "text": WidgetKind(TextInput, tiles.ENTRY, styles=("entries",), script=False),
     "number": WidgetKind(NumberInput, tiles.NUMBER, styles=("entries",), script=False),
     "slider": WidgetKind(SliderInput, tiles.SLIDER, styles=("entries",), script=False),
-    "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script=True),
+    "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script="entries"),
     "toggle": WidgetKind(ToggleInput, tiles.ENTRY, styles=("entries",), script=False),
     "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
-    "hold": WidgetKind(Hold, tiles.KEY, styles=(), script=True),
+    "hold": WidgetKind(Hold, tiles.KEY, styles=(), script="holds"),
     "step": WidgetKind(Step, tiles.STEP, styles=("own",), script=True),
-    "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries",), script=True),
-    "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script=True),
+    "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries",), script="entries"),
+    "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script="holds"),
     "call": WidgetKind(Call, tiles.KEY, styles=(), script=False),
     "action": WidgetKind(Action, tiles.ACTION, styles=(), script=False),
-    "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script=True),
+    "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script="entries"),
     "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
     "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
     "figure": WidgetKind(Figure, tiles.FIGURE, styles=("facts",), script=False),
-    "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("facts",), script=True),
-    "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("facts",), script=True),
-    "sequence": WidgetKind(Sequence, tiles.SEQUENCE, styles=("facts",), script=True),
+    "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("facts",), script="facts"),
+    "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("facts",), script="facts"),
+    "sequence": WidgetKind(Sequence, tiles.SEQUENCE, styles=("facts",), script="facts"),
     "gauge": WidgetKind(Gauge, tiles.GAUGE, styles=("marks", "own"), script=True),
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),

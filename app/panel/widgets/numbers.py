@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from app.errors import Fault, InputError
-from app.i18n import PanelText, Text, TextLike, number, say
-from app.i18n.typed_numbers import read_number
-from app.i18n.values import after_space, number_like
-from app.interfaces.validation import format_value
 from app.panel.base import Span, panel_text
-from app.panel.number_range import is_on_step, step_fault
-from app.panel.units import Conversion, conversion, units_like
+from app.panel.numbers import Conversion, conversion, is_on_step, step_fault, units_like
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault, InputError
+from app.system.texts import PanelText, Text, TextLike, number, say
+from app.system.texts.locales import clear_text, is_unclear, lone_group, read_number
+from app.system.texts.text import after_space, number_like
 
 MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this, numbers of a browser are not exact
 
@@ -27,7 +26,10 @@ else:
 
 
 def no_number(label: TextLike, limits: TextLike, value: Any, *, whole: bool) -> Text:
-    """Why a value is refused that is not a number, or not written like one."""
+    """Why a value is refused that is not a number, or not written like one, or like two."""
+    if isinstance(value, str) and (both := lone_group(value)) is not None:
+        first, second = (number(clear_text(number_text(each))) for each in both)
+        return say("input_unclear_number", label=label, given=value, first=first, second=second)
     shown, example = format_value(value), number_like(whole=whole)
     return say("input_not_a_number", label=label, limits=limits, given=shown, example=example)
 
@@ -73,7 +75,7 @@ class Numeric(SteppedWidget, Input):
     @property
     def initial_text(self) -> str:
         """The initial text of its entry."""
-        return "" if self.default is None else number_text(self.default)
+        return "" if self.default is None else clear_text(number_text(self.default))
 
     @property
     def is_whole(self) -> bool:
@@ -163,7 +165,12 @@ class Numeric(SteppedWidget, Input):
 
     def parse_text(self, text: str, language: str) -> int | float | str:
         value = read_number(text, language, whole=self.is_whole)
-        return text.strip() if value is None else value
+        return text.strip() if value is None or is_unclear(text, self.permits) else value
+
+    def permits(self, value: float) -> bool:
+        """Whether a number is within the limits and on a step."""
+        is_whole = not self.is_whole or float(value).is_integer()
+        return is_whole and self.min <= value <= self.max and self.is_on_step(value)
 
     def check_value(self, value: Any) -> int | float:
         label, allowed = self.label, self.limits_text
@@ -207,7 +214,8 @@ class Numeric(SteppedWidget, Input):
             yield Fault(f"{place}.send_unit", message)
         elif not unit:
             yield Fault(
-                f"{place}.unit", f"is missing: {self.send_unit} is made of the unit that is entered"
+                f"{place}.unit",
+                f'is missing: the robot gets "{self.send_unit}" (send_unit); unit is what is entered',
             )
         elif conversion(unit, self.send_unit) is None:
             known = units_like(unit)
@@ -224,4 +232,4 @@ class SliderInput(Numeric):
 
     @property
     def initial_text(self) -> str:
-        return number_text(self.min if self.default is None else self.default)
+        return clear_text(number_text(self.min if self.default is None else self.default))

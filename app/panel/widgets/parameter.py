@@ -6,14 +6,6 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from app.dialect.endpoint import Role
-from app.errors import Fault
-from app.i18n import PanelText, Text, TextLike, number, say
-from app.i18n.typed_numbers import read_number, read_numbers
-from app.i18n.values import numbers, with_unit
-from app.interfaces import INTEGER_RANGES, Interfaces
-from app.interfaces.names import PARAMETER_EVENTS
-from app.interfaces.validation import format_value
 from app.panel.base import (
     NodeName,
     ParameterName,
@@ -23,12 +15,19 @@ from app.panel.base import (
     TopicQos,
     catalogue_default,
 )
-from app.panel.number_range import Range, decimal_text, step_fault
+from app.panel.numbers import Range, decimal_text, step_fault
 from app.panel.values import join_list, number_text, quote_element, same_value
-from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand
-from app.panel.widgets.inputs import BOOL_TEXTS, Option, option_faults
+from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand, SentMessage
+from app.panel.widgets.inputs import BOOL_TEXTS, Option, SelectInput, option_faults
 from app.panel.widgets.numbers import Number, SteppedWidget, Unit
-from app.panel.widgets.sent_message import SentMessage
+from app.ros.dialects.dialect import Role
+from app.ros.messages import INTEGER_RANGES, Interfaces
+from app.ros.messages.names import PARAMETER_EVENTS
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
+from app.system.texts import PanelText, Text, TextLike, number, say
+from app.system.texts.locales import clear_text, is_unclear, read_number, read_numbers
+from app.system.texts.text import numbers, with_unit
 
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]
@@ -42,6 +41,9 @@ EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 GET: Final = ("get_parameters", "rcl_interfaces/srv/GetParameters")
 DESCRIBE: Final = ("describe_parameters", "rcl_interfaces/srv/DescribeParameters")
 SET: Final = ("set_parameters", "rcl_interfaces/srv/SetParameters")
+SERVICES: Final = (GET, DESCRIBE, SET)
+# All or none of several values; a node may lack it.
+SET_ATOMICALLY: Final = ("set_parameters_atomically", "rcl_interfaces/srv/SetParametersAtomically")
 
 MAX_TEXT: Final = 1000  # characters that can be set
 TYPE_TEXTS: Final[Mapping[str, str]] = {
@@ -74,7 +76,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     required_types: ClassVar[tuple[str, ...]] = (
         EVENT_TYPE,
-        *(f"{name}_Request" for _, name in (GET, DESCRIBE, SET)),
+        *(f"{name}_Request" for _, name in SERVICES),
     )
 
     @property
@@ -114,16 +116,21 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
         yield SentMessage(f'sets {self.parameter} of {self.node} ({self.type}) to "{{{self.id}}}"')
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:
-        for name, _ in (GET, DESCRIBE, SET):
+        for name, _ in SERVICES:
             yield "SS", f"{self.node}/{name}"
 
     def parse_text(self, text: str, language: str) -> Any:
         if self.is_number_list:
-            return read_numbers(text, language, whole=self.is_whole)
+            return read_numbers(text, language, whole=self.is_whole, permits=self._permits)
         if self.is_number_entry:
             value = read_number(text, language, whole=self.is_whole)
-            return text.strip() if value is None else value
+            return text.strip() if value is None or is_unclear(text, self._permits) else value
         return BOOL_TEXTS.get(text, text) if self.type == "bool" else text
+
+    def _permits(self, value: float) -> bool:
+        """Whether the limits of the panel file permit a number; those of the node may be closer."""
+        is_whole = not self.is_whole or float(value).is_integer()
+        return is_whole and Range(self.min, self.max, self.step).contains(value)
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
@@ -169,14 +176,17 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
             return self.on if value else self.off
         return self.entry_text(value, self.unit)  # a list is shown as it is entered
 
-    def entry_text(self, value: Value, unit: str | PanelText = "") -> TextLike:
-        """A value as the text of its entry, and its unit. True and false are entered in lists only:
-        as the panel file calls them, in the panel's language, or in English."""
+    def entry_text(self, value: Value, unit: str | PanelText = "", *, clear: bool = False) -> TextLike:
+        """A value as the text of its entry, and its unit; `clear`: it is read again. True
+        and false are entered in lists only: as the panel file calls them, in the panel's language, or
+        in English."""
         if not self.has_numbers:
             return with_unit(self._plain_text(value), unit)
         if isinstance(value, tuple):
-            return numbers(map(self.element_text, value), unit)
-        return number(self.element_text(value), unit)
+            texts = map(self.element_text, value)
+            return numbers(map(clear_text, texts) if clear else texts, unit)
+        text = self.element_text(value)
+        return number(clear_text(text) if clear else text, unit)
 
     def _plain_text(self, value: Value) -> str:
         if not isinstance(value, tuple):
@@ -254,3 +264,28 @@ def type_faults(parameters: Iterable[tuple[str, Parameter]]) -> Iterator[Fault]:
             message = f"{widget.parameter} of {widget.node} is {widget.type} here but {first} above"
             cause = f"parameter {widget.node} {widget.parameter}"
             yield Fault(f"{place}.type", message, cause=cause)
+
+
+# The parameter whose texts are the options of a select: it is read as those that widgets show.
+
+
+def listed_parameter(select: SelectInput) -> Parameter | None:
+    """The parameter of a select with `options_from`, under an id that no widget has; None for another
+    source."""
+    listed = select.options_from.listed if select.options_from is not None else None
+    if listed is None:
+        return None
+    return Parameter.model_construct(
+        None,
+        id=options_id(select),
+        kind="parameter",
+        label=select.label,
+        node=listed.node,
+        parameter=listed.name,
+        type="integer" if listed.of_range else "string[]",
+    )
+
+
+def options_id(select: SelectInput) -> str:
+    """The id under which the parameter of a select is known."""
+    return f"{select.id}.options"

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from app.panel.widgets.families import Command, PressCommand
 
 
-class PartedCommand(PressCommand):
+class CompositeCommand(PressCommand):
     """A command whose press is sent by one of its parts."""
 
     @property
@@ -16,4 +16,4 @@ class PartedCommand(PressCommand):
 
 def parts_of(command: Command) -> tuple[Command, ...]:
     """The commands by which a command sends: itself, or its parts."""
-    return command.parts if isinstance(command, PartedCommand) else (command,)
+    return command.parts if isinstance(command, CompositeCommand) else (command,)

@@ -2,29 +2,33 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from app.dialect.endpoint import Role
-from app.errors import InputError
-from app.i18n import say
-from app.interfaces import Interfaces
-from app.interfaces.validation import format_value
 from app.panel.recipe import ParameterKind, RecipeSet
-from app.panel.widgets.families import BaseWidget, Command, EntryWidget, Input, TopicSource
-from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.parts import PartedCommand
+from app.panel.widgets.families import BaseWidget, Command, EntryWidget, Input, SentMessage, TopicSource
+from app.panel.widgets.parameter import SET_ATOMICALLY, Parameter
+from app.panel.widgets.parts import CompositeCommand
 from app.panel.widgets.publish import Publish
-from app.panel.widgets.sent_message import SentMessage
 from app.panel.widgets.service_action import Call
+from app.ros.dialects.dialect import Role
+from app.ros.messages import Interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import InputError
+from app.system.texts import say
 
 
-class RecipeLoad(EntryWidget, PartedCommand):
+class RecipeLoad(EntryWidget, CompositeCommand):
     """Loads a recipe of one set: a press has "<recipe>@<version>" under the set's id. It is on the page
     of recipes, which no table of the panel file describes."""
 
     kind: Literal["recipe"]
     table: Any
     inputs: tuple[Any, ...]
+
+    required_types: ClassVar[tuple[str, ...]] = (
+        *Parameter.required_types,
+        f"{SET_ATOMICALLY[1]}_Request",
+    )
 
     @property
     def set(self) -> RecipeSet:
@@ -43,9 +47,9 @@ class RecipeLoad(EntryWidget, PartedCommand):
 
     @property
     def answer_s(self) -> float:
-        """Within which a press has its receipt."""
+        """Within which a press has its receipt. Parameters may be put back, and read again."""
         sending = 0.0 if self.set.topic is not None else self.set.timeout_s
-        return sending + self.set.confirm_s
+        return (sending + self.set.confirm_s) * (1 if self.parts else 2)
 
     @cached_property
     def parts(self) -> tuple[Command, ...]:
@@ -56,7 +60,8 @@ class RecipeLoad(EntryWidget, PartedCommand):
             return (Publish.model_construct(None, kind="publish", **keys),)
         if self.set.service is not None:
             keys |= {"service": self.set.service, "request": self.set.request or {}}
-            keys |= {"timeout_s": self.set.timeout_s, "success": self.set.success}
+            keys |= {"timeout_s": self.set.timeout_s}
+            keys |= {"success": self.set.success, "answer": self.set.answer}
             return (Call.model_construct(None, kind="call", **keys),)
         return ()
 
@@ -113,7 +118,7 @@ class RecipeLoad(EntryWidget, PartedCommand):
             yield from part.sent_messages(interfaces)
         if self.parameters:
             names = ", ".join(parameter.parameter for parameter in self.parameters.values())
-            yield SentMessage(f"sets {names} of {self.set.node} by {SET[0]}")
+            yield SentMessage(f"sets {names} of {self.set.node} by {SET_ATOMICALLY[0]}")
 
     def check_value(self, value: Any) -> tuple[str, int]:
         """The id of the recipe and its version; InputError for anything else."""

@@ -5,13 +5,11 @@ import json
 from collections.abc import Iterator
 from typing import Annotated, Any, Final, NamedTuple
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, TypeAdapter
 
-from app.dialect.endpoint import Role
-from app.errors import Fault, FieldError, InterfaceError
-from app.interfaces import STRING_TYPES, Interfaces
 from app.panel.base import (
     Description,
+    MessageField,
     MessageOrServiceType,
     NodeName,
     ParameterName,
@@ -20,10 +18,14 @@ from app.panel.base import (
     TopicQos,
 )
 from app.panel.checks.types import field_faults, type_fault
-from app.panel.field_paths import MessageField
 from app.panel.template import placeholders
 from app.panel.widgets.families import TopicSource
+from app.ros.dialects.dialect import Role
+from app.ros.messages import STRING_TYPES, Interfaces
+from app.system.errors import Fault, FieldError, InterfaceError
 
+EACH: Final = "[]."  # before the field of each message of a list
+OF_SERVICES_ONLY: Final = "is a field of a list of messages, which is read of a service's answer only"
 MOST: Final = 200  # options that are shown; a press with a later one is refused
 KEY: Final = "options_from"
 PARAMETER_SERVICES: Final = ("get_parameters", "describe_parameters", "set_parameters")
@@ -37,6 +39,18 @@ NO_SOURCE: Final = (
     'names no list: write topic or service with their type, as in { topic = "/stations", type = '
     '"cell_msgs/msg/Names" }, or node and parameter'
 )
+
+
+def _check_listed_field(path: str) -> str:
+    """`programs[].name`: a field of each message of a list."""
+    field = LISTED.validate_python
+    for part in path.split(EACH, 1):
+        field(part)
+    return path
+
+
+LISTED: Final = TypeAdapter(MessageField)
+ListedField = Annotated[str, AfterValidator(_check_listed_field)]
 
 
 class ListedParameter(NamedTuple):
@@ -71,7 +85,7 @@ class RobotOptions(Description):
     range: bool = False
     request: dict[str, Any] = Field(default_factory=dict)
     type: MessageOrServiceType | None = None
-    field: MessageField = "data"
+    field: ListedField = "data"
     every_s: Annotated[Seconds, Field(ge=1.0)] = 10.0
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
@@ -163,6 +177,9 @@ class RobotOptions(Description):
                 yield type_fault(f"{place}.type", error)
                 return
             yield from self._request_faults(f"{place}.request", request, interfaces)
+        if EACH in self.field:
+            yield from self._each_faults(place, type_name, interfaces)
+            return
         faults = list(field_faults(place, type_name, self.field, interfaces))
         yield from faults
         field_type = None if faults else interfaces.type_at(type_name, self.field)
@@ -171,6 +188,26 @@ class RobotOptions(Description):
         ):
             message = f'"{self.field}" is {field_type}: options are a list of texts, like string[]'
             yield Fault(f"{place}.field", message)
+
+    def _each_faults(self, place: str, type_name: str, interfaces: Interfaces) -> Iterator[Fault]:
+        """Faults of a text of each message of a list."""
+        path, item = self.field.split(EACH, 1)
+        if self.service is None:
+            yield Fault(f"{place}.field", f'"{self.field}" {OF_SERVICES_ONLY}')
+            return
+        faults = list(field_faults(place, type_name, path, interfaces))
+        yield from faults
+        if faults:
+            return
+        kind = interfaces.type_at(type_name, path)
+        if kind.container == "one" or not kind.is_nested:
+            yield Fault(f"{place}.field", f'"{path}" is {kind}: before [] stands a list of messages')
+            return
+        faults = list(field_faults(place, kind.name, item, interfaces))
+        yield from faults
+        text = None if faults else interfaces.type_at(kind.name, item)
+        if text is not None and (text.container != "one" or text.name not in STRING_TYPES):
+            yield Fault(f"{place}.field", f'"{self.field}" is {text}: options are texts, like string')
 
     def _request_faults(self, place: str, type_name: str, interfaces: Interfaces) -> Iterator[Fault]:
         try:

@@ -5,17 +5,17 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from app.errors import Fault
-from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type
-from app.interfaces.validation import format_value, unknown_constant
 from app.panel.base import Description, Id, Interlocks, Label, Span
 from app.panel.checks.types import field_faults
 from app.panel.constants import parent_type, value_mismatch
-from app.panel.faults.wording import list_names
+from app.panel.file.wording import list_names
 from app.panel.values import same_value
 from app.panel.widgets.displays import check_state_value, resolve_state_value
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicField, TopicSource
-from app.pictures import PICTURE
+from app.ros.messages import INTEGER_RANGES, STRING_TYPES, Interfaces, Type
+from app.ros.messages.validation import format_value, unknown_constant
+from app.system.errors import Fault
+from app.system.pictures import PICTURE
 
 MAX_STEPS: Final = 50
 ALARM_LINES: Final = 4  # of the action of an alarm that are shown as steps

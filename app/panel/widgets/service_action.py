@@ -7,16 +7,15 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from app.dialect.endpoint import Role, ServerRole
-from app.errors import Fault, FieldError, InterfaceError
-from app.i18n import TextLike
-from app.interfaces import Interfaces
-from app.panel.base import ActionType, AnyText, Seconds, ServiceType, Span, TopicName
-from app.panel.field_paths import MessageField
+from app.panel.base import ActionType, AnyText, MessageField, Seconds, ServiceType, Span, TopicName
 from app.panel.response_text import response_fields
+from app.panel.widgets.displays import LampCommand
 from app.panel.widgets.families import CheckContext
-from app.panel.widgets.key_lamp import LampCommand
 from app.panel.widgets.templated import TemplateCommand
+from app.ros.dialects.dialect import Role, ServerRole
+from app.ros.messages import Interfaces
+from app.system.errors import Fault, FieldError, InterfaceError
+from app.system.texts import TextLike
 
 NUMBER_TYPES: Final = r"u?int(8|16|32|64)|float(32|64)|byte|char"
 TYPE_WORDS: Final = {NUMBER_TYPES: "a number"}

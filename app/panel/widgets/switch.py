@@ -3,15 +3,10 @@
 import itertools
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import BeforeValidator
 
-from app.dialect.endpoint import Role
-from app.errors import Fault, InputError
-from app.i18n import say
-from app.interfaces import Interfaces
-from app.interfaces.validation import format_value
 from app.panel.base import SaidLabel, Seconds, Span, TopicName, TopicQos, catalogue_default
 from app.panel.checks.types import field_faults
 from app.panel.constants import parent_type
@@ -21,14 +16,19 @@ from app.panel.widgets.families import (
     CheckContext,
     Command,
     EntryWidget,
+    SentMessage,
     TopicField,
     TopicSource,
 )
 from app.panel.widgets.inputs import BOOL_TEXTS
-from app.panel.widgets.parts import PartedCommand
+from app.panel.widgets.parts import CompositeCommand
 from app.panel.widgets.publish import Confirm, Publish, PublishPress, confirm_faults
-from app.panel.widgets.sent_message import SentMessage
 from app.panel.widgets.service_action import Call
+from app.ros.dialects.dialect import Role
+from app.ros.messages import Interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault, InputError
+from app.system.texts import say
 
 Position = Literal["on", "off", ""]
 ReportedState = Annotated[bool | int | str, BeforeValidator(check_state_value)]
@@ -40,13 +40,17 @@ class SwitchReport(TopicField):
     """The field by which the robot reports whether it is on."""
 
 
-class Switch(EntryWidget, PartedCommand):
+class Switch(EntryWidget, CompositeCommand):
     """Shows whether something is on, as the robot reports it, and switches it: by a message to `topic`,
     or by a call of `service`. A press waits for the report, at most `confirm_s`.
 
     It is an input too: a press has true or false under the widget's id.
     """
 
+    why_needed: ClassVar[Mapping[str, str]] = {
+        "reported": "the topic on which the robot says whether it is on, such as reported = "
+        '{ topic = "/light", type = "std_msgs/msg/Bool" }',
+    }
     kind: Literal["switch"]
     reported: SwitchReport
     on: SaidLabel = catalogue_default("on")
@@ -179,11 +183,22 @@ class Switch(EntryWidget, PartedCommand):
             if (fault.place, fault.message) not in seen:
                 yield fault
             seen.add((fault.place, fault.message))
+        yield from self._same_sent_faults(place)
         if same_value(self.on_value, self.off_value):
             message = (
                 f"{format_value(self.off_value)} is on_value too: the positions could not be told apart"
             )
             yield Fault(f"{place}.off_value", message)
+
+    def _same_sent_faults(self, place: str) -> Iterator[Fault]:
+        """A fault if the same is sent for both positions."""
+        for on, off, key in (
+            (self.on_message, self.off_message, "off_message"),
+            (self.on_request, self.off_request, "off_request"),
+        ):
+            if on is not None and on == off:
+                message = f"is the same as {key.replace('off', 'on')}: both positions would be the same"
+                yield Fault(f"{place}.{key}", message)
 
     def _missing_faults(self, place: str) -> Iterator[Fault]:
         """Faults of what is sent: missing, or of the other way to send."""

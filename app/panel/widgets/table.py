@@ -5,13 +5,9 @@ from typing import Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field
 
-from app.errors import Fault
-from app.i18n import PanelText
-from app.interfaces import Interfaces
-from app.panel.base import Description, Label, Seconds, Span, non_empty
+from app.panel.base import Description, Label, MessageField, Seconds, Span, non_empty
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS, parent_type
-from app.panel.field_paths import MessageField
 from app.panel.times import DEFAULT_FORMATS, time_faults
 from app.panel.widgets.displays import (
     CONSTANTS,
@@ -24,6 +20,9 @@ from app.panel.widgets.displays import (
 )
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.numbers import Unit
+from app.ros.messages import Interfaces
+from app.system.errors import Fault
+from app.system.texts import PanelText
 
 MAX_COLUMNS: Final = 8
 MAX_ROWS: Final = 20

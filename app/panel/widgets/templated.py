@@ -4,12 +4,11 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar
 
-from app.errors import Fault, InterfaceError
-from app.interfaces import Interfaces
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.widgets.families import CheckContext, Command, KeyCommand, PressCommand
-from app.panel.widgets.sent_message import SentMessage
+from app.panel.widgets.families import CheckContext, Command, KeyCommand, PressCommand, SentMessage
+from app.ros.messages import Interfaces
+from app.system.errors import Fault, InterfaceError
 
 
 class TemplateCommand(KeyCommand, PressCommand):

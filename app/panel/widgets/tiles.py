@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Self
 
 from app.panel.widgets.alarm_views import AlarmListView
-from app.panel.widgets.conditions import Conditions
+from app.panel.widgets.displays import Conditions, LogView
 from app.panel.widgets.families import BaseWidget
-from app.panel.widgets.figure import Figure
-from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.gauge import Figure, Gauge
 from app.panel.widgets.joints import Joints
-from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.table import Table
@@ -19,7 +17,7 @@ from app.panel.widgets.trend import Trend
 WIDE, MIDDLE, NARROW = 1200, 900, 600  # from these widths on a page has all columns, two, one
 KEY_MM, ENTRY_MM, GAP_MM = 20.0, 14.0, 5.0
 UPRIGHT: Final = 1000  # from this height on a narrow screen has two rows of groups
-LOW_SCREEN: Final = 560  # up to this height a row with a cancel key is as low as an entry
+LOW_SCREEN: Final = 560  # up to this height a row with a cancel key is as low as a touch permits
 TOUCH: Final = 44.0  # the least of what is touched
 ROW_GAP: Final = 12.0
 LABEL_HEIGHT: Final = 25.0  # above an entry
@@ -58,7 +56,7 @@ ALARM_LIST_FRAME, ALARM_ROW, ALARMS_WIDTH = 33.0, 62.0, 300.0
 ALARM_ROWS: Final = 2  # that are seen at least
 LOG_HEIGHT, LOG_WIDTH = 100.0, 300.0  # of some lines
 PICTURE_HEIGHT, PICTURE_WIDTH = 120.0, 160.0  # the least in which a picture is readable
-TREND_HEIGHT: Final = 150.0  # names and values of the pens, plot and time axis
+TREND_HEIGHT, LOW_TREND_HEIGHT = 150.0, 122.0  # names and values of the pens, plot and time axis
 TREND_WIDTH: Final = 240.0
 TREND_KEYS: Final = 5
 
@@ -102,8 +100,13 @@ class Screen:
 
     @property
     def pad(self) -> float:
-        """Around and inside groups."""
+        """At the sides of groups and of what is in them."""
         return 12.0 if self.is_wide else 10.0 if self.width >= MIDDLE else 8.0
+
+    @property
+    def pad_above(self) -> float:
+        """Above and below groups and what is in them."""
+        return 4.0 if self.width < MIDDLE and self.height <= LOW_SCREEN else self.pad
 
     def touch(self, millimetres: float) -> float:
         """The height of what is touched."""
@@ -132,7 +135,7 @@ def _key_height(_: BaseWidget, screen: Screen) -> float:
 
 
 def _action_height(_: BaseWidget, screen: Screen) -> float:
-    return _key(screen, ENTRY_MM if screen.height <= LOW_SCREEN else KEY_MM)
+    return _key(screen, 0.0 if screen.height <= LOW_SCREEN else KEY_MM)
 
 
 def _key(screen: Screen, height_mm: float) -> float:
@@ -196,7 +199,8 @@ def _table_height(table: Table, screen: Screen) -> float:
 
 
 def _trend_height(trend: Trend, screen: Screen) -> float:
-    return TREND_HEIGHT + (screen.touch(KEY_MM) + 8 if trend.keys else 0.0)
+    plot = LOW_TREND_HEIGHT if screen.height <= LOW_SCREEN else TREND_HEIGHT
+    return plot + (screen.touch(KEY_MM) + 8 if trend.keys else 0.0)
 
 
 def _trend_width(trend: Trend, screen: Screen) -> float:

@@ -8,10 +8,9 @@ from typing import Annotated, Final, Literal, Protocol
 
 from pydantic import AfterValidator, Field
 
-from app.errors import Fault
-from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
+    FieldPath,
     Label,
     Seconds,
     Span,
@@ -22,11 +21,12 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults
 from app.panel.constants import NUMBERS
-from app.panel.field_paths import FieldPath
-from app.panel.number_format import FORMAT, Factor
+from app.panel.numbers import FORMAT, Factor
 from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
 from app.panel.widgets.numbers import Unit
+from app.ros.messages.validation import format_value
+from app.system.errors import Fault
 
 MAX_PENS: Final = 8
 OF_READOUTS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "offset", "format")
@@ -94,10 +94,6 @@ class Pen(Description):
     high: Factor | None = None
     normal: Annotated[tuple[Factor, ...], Field(strict=False, min_length=2, max_length=2)] | None = None
     axis: Axis = "left"
-
-    def shown(self, value: float) -> float:
-        """A value of the field as the trend has it."""
-        return value * self.scale + self.offset
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         faults = list(field_faults(place, self.type, self.field, checking.interfaces))

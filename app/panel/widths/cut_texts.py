@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from app.errors import Note
 from app.panel.checks.fit import GAP, cell_width, group_width, page_width, row_heights
 from app.panel.layout import COLUMNS, Group, Page, is_button
 from app.panel.model import Panel
@@ -19,10 +18,16 @@ from app.panel.widgets.tiles import (
     Screen,
 )
 from app.panel.widths.boxes import SIZES, Box, Cell, Cut
-from app.panel.widths.condition_rows import condition_texts
-from app.panel.widths.panel_fonts import font_notes, fonts_of
-from app.panel.widths.reasons import reason_texts
-from app.panel.widths.texts import MANY, face_texts, texts
+from app.panel.widths.fonts import font_notes, fonts_of
+from app.panel.widths.texts import (
+    MANY,
+    condition_texts,
+    face_texts,
+    reason_texts,
+    stop_hint_text,
+    texts,
+)
+from app.system.errors import Note
 
 KIOSK_SCREENS: Final = ("1280x800", "1024x600", "800x480")  # where the panel file names none
 MAX_KEY_MM: Final = 28.0  # on a page that fits
@@ -126,6 +131,8 @@ def _rail(panel: Panel, screen: Screen) -> Placed:
             yield f"frame.widget[{w}]", box
         for box in reason_texts(widget, interlocks, cell, inside=inside):
             yield f"frame.widget[{w}]", box
+        for box in stop_hint_text(widget, panel.stop_hint, cell, inside):
+            yield f"frame.widget[{w}]", box
 
 
 def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
@@ -139,7 +146,10 @@ def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
             yield at, box
         for w, cell in enumerate(_cells(panel, page, group, screen, width)):
             widget = group.widgets[w]
-            reasons = reason_texts(widget, interlocks, cell)
+            reasons = [
+                *stop_hint_text(widget, panel.stop_hint, cell),
+                *reason_texts(widget, interlocks, cell),
+            ]
             for box in (*texts(widget, cell), *reasons, *condition_texts(widget, conditions, cell)):
                 yield f"{at}.widget[{w}]", box
 

@@ -4,36 +4,70 @@ tests/browser/test_widths_in_browser.py holds them against a browser. What has n
 not measured: values of topics without a scale, receipts, and the server's own sentences.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from app.i18n import say
-from app.i18n.values import each_language, together
-from app.panel.widgets.camera import Camera
-from app.panel.widgets.conditions import Conditions
-from app.panel.widgets.displays import Indicator
+from app.panel.condition import Condition, Interlock, NamedCondition
+from app.panel.values import number_text
+from app.panel.widgets.displays import (
+    Camera,
+    Conditions,
+    Indicator,
+    LogView,
+    PageLink,
+    Pallet,
+    Picture,
+    TextLabel,
+)
 from app.panel.widgets.families import BaseWidget, KeyCommand
-from app.panel.widgets.figure import Figure
-from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.gauge import Figure, Gauge
+from app.panel.widgets.hold import Joystick
 from app.panel.widgets.inputs import SelectInput, ToggleInput
 from app.panel.widgets.joints import Joints
-from app.panel.widgets.joystick import Joystick
 from app.panel.widgets.kinds import find_row
-from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric, SliderInput
-from app.panel.widgets.pallet import Pallet
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.sequence import Sequence
+from app.panel.widgets.publish import Step
+from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.service_action import Action
-from app.panel.widgets.static import PageLink, Picture, TextLabel
-from app.panel.widgets.step import Step
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
+from app.panel.widgets.templated import is_stop
 from app.panel.widgets.tiles import ENTRY_MM, GAP_MM, KEY_MM, LOW_SCREEN, MIDDLE, STEP_SIDES
 from app.panel.widths.boxes import Box, Cell
-from app.panel.widths.letters import text_width
-from app.panel.widths.values import after_gap, ends, formatted, with_some_value
+from app.panel.widths.fonts import text_width
+from app.system.texts import PanelText, TextLike, say
+from app.system.texts import number as text_number
+from app.system.texts.text import changed, each_language, together
+
+# The longest values that a panel file knows of: the ends of scales and limits, and units.
+
+SOME_VALUE: Final = "00"  # of a value in a sentence whose own length is not known
+
+
+def formatted(value: float, style: str | None) -> TextLike:
+    """A number as it is shown, in a format of the panel file."""
+    if style is None:
+        return text_number(number_text(float(value)))
+    return text_number(format(int(value) if style.endswith("d") else value, style))
+
+
+def ends(low: float, high: float, style: str | None) -> Iterator[TextLike]:
+    """The lowest and the highest number, as they are shown, with the digits of the format."""
+    yield from (formatted(value, style) for value in (low, high) if math.isfinite(value))
+
+
+def after_gap(unit: str | PanelText) -> TextLike:
+    """A unit behind a number; "" without one."""
+    return together([" ", unit]) if unit else ""
+
+
+def with_some_value(text: str | PanelText) -> str | PanelText:
+    """A text of the panel file whose {value} is not known."""
+    return changed(text, lambda translation: translation.replace("{value}", SOME_VALUE))
+
 
 Texts = Callable[[Any, Cell], Iterator[Box]]
 BORDERS: Final = 3.0  # of a button, left and right
@@ -244,7 +278,7 @@ def _joints(widget: Joints, cell: Cell) -> Iterator[Box]:
         yield Box(part, joint.shown_label, width, size, bold=True)
 
 
-def _sequence(widget: Sequence, cell: Cell) -> Iterator[Box]:
+def _sequence(widget: SequenceWidget, cell: Cell) -> Iterator[Box]:
     beside = widget.has_picture and cell.screen.width < MIDDLE
     width = ((cell.width - 12) * 3 / 5 if beside else cell.width) - 12 - STEP_NUMBER
     is_low = cell.screen.height <= NO_NAMES
@@ -283,5 +317,144 @@ TEXTS: Final[Mapping[type[BaseWidget], Texts]] = {
     Step: _step,
     Table: _table,
     Joints: _joints,
-    Sequence: _sequence,
+    SequenceWidget: _sequence,
 }
+
+
+# The sentences by which interlocks lock a button, and whether they have room on it.
+
+ICON: Final = 15.0
+# The heights of a button's face, in the size of small texts, from which on a reason has so many lines.
+LINES: Final = ((7.7, 5), (6.5, 4), (5.4, 3))
+JAPANESE_LINES: Final = ((8.6, 5), (7.4, 4), (6.2, 3))  # which are higher
+LEAST_LINES: Final = 2
+STEP_REASON: Final = 14.0
+FACE_PADS: Final = 6.0  # above and below
+
+
+def sentence(interlock: Interlock) -> TextLike:
+    """What an interlock says where the robot's value does not meet it."""
+    if interlock.locked is not None:
+        return with_some_value(interlock.locked)
+    if not interlock.comparisons:
+        return say("interlock_not_permitted", name=interlock.name)
+    wanted = some_value(interlock)
+    return say("interlock_condition_unmet", name=interlock.name, value=wanted, wanted=wanted)
+
+
+def some_value(condition: Condition) -> TextLike:
+    """A value that a condition with comparisons has, as a sentence names it."""
+    value = next(iter(condition.comparisons.values()))
+    if isinstance(value, tuple):
+        value = value[0]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f'"{value}"'
+    return text_number(number_text(float(value)), condition.unit)
+
+
+def reason_texts(
+    widget: BaseWidget, interlocks: Mapping[str, Interlock], cell: Cell, *, inside: float = 0.0
+) -> Iterator[Box]:
+    """The reason of each interlock of a button; `inside` is the width of its face, where it is not in a
+    cell."""
+    if not isinstance(widget, KeyCommand | Step) or isinstance(widget, Joystick):
+        return
+    width, size, lines = inside or cell.width - FACE_PAD, cell.sizes.small, face_lines(cell)
+    if isinstance(widget, Step):
+        width, size, lines = step_width(cell), STEP_REASON, LEAST_LINES
+    others = len(widget.interlocks) - 1
+    more: TextLike = say("more_reasons", number=others) if others > 0 else ""
+    for place, name in enumerate(widget.interlocks):
+        box = Box(
+            f"interlock[{place}]" if others else "interlock",
+            sentence(interlocks[name]),
+            width,
+            size,
+            lines=lines,
+            wraps=True,
+            indent=ICON + text_width(" ", size, cell.fonts),
+            after=more,
+            after_bold=True,
+            name="button",
+        )
+        yield beside_cancel(box, cell) if isinstance(widget, Action) else box
+
+
+def stop_hint_text(
+    widget: BaseWidget, hint: TextLike, cell: Cell, inside: float = 0.0
+) -> Iterator[Box]:
+    """What a stop button says before the reason of its lock; see `reason_texts`."""
+    if not isinstance(widget, KeyCommand) or not is_stop(widget):
+        return
+    size = cell.sizes.small
+    box = Box(
+        "stop_hint",
+        hint,
+        inside or cell.width - FACE_PAD,
+        size,
+        lines=face_lines(cell, JAPANESE_LINES),
+        wraps=True,
+        indent=ICON + text_width(" ", size, cell.fonts),
+        after="…",  # of the reason behind it
+        name="button",
+    )
+    yield beside_cancel(box, cell) if isinstance(widget, Action) else box
+
+
+def face_lines(cell: Cell, heights: Sequence[tuple[float, int]] = LINES) -> int:
+    """How many lines a reason has on a button of this height."""
+    height = (cell.height - FACE_PADS) / cell.sizes.small
+    return next((lines for least, lines in heights if height >= least), LEAST_LINES)
+
+
+# The rows of a check list of conditions: each with its name, its value and what to do.
+
+SIGN: Final = 26.0
+GAP: Final = 10.0  # beside the sign and the value
+ROW, LOW_ROW = 42.0, 36.0
+SMALL: Final = 14.0
+LINE: Final = 1.1  # the height of a line in the size of its letters
+
+
+def condition_texts(
+    widget: BaseWidget, conditions: Mapping[str, NamedCondition], cell: Cell
+) -> Iterator[Box]:
+    """The rows as they are while none of the conditions is met: their letters are bold then. What is
+    below a name has one line."""
+    if not isinstance(widget, Conditions):
+        return
+    height = LOW_ROW if cell.screen.height <= LOW_SCREEN else ROW
+    width, size = cell.width - SIGN - 2 * GAP, cell.sizes.text
+    for place, name in enumerate(widget.conditions):
+        condition = conditions[name]
+        value: TextLike = say("condition_unmet")
+        if condition.comparisons:
+            value = some_value(condition)
+        has_more = condition.comparisons or condition.action is not None
+        lines = int((height - (SMALL * LINE if has_more else 0)) / (size * LINE))
+        box = Box(
+            f"conditions[{place}]",
+            condition.name,
+            width,
+            size,
+            bold=True,
+            lines=max(1, lines),
+            wraps=True,
+            beside=value,
+            beside_size=size,
+            beside_bold=True,
+            name="row",
+        )
+        yield box
+        if condition.action is not None:
+            yield Box(
+                f"conditions[{place}] action",
+                condition.action,
+                width,
+                SMALL,
+                wraps=True,
+                beside=value,
+                beside_size=size,
+                beside_bold=True,
+                name="row",
+            )

@@ -1,39 +1,363 @@
-"""The shift report, as a page to be printed."""
+"""The shift report: a page to be printed, with alarms, presses and the states of the machine."""
 
 import asyncio
+import json
 import secrets
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
 from functools import partial
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal, NamedTuple, TypedDict
 from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from app.alarms.report import read_report
-from app.alarms.shifts import Shift
-from app.alarms.state_times import StatePeriod, read_states
-from app.audit import Filter, OperatorLog, Row
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.control_acts import TOO_OFTEN
-from app.commands.press import PRESS_ID
-from app.commands.shift_acts import LONGEST_MESSAGE, SHIFT_ACTION
-from app.web.act_answer import ActAnswer, act_answer
+from app.cell.alarms.figures import Figures
+from app.cell.alarms.history import HistoryRow
+from app.cell.alarms.records import text_of
+from app.cell.alarms.report import AlarmReport, Shift, StatePeriod, read_report, read_states, shift_at
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.control_acts import TOO_OFTEN
+from app.cell.commands.press import PRESS_ID
+from app.cell.commands.shift_acts import LONGEST_MESSAGE, SHIFT_ACTION
+from app.cell.view.times import duration_text
+from app.panel.model import Panel
+from app.panel.widgets.families import Command
+from app.records import Filter, LogRow, OperatorLog
+from app.system.clock import format_datetime, format_time
+from app.system.printable import printable, printable_texts
+from app.system.texts import Text, TextLike, date_and_time, number, say, time_of_day
+from app.web.answers import ActAnswer, act_answer
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import principal_with_new_token, set_client_cookie
-from app.web.framed_page import FramedPage, framed_page
-from app.web.openapi_parts import described_body, errors, fields, refusals
-from app.web.rendering.alarm_report_page import COUNTED, ReportParts, now, report_context
-from app.web.rendering.alarm_report_query import ReportQuery
-from app.web.rendering.alarms_page import word
-from app.web.rendering.log_words import word as log_word
-from app.web.request_body import act_body_of, as_model
+from app.web.client import principal_with_new_token, set_client_cookie
+from app.web.pages.alarm_figures import (
+    FiguresContext,
+    clock_text,
+    figures_context,
+    median_text,
+    rate_text,
+)
+from app.web.pages.alarms import word
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.log_words import ACTION_WORDS, outcome_of, who_of
+from app.web.pages.log_words import word as log_word
+from app.web.requests import (
+    FormFields,
+    Moment,
+    TypedTime,
+    act_body_of,
+    as_model,
+    described_body,
+    errors,
+    parse_form_time,
+    refusals,
+)
 from app.web.routes.alarm_history import read_figures_of
+
+# The query of the shift report: of which time it is.
+
+DAY_S: Final = 86_400.0
+SHIFTS: Final = ("this", "last", "previous")
+SHIFT_WORDS: Final = ("alarms_report_this", "alarms_report_last", "alarms_report_previous")
+
+
+class ReportQuery(BaseModel):
+    """The time of the report: a shift, or from `since` on and before `until` if one of these is there.
+    `robot` is the one whose states are shown, by default the first."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    shift: Literal["this", "last", "previous"] = "this"
+    since: TypedTime = ""
+    until: TypedTime = ""
+    robot: Annotated[str, Field(max_length=64)] = ""
+    act: Annotated[str, Field(max_length=400)] = ""
+
+    @property
+    def has_times(self) -> bool:
+        return bool(self.since or self.until)
+
+    def times(self, now: float, starts: Sequence[str]) -> Shift:
+        """From when to when; InputError for what is no time. Without a beginning the time is a day
+        long, and without an end it ends now."""
+        if not self.has_times:
+            return shift_at(now, starts, SHIFTS.index(self.shift))
+        since = parse_form_time("since", self.since)
+        until = parse_form_time("until", self.until, fold=1)
+        end = now if until is None else until / 1000
+        return Shift(end - DAY_S if since is None else since / 1000, end)
+
+    def before(self, now: float, starts: Sequence[str]) -> Shift:
+        """The time before that, of the same length, or the shift before."""
+        if not self.has_times:
+            return shift_at(now, starts, SHIFTS.index(self.shift) + 1)
+        since, until = self.times(now, starts)
+        return Shift(since - (until - since), since)
+
+
+# The shift report: a page of paper with alarms, presses and the states of the machine in a time.
+
+PRESSES: Final = 8  # on the page; the others are counted
+COUNTED: Final = 500  # presses at most
+MARKS: Final = 4
+# Entries that no operator made.
+LEFT_OUT: Final = frozenset({"began", "changed", "signed", "resumed", "removed"})
+
+
+class ShownMessage(NamedTuple):
+    """A message to the next shift: who left it, and when."""
+
+    text: str
+    who: TextLike
+    at: Text
+
+
+class ShownState(NamedTuple):
+    """A state of the machine with how long it was in it; `fill` is how the bar shows it."""
+
+    text: TextLike
+    fill: str
+    duration: TextLike
+
+
+class ShownPeriod(NamedTuple):
+    """A part of the bar of states, in percent of it."""
+
+    fill: str
+    x: float
+    width: float
+
+
+class ReportRow(NamedTuple):
+    """A row of a table: `cells` beside the first."""
+
+    first: TextLike
+    cells: tuple[TextLike, ...]
+    priority: int = 0
+    text: TextLike = ""
+
+
+class ReportContext(TypedDict):
+    """The variables of `alarm-report.html`, beside those of the frame."""
+
+    form: ReportQuery
+    typed: dict[str, str]
+    shifts: list[tuple[Text, TextLike, str, bool]]
+    robots: dict[str, TextLike]
+    span: Text
+    figures: list[tuple[TextLike, TextLike, TextLike]]
+    states: list[ShownState]
+    periods: list[ShownPeriod]
+    marks: list[TextLike]
+    frequent: list[ReportRow]
+    high: list[ReportRow]
+    high_more: TextLike
+    presses: list[ReportRow]
+    presses_more: TextLike
+    of_time: FiguresContext
+    from_before: ShownMessage | None
+    to_next: ShownMessage | None
+    longest_message: int
+    printed: Text
+
+
+class ReportParts(NamedTuple):
+    """What a report is made of: `rows` are entries of the operator's log, the newest first, and
+    `messages` those of its messages, also of the shift before."""
+
+    figures: Figures
+    alarms: AlarmReport
+    states: Sequence[StatePeriod]
+    rows: Sequence[LogRow]
+    messages: Sequence[LogRow] = ()
+
+
+def report_context(
+    panel: Panel, form: ReportQuery, shift: Shift, parts: ReportParts, now: float
+) -> ReportContext:
+    """The report of a time."""
+    end = min(shift.until, now)
+    fills = _fills(parts.states)
+    presses = [row for row in parts.rows if row.entry.kind not in LEFT_OUT]
+    alarms = parts.alarms
+    high_more = alarms.high_count - len(alarms.high)
+    return ReportContext(
+        form=form,
+        typed=printable_texts(form.model_dump()),
+        shifts=[
+            (say(SHIFT_WORDS[back]), _span(shift_at(now, panel.alarm_rules.shifts, back)), name, chosen)
+            for back, name in enumerate(SHIFTS)
+            for chosen in [name == form.shift and not form.has_times]
+        ],
+        robots={str(robot.id): robot.name for robot in panel.robots},
+        span=_span(shift),
+        figures=list(_figures(parts.figures, len(presses))),
+        states=list(_durations(parts.states, fills)),
+        periods=[
+            ShownPeriod(fills[period.state], *_place(period, shift.since, end))
+            for period in parts.states
+        ],
+        marks=[clock_text(shift.since + n * (end - shift.since) / MARKS) for n in range(MARKS + 1)],
+        frequent=[
+            ReportRow(
+                "",
+                (
+                    number(f"{alarm.raises:,d}"),
+                    duration_text(alarm.active_s) if alarm.active_s else "–",
+                    duration_text(alarm.longest_s) if alarm.longest_s else "–",
+                ),
+                alarm.row.priority,
+                _text(alarm.row),
+            )
+            for alarm in alarms.frequent
+        ],
+        high=[
+            ReportRow(
+                format_time(row.at),
+                (_lasted(returned), _acknowledged(acknowledged)),
+                row.priority,
+                _text(row),
+            )
+            for row, acknowledged, returned in alarms.high
+        ],
+        high_more=say("alarms_report_more", count=number(f"{high_more:,d}")) if high_more else "",
+        presses=[_press(panel, row) for row in reversed(presses[:PRESSES])],
+        presses_more=_more(len(presses) - PRESSES, len(parts.rows)),
+        of_time=figures_context(parts.figures),
+        from_before=_message(row for row in parts.messages if row.entry.at < shift.since * 1000),
+        to_next=_message(row for row in parts.messages if row.entry.at >= shift.since * 1000),
+        longest_message=LONGEST_MESSAGE,
+        printed=say("alarms_report_printed", time=format_datetime(now)),
+    )
+
+
+def _message(rows: Iterable[LogRow]) -> ShownMessage | None:
+    """The newest of messages."""
+    row = next(iter(rows), None)
+    if row is None:
+        return None
+    text, entry = json.loads(row.entry.values).get("text", ""), row.entry
+    return ShownMessage(
+        printable(str(text)), who_of(printable(entry.who)), format_datetime(entry.at / 1000)
+    )
+
+
+def _span(shift: Shift) -> Text:
+    since, until = (datetime.fromtimestamp(at) for at in shift)
+    end = (
+        time_of_day(until.strftime("%H:%M"))
+        if since.date() == until.date()
+        else date_and_time(until.strftime("%Y-%m-%d %H:%M"))
+    )
+    begin = date_and_time(since.strftime("%Y-%m-%d %H:%M"))
+    return say("alarms_report_span", since=begin, until=end)
+
+
+def _figures(figures: Figures, presses: int) -> Iterator[tuple[TextLike, TextLike, TextLike]]:
+    yield (
+        word("title"),
+        number(f"{figures.raised:,d}"),
+        say("alarms_report_per_hour", rate=rate_text(figures.per_hour)),
+    )
+    yield (
+        word("report_worst"),
+        number(f"{figures.worst_10_min:,d}"),
+        word("report_in_10_min"),
+    )
+    yield word("figure_acknowledge"), median_text(figures), word("figure_median")
+    yield word("report_presses"), _count(presses), ""
+
+
+def _count(presses: int) -> TextLike:
+    if presses >= COUNTED:
+        return say("alarms_report_at_least", count=number(f"{presses:,d}"))
+    return number(f"{presses:,d}")
+
+
+def _more(more: int, read: int) -> TextLike:
+    """How many presses are only in the log."""
+    if more <= 0:
+        return ""
+    code = "alarms_report_presses_at_least" if read >= COUNTED else "alarms_report_presses_more"
+    return say(code, count=number(f"{more:,d}"))
+
+
+def _fills(periods: Iterable[StatePeriod]) -> dict[str, str]:
+    """How each state is shown on paper: what is abnormal is hatched, the others differ in grey."""
+    fills: dict[str, str] = {}
+    greys = 0
+    for state in dict.fromkeys(period.state for period in periods):
+        shown = json.loads(state)
+        if shown["colour"] in ("red", "yellow"):
+            fills[state] = "hatched"
+        elif shown["colour"] == "none":
+            fills[state] = "white"
+        else:
+            fills[state] = f"grey{greys % 4}"
+            greys += 1
+    return fills
+
+
+def _durations(periods: Sequence[StatePeriod], fills: Mapping[str, str]) -> Iterator[ShownState]:
+    """The states with the longest first."""
+    seconds: dict[str, float] = {}
+    for since, until, state in periods:
+        seconds[state] = seconds.get(state, 0.0) + until - since
+    for state, lasted in sorted(seconds.items(), key=lambda item: -item[1]):
+        if lasted >= 1.0:
+            text = text_of(json.loads(state)["text"])
+            yield ShownState(text, fills[state], duration_text(float(round(lasted))))
+
+
+def _place(period: StatePeriod, since: float, until: float) -> tuple[float, float]:
+    whole = max(1.0, until - since)
+    return (
+        round(100 * (period.since - since) / whole, 3),
+        round(100 * (period.until - period.since) / whole, 3),
+    )
+
+
+def _text(row: HistoryRow) -> TextLike:
+    return text_of(json.loads(row.record).get("about", {}).get("text", row.id))
+
+
+def _lasted(row: HistoryRow | None) -> TextLike:
+    return "–" if row is None or row.lasted_s is None else duration_text(row.lasted_s)
+
+
+def _acknowledged(row: HistoryRow | None) -> TextLike:
+    if row is None or row.lasted_s is None:
+        return word("report_not_acknowledged")
+    who = who_of(printable(row.actor))
+    return say("alarms_report_who_after", who=who, duration=duration_text(row.lasted_s))
+
+
+def _press(panel: Panel, row: LogRow) -> ReportRow:
+    entry = row.entry
+    if entry.kind in ("control", "alarm"):
+        code = ACTION_WORDS.get(entry.action, "")
+        label: TextLike = say(code) if code else entry.action
+    else:
+        labels = {w.id: w.label for w in panel.widgets() if isinstance(w, Command)}
+        label = labels.get(entry.widget, printable(entry.widget))
+    at = datetime.fromtimestamp((row.pressed_at or entry.at) / 1000)
+    return ReportRow(
+        time_of_day(at.strftime("%H:%M")),
+        (who_of(printable(entry.who)), label, outcome_of(entry.outcome or entry.kind)),
+    )
+
+
+def now() -> float:
+    """Seconds since the epoch."""
+    return time.time()
+
 
 router = APIRouter()
 
 FORM_FIELDS_MOST: Final = 10
+MESSAGE_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "text": {"maxLength": LONGEST_MESSAGE}})
 MESSAGES_READ: Final = 20  # of two shifts, the newest
 
 
@@ -42,9 +366,9 @@ class MessageBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    text: Annotated[str, Field(max_length=LONGEST_MESSAGE)]
+    text: Annotated[str, Field(max_length=LONGEST_MESSAGE)] = ""
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
 
 
 class MessageReceipt(ActAnswer):
@@ -58,25 +382,25 @@ class MessageReceipt(ActAnswer):
     responses=errors(403, 422, 429, 503),
 )
 async def report(
-    request: Request, state: CurrentState, wanted: Annotated[ReportQuery, Query()]
+    request: Request, state: CurrentState, form: Annotated[ReportQuery, Query()]
 ) -> Response:
     at, panel = now(), state.fleet.panel
-    shift = wanted.times(at, panel.alarm_rules.shifts)
+    shift = form.times(at, panel.alarm_rules.shifts)
     alarms = state.fleet.alarms.history
     end = min(shift.until, at)
     parts = ReportParts(
         await read_figures_of(state, shift.since, end),
         await alarms.read(partial(read_report, since=shift.since, until=end)),
-        await _states(state, wanted.robot, shift.since, end),
+        await _states(state, form.robot, shift.since, end),
         await _log_rows(state, shift),
-        await _messages(state, wanted.before(at, panel.alarm_rules.shifts), shift),
+        await _messages(state, form.before(at, panel.alarm_rules.shifts), shift),
     )
-    context = report_context(panel, wanted, shift, parts, at)
-    query = urlencode(wanted.model_dump(exclude={"act"}, exclude_defaults=True))
+    context = report_context(panel, form, shift, parts, at)
+    query = urlencode(form.model_dump(exclude={"act"}, exclude_defaults=True))
     path = f"alarms/report?{query}"
     page = FramedPage("alarm-report.html", word("report_title"), alarms_page=path)
-    receipt = state.fleet.first.shift_acts.receipt(wanted.act)
-    refused = TOO_OFTEN if wanted.act == TOO_OFTEN.code else receipt.reason if receipt else ""
+    receipt = state.fleet.first.shift_acts.receipt(form.act)
+    refused = TOO_OFTEN if form.act == TOO_OFTEN.code else receipt.reason if receipt else ""
     texts = {"word": word, "log_word": log_word, "refused_message": refused}
     return framed_page(request, state, page, {**context, **texts})
 
@@ -91,14 +415,10 @@ async def report(
         303: {"description": "of a form: back to the report, with the receipt's id if it was refused"},
         503: {"model": MessageReceipt, "description": "the operator's log can't be written"},
     },
-    openapi_extra=described_body(
-        MessageBody,
-        fields(id={"pattern": PRESS_ID}, text={"maxLength": LONGEST_MESSAGE}),
-        required=True,
-    ),
+    openapi_extra=described_body(MessageBody, MESSAGE_FORM.schema, required=False),
 )
 async def leave_message(request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
+    is_form, content = await act_body_of(request, MESSAGE_FORM, FORM_FIELDS_MOST)
     body = as_model(MessageBody, content)
     who, token = principal_with_new_token(request, state)
     runner = state.fleet.first.shift_acts
@@ -121,7 +441,7 @@ def _answer(request: Request, state: AppState, receipt: ActReceipt, is_form: boo
     return act_answer(request, receipt)
 
 
-async def _messages(state: AppState, before: Shift, shift: Shift) -> list[Row]:
+async def _messages(state: AppState, before: Shift, shift: Shift) -> list[LogRow]:
     """The messages of a shift and of the one before it, the newest first; none without a log."""
     if not isinstance(state.log, OperatorLog):
         return []
@@ -144,7 +464,7 @@ async def _states(state: AppState, robot: str, since: float, until: float) -> li
     return await asyncio.to_thread(read_states, state.fleet.states, name, since, until)
 
 
-async def _log_rows(state: AppState, shift: Shift) -> list[Row]:
+async def _log_rows(state: AppState, shift: Shift) -> list[LogRow]:
     """The newest entries of the operator's log; none without a log."""
     if not isinstance(state.log, OperatorLog):
         return []

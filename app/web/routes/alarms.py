@@ -2,24 +2,31 @@
 and scripts, forms without them."""
 
 import asyncio
+import re
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Annotated, Any, Final
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, urlencode, urlsplit
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import BaseModel
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from pydantic import BaseModel, ConfigDict
+from pydantic import Field as PydanticField
 
-from app.alarms.history import read_history
-from app.alarms.shown import more_text
-from app.alarms.transition_json import finite, transition
-from app.commands.act_receipt import ActReceipt
-from app.commands.alarm_acts import ALARM_ACTS
-from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
-from app.i18n import localized, say
-from app.permission.confirmations import ConfirmedBy
+from app.cell.alarms.history import read_history
+from app.cell.alarms.records import finite, transition
+from app.cell.alarms.shown import more_text
+from app.cell.alarms.states import AlarmInstance
+from app.cell.commands.acts import ActReceipt
+from app.cell.commands.alarm_acts import ALARM_ACTS, CONFIRMED
+from app.cell.commands.judge import RETRY_AFTER_S
+from app.cell.commands.press import PRESS_ID
+from app.cell.people.access import PIN_HERE
+from app.cell.people.secrets_hash import LONGEST
+from app.cell.permission.roles import ConfirmedBy, role_lock, role_name, role_verdict, strictest
+from app.records.principal import Principal
+from app.system.errors import NotFound
+from app.system.texts import TextLike, localized, say
 from app.web.alarm_answers import (
     AcknowledgeBody,
     AlarmActBody,
@@ -28,22 +35,171 @@ from app.web.alarm_answers import (
     AlarmReceipts,
     AlarmsAnswer,
     HistoryAnswer,
+    Occurrence,
     receipt_json,
 )
 from app.web.alarm_runs import AlarmRun, AlarmRuns
+from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import principal_with_new_token, set_client_cookie
-from app.web.framed_page import FramedPage, framed_page
+from app.web.client import caller, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, Described, described_body, errors, fields, refusals
-from app.web.rendering.alarm_choice import chosen_rows, segment_counts
-from app.web.rendering.alarms_page import alarms_context, word
-from app.web.request_body import act_body_of, as_model
-from app.web.routes.alarm_confirm import OWN_PAGE, AlarmId, confirmed_act
-from app.web.routes.press_forms import is_second_tap
-from app.web.routes.presses import STATUS
+from app.web.large_answers import rows_answer
+from app.web.pages.alarms import alarms_context, chosen_rows, segment_counts, word
+from app.web.pages.confirm import Subject, confirm_sheet, digits_key
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.words import Ask
+from app.web.requests import (
+    PAGE,
+    SINCE,
+    Described,
+    Field,
+    FormFields,
+    act_body_of,
+    as_model,
+    described_body,
+    errors,
+    refusals,
+)
+from app.web.routes.presses import FIELDS, ConfirmForm, checked_entry, entered_fields, is_second_tap
+
+# Acts on alarms that a person confirms with a PIN, password or badge: the page that asks for it.
 
 router = APIRouter()
+
+ConfirmedAct = Annotated[str, Path(json_schema_extra={"enum": sorted(CONFIRMED)})]
+AlarmId = Annotated[str, Path(max_length=300, description="the id of an alarm")]
+OWN_PAGE: Final = re.compile(
+    r"(/robots/[a-z0-9_]+)?/"
+    r"(pages/[a-z0-9_]+|alarms[a-z/_-]*|log|diagnostics|help|recipes/[a-z0-9_]+)(\?[!-~]*)?"
+)
+CARRIED: Final = ("id", "page", "occurrence", "reason", "for_s")
+PLAIN: Final = frozenset(
+    {
+        "confirm_wrong_pin", "confirm_wrong_password", "confirm_wrong_badge", "confirm_empty",
+        "confirm_who", "confirm_same_person", PIN_HERE,
+    }
+)  # fmt: skip
+
+
+class ConfirmQuery(BaseModel):
+    """The fields of the act, the second person so far, and the code of the last refusal."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    id: Annotated[str, PydanticField(pattern=PRESS_ID)] | None = None
+    page: Annotated[str, PydanticField(max_length=400)] = ""
+    occurrence: Occurrence | None = None
+    reason: Annotated[str, PydanticField(max_length=200)] = ""
+    for_s: Annotated[int, PydanticField(gt=0, le=86_400)] | None = None
+    user: Annotated[str, PydanticField(max_length=40)] = ""
+    refused: Annotated[str, PydanticField(max_length=40)] = ""
+
+
+@router.get(
+    "/alarms/{alarm:path}/{act}/confirm",
+    response_class=HTMLResponse,
+    summary="The page on which a person confirms an act on an alarm",
+    responses=errors(403, 404, 422),
+)
+async def confirm_page(
+    alarm: AlarmId,
+    act: ConfirmedAct,
+    request: Request,
+    state: CurrentState,
+    query: Annotated[ConfirmQuery, Query()],
+) -> Response:
+    standing = state.fleet.alarms.engine.alarms.get(alarm)
+    subject = _subject(standing, act) if standing else None
+    if subject is None:
+        raise NotFound(f'there is no act "{act:.40}" on an alarm "{alarm:.64}" that a person confirms')
+    who = caller(request).principal(state)
+    fields = {name: str(value) for name in CARRIED if (value := getattr(query, name))}
+    address = f"{state.root}/alarms/{quote(alarm, safe='')}"
+    page = query.page.removeprefix(state.root)
+    context: dict[str, Any] = {
+        **confirm_sheet(state, subject, who, query.user),
+        "action": f"{address}/{act}",
+        "away": state.root + (page if OWN_PAGE.fullmatch(page) else "/alarms"),
+        "no": say("back"),
+        "fields": fields,
+        "failed": _failure(state, subject, who, query),
+        "scripted": False,
+    }
+    framed = FramedPage("alarm-confirm.html", word(act), own_path=f"/alarms/{alarm}/{act}/confirm")
+    return framed_page(request, state, framed, context)
+
+
+async def confirmed_act(
+    request: Request, state: AppState, alarm_id: str, act: str, content: dict[str, str]
+) -> tuple[ConfirmedBy | None, Response | None]:
+    """Who has confirmed the act of a form, whose fields for it are removed; else the redirect to the
+    page that asks. (None, None) for an act that needs none, or that is refused without a PIN."""
+    alarm, client = state.fleet.alarms.engine.alarms.get(alarm_id), caller(request)
+    subject = _subject(alarm, act) if alarm else None
+    who = client.principal(state)
+    entered = entered_fields(content) if any(name in content for name in FIELDS) else None
+    if subject is None or not who.user or role_verdict(subject.needs, who):
+        return None, None
+    too_soon, digits = is_second_tap(content), digits_key(subject.id)
+    if entered is None:
+        return None, None if too_soon else _asking(state, alarm_id, act, content)
+    typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
+    if entered["_digit"] != "enter" or (too_soon and not typed):
+        if entered["_digit"] != "enter":
+            state.access.typed_digits.press(who.client.id, digits, entered["_digit"])
+        return None, _asking(state, alarm_id, act, content, entered["_user"])
+    form = ConfirmForm(who, content, client.session)
+    by, checked = await checked_entry(state, subject, act, form, entered)
+    if by is not None:
+        content.pop("_since", None)
+        return by, None
+    return None, _asking(state, alarm_id, act, content, entered["_user"], checked.code)
+
+
+def _asking(
+    state: AppState,
+    alarm: str,
+    act: str,
+    content: Mapping[str, str],
+    user: str = "",
+    refused: str = "",
+) -> Response:
+    """The redirect to the page that asks."""
+    fields = {name: content[name] for name in CARRIED if content.get(name)}
+    query = fields | {name: text for name, text in (("user", user), ("refused", refused)) if text}
+    address = f"{state.root}/alarms/{quote(alarm, safe='')}/{act}/confirm?{urlencode(query)}"
+    return RedirectResponse(address, status_code=303)
+
+
+def _subject(alarm: AlarmInstance, act: str) -> Subject | None:
+    """What is confirmed; None for an act on this alarm that needs no confirmation."""
+    described = alarm.definition.alarm
+    if act not in CONFIRMED or described.confirm_act is None:
+        return None
+    needs = frozenset(filter(None, (ALARM_ACTS[act].needs, described.needs)))
+    ask = Ask(
+        sentence=say("alarms_confirm", act=word(act), alarm=alarm.text), inputs=[], changes=[], note=""
+    )
+    return Subject(described.id, described.confirm_act, needs, ask, word(act))
+
+
+def _failure(state: AppState, subject: Subject, who: Principal, query: ConfirmQuery) -> TextLike:
+    """Why the last confirmation failed, by its code; how many tries are left."""
+    if not query.refused:
+        return ""
+    name = query.user if subject.confirmation == "two_persons" else who.user
+    if wait_s := state.access.wait_s(who.client, name):
+        return say("sign_in_wait", seconds=str(wait_s))
+    role = strictest(subject.needs)
+    if query.refused == "confirm_second_role":
+        return say(query.refused, name=query.user, role=role_name(role))
+    if query.refused not in PLAIN:
+        return role_lock(role).reason or "" if query.refused == "role_needed" else ""
+    said = say(query.refused)
+    if "wrong" not in query.refused:
+        return said
+    return say("signin_tries_left", why=said, count=str(state.access.tries_left(who.client, name)))
+
 
 AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
@@ -67,20 +223,29 @@ def _acts(model: type[BaseModel]) -> Described:
     )
 
 
-FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
+FORM_PARTS: Final[Mapping[str, Field]] = {
     "id": {"pattern": PRESS_ID},
     "page": {"description": "the path of the panel's page to go back to"},
-    "_since": {
-        "description": "when the page was rendered, in the server's own time",
-        "pattern": r"^[0-9]{1,10}(\.[0-9]{1,3})?$",
-    },
+    "_since": SINCE,
 }
-ACT_FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
-    **FORM_PARTS,
-    "occurrence": {"pattern": "^[0-9]{1,15}$"},
-    "reason": {"maxLength": 200},
-    "for_s": {"pattern": "^[1-9][0-9]{0,3}$"},
-}
+OCCURRENCE_SCHEMA: Final[Field] = {"pattern": "^[0-9]{1,15}$"}
+ACKNOWLEDGE_FORM: Final = FormFields(
+    FORM_PARTS,
+    {f"^{re.escape(OCCURRENCE)}": OCCURRENCE_SCHEMA},
+    about=f'"{OCCURRENCE}" and the id: the occurrence that the page showed',
+)
+ACT_FORM: Final = FormFields(
+    {
+        **FORM_PARTS,
+        "occurrence": OCCURRENCE_SCHEMA,
+        "reason": {"maxLength": 200},
+        "for_s": {
+            "description": "up to 86400",
+            "pattern": "^([1-9][0-9]{0,3}|[1-7][0-9]{4}|8[0-5][0-9]{3}|86[0-3][0-9]{2}|86400)$",
+        },
+        **{name: {"maxLength": LONGEST, "description": "of who confirms it"} for name in FIELDS},
+    }
+)
 
 
 @router.get(
@@ -100,24 +265,29 @@ async def alarms(
         rows = await state.fleet.alarms.history.read(read)
         older = rows[-1].seq if len(rows) == query.limit else None
         content = {"history": [transition(row) for row in rows], "older": older}
-    else:
-        content = _chosen(state, query, language_of(request))
-    answer = localized(content, language_of(request))
-    return JSONResponse(answer, headers={"cache-control": "no-store"})
+        return await rows_answer(request, lambda: content, len(rows))
+    content = _listed_alarms(state, query, language_of(request))
+    return await rows_answer(request, partial(_with_finite, content), len(content["alarms"]))
 
 
-def _chosen(state: AppState, query: AlarmQuery, language: str) -> dict[str, Any]:
+def _listed_alarms(state: AppState, query: AlarmQuery, language: str) -> dict[str, Any]:
     """The alarms that a query chooses, and how many there are of all that it might list."""
     rows, limit = state.fleet.alarms.rows(), query.rows_limit
     choice = query.choice()
     listed = chosen_rows(choice, rows, language, limit)
     return {
-        "alarms": [finite(row) for row in listed.rows],
+        "alarms": listed.rows,
         "more": listed.more,
         "more_text": more_text(listed.more),
         "counts": segment_counts(listed.taken),
-        "alarm": next((finite(row) for row in rows if row["id"] == choice.alarm), None),
+        "alarm": next((row for row in rows if row["id"] == choice.alarm), None),
     }
+
+
+def _with_finite(content: dict[str, Any]) -> dict[str, Any]:
+    alarm = content["alarm"]
+    rows = [finite(row) for row in content["alarms"]]
+    return {**content, "alarms": rows, "alarm": None if alarm is None else finite(alarm)}
 
 
 def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
@@ -135,18 +305,10 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     response_model=AlarmReceipts,
     summary="Acknowledge several alarms, such as those that a page shows",
     responses=_acts(AlarmReceipts),
-    openapi_extra=described_body(
-        AcknowledgeBody,
-        {
-            **fields(**FORM_PARTS),
-            "description": f'"{OCCURRENCE}" and the id: the occurrence that the page showed',
-            "additionalProperties": {"type": "string", "pattern": "^[0-9]{1,15}$"},
-        },
-        required=True,
-    ),
+    openapi_extra=described_body(AcknowledgeBody, ACKNOWLEDGE_FORM.schema, required=True),
 )
 async def acknowledge(request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
+    is_form, content = await act_body_of(request, ACKNOWLEDGE_FORM, FORM_FIELDS_MOST)
     if is_form:
         shown = {k.removeprefix(OCCURRENCE): v for k, v in content.items() if k.startswith(OCCURRENCE)}
         body = as_model(AcknowledgeBody, {"alarms": shown, "id": content.get("id")})
@@ -166,16 +328,16 @@ async def acknowledge(request: Request, state: CurrentState) -> Response:
     response_model=AlarmReceipt,
     summary="Acknowledge, shelve or reset an alarm, or take it out of service",
     responses=_acts(AlarmReceipt),
-    openapi_extra=described_body(AlarmActBody, fields(**ACT_FORM_PARTS), required=False),
+    openapi_extra=described_body(AlarmActBody, ACT_FORM.schema, required=False),
 )
 async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
+    is_form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
     confirmed: ConfirmedBy | None = None
     if is_form:
         confirmed, asked = await confirmed_act(request, state, alarm, act, content)
         if asked is not None:
             return asked
-    filled = {k: v for k, v in content.items() if v != "" and k not in ("page", "_since")}
+    filled = {k: v for k, v in content.items() if k not in ("page", "_since")}
     body = as_model(AlarmActBody, filled if is_form else content)
     return await _answer(
         request, state, act, {alarm: body}, content if is_form else None, confirmed=confirmed

@@ -1,33 +1,32 @@
 """The operator's log as a page with a filter, and as CSV."""
 
+import time
+from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from dataclasses import replace
+from datetime import datetime, timedelta
 from functools import partial
-from typing import Annotated, Final, TypedDict
+from typing import Annotated, Final, NamedTuple, TypedDict
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.audit import Entry, Filter, OperatorLog, Row
-from app.commands.alarm_acts import ALARM_ACTS
-from app.commands.control_acts import CONTROL_ACTS
-from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
-from app.commands.recipe_acts import RECIPE_ACTS
-from app.commands.shift_acts import SHIFT_ACTION
-from app.errors import NotFound
-from app.i18n import Text, TextLike, number, say
+from app.cell.alarms.report import shift_at
+from app.cell.permission.verdict import WITHOUT_CONTROL
 from app.panel.widgets.families import Command, EntryWidget
-from app.permission.verdict import WITHOUT_CONTROL
-from app.printable import printable, printable_texts
+from app.records import Entry, Filter, LogRow, OperatorLog
+from app.system.errors import NotFound
+from app.system.printable import printable, printable_texts
+from app.system.texts import Text, TextLike, number, say
 from app.web.app_state import CurrentState
-from app.web.exported import Exported
-from app.web.framed_page import FramedPage, framed_page
+from app.web.downloads import Exported
 from app.web.language import language_of
-from app.web.openapi_parts import TEXT, errors
-from app.web.rendering.log_words import (
-    OUTCOMES,
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.log_words import (
+    ACTION_WORDS,
+    OUTCOME_WORDS,
     by_day,
     iso_of,
     outcome_of,
@@ -36,23 +35,14 @@ from app.web.rendering.log_words import (
     who_of,
     word,
 )
-from app.web.typed_times import TypedTime, typed_ms
+from app.web.requests import TEXT, TypedTime, errors, parse_form_time
 
 router = APIRouter()
 
 ROWS_ON_PAGE: Final = 50
-# Entries of the kind "control": acts, and changes that no act made.
-CONTROL_ACTIONS: Final = (
-    *(f"control_{act}" for act in CONTROL_ACTS),
-    "control_lost", "control_idle", "control_first_page", "control_request_lost",
-)  # fmt: skip
-RECIPE_ACTIONS: Final = tuple(f"recipe_{act}" for act in RECIPE_ACTS)
-ALARM_ACTIONS: Final = (*(f"alarm_{act}" for act in ALARM_ACTS), SHIFT_ACTION)
-DIAGNOSTIC_ACTIONS: Final = tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS)
-ACTIONS: Final = (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS, *RECIPE_ACTIONS)
 
 
-class Wanted(BaseModel):
+class LogQuery(BaseModel):
     """The filter as a form sends it; times are `2026-11-21T10:00`, in the server's zone where they
     have none of their own. `robot` is the id of the robot whose frame is around the page, `act`
     that of an act on an alarm, whose receipt is shown: they leave no entry out."""
@@ -78,8 +68,8 @@ class Wanted(BaseModel):
     def filter(self) -> Filter:
         """Raises InputError for what is no time."""
         return Filter(
-            since=typed_ms("since", self.since),
-            until=typed_ms("until", self.until, fold=1),
+            since=parse_form_time("since", self.since),
+            until=parse_form_time("until", self.until, fold=1),
             **self.model_dump(include={"widget", "outcome", "who", "text", "every"}),
         )
 
@@ -91,12 +81,45 @@ class Wanted(BaseModel):
         return urlencode(fields)
 
 
+class Quick(NamedTuple):
+    """A button that shows the entries of a time. `query` is the filter, `current`: it is the shown
+    one."""
+
+    label: Text
+    query: str
+    current: bool
+
+
+def quick_choices(form: LogQuery, shifts: Sequence[str], now: float) -> list[Quick]:
+    """The buttons above the filter; the last one shows the log as it opens."""
+    today = datetime.fromtimestamp(now).replace(hour=0, minute=0, second=0)
+    shift = datetime.fromtimestamp(shift_at(now, shifts).since)
+    times = {
+        "log_page_quick_today": (_typed(today), ""),
+        "log_page_quick_yesterday": (_typed(today - timedelta(days=1)), _typed(today)),
+        "log_page_quick_shift": (_typed(shift), ""),
+    }
+    choices = []
+    for code, (since, until) in times.items():
+        chosen = form.model_copy(update={"since": since, "until": until})
+        current = (form.since, form.until) == (since, until)
+        choices.append(Quick(say(code), chosen.query(), current))
+    start = LogQuery(robot=form.robot)
+    current = not form.is_narrowed and form.before is None
+    return [*choices, Quick(say("log_page_quick_start"), start.query(), current)]
+
+
+def _typed(moment: datetime) -> str:
+    return f"{moment:%Y-%m-%dT%H:%M}"
+
+
 class LogContext(TypedDict):
     """The variables of `log.html`, beside those of the frame."""
 
-    wanted: Wanted
+    form: LogQuery
+    quick: list[Quick]
     typed: dict[str, str]
-    days: list[tuple[Text, list[Row]]]
+    days: list[tuple[Text, list[LogRow]]]
     labels: dict[str, TextLike]
     entered: dict[str, TextLike]
     robots: dict[str, TextLike]
@@ -115,30 +138,29 @@ class LogContext(TypedDict):
     summary="The operator's log, the newest first",
     responses=errors(403, 422, 429, 503),
 )
-async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
-    rows: list[Row] = []
+async def page(request: Request, state: CurrentState, form: Annotated[LogQuery, Query()]) -> Response:
+    rows: list[LogRow] = []
     language = language_of(request)
     if isinstance(state.log, OperatorLog):
-        rows = await state.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
+        rows = await state.log.rows(form.filter(), form.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
     rows = [_shown(row, language) for row in rows[:ROWS_ON_PAGE]]
     panel, head = state.fleet.panel, state.log.head
     context = LogContext(
-        wanted=wanted,
-        typed=printable_texts(wanted.model_dump()),
+        form=form,
+        quick=quick_choices(form, panel.alarm_rules.shifts, time.time()),
+        typed=printable_texts(form.model_dump()),
         days=list(by_day(rows)),
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         entered={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         robots={str(robot.name): robot.name for robot in panel.robots},
-        acts={
-            a: word(a) for a in (*CONTROL_ACTIONS, *ALARM_ACTIONS, *DIAGNOSTIC_ACTIONS, *RECIPE_ACTIONS)
-        },
-        outcomes=OUTCOMES,
+        acts={action: say(code) for action, code in ACTION_WORDS.items()},
+        outcomes=tuple(OUTCOME_WORDS),
         off="" if state.log.enabled else say("log_off"),
         count=word("head", count=number(f"{head.count:,d}")) if head else "",
-        older=wanted.query(rows[-1].entry.seq) if more else "",
-        newest=wanted.query() if wanted.before else "",
-        csv=wanted.query(),
+        older=form.query(rows[-1].entry.seq) if more else "",
+        newest=form.query() if form.before else "",
+        csv=form.query(),
     )
     functions = {
         "time_of": partial(time_of, language=language),
@@ -149,7 +171,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         "word": word,
         "without_control": WITHOUT_CONTROL.code,
     }
-    framed = FramedPage("log.html", say("log_page_title"), wanted.robot)
+    framed = FramedPage("log.html", say("log_page_title"), form.robot)
     return framed_page(request, state, framed, {**context, **functions})
 
 
@@ -159,19 +181,19 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
     summary="What the filter shows, as CSV",
     responses=errors(403, 404, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
 )
-async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
+async def as_csv(request: Request, state: CurrentState, form: Annotated[LogQuery, Query()]) -> Response:
     if not isinstance(state.log, OperatorLog):
         raise NotFound(say("log_off"))
     gzip = "gzip" in request.headers.get("accept-encoding", "")
     async with AsyncExitStack() as opened:
         export = await opened.enter_async_context(
-            state.log.export(wanted.filter(), wanted.before, gzip, language_of(request))
+            state.log.export(form.filter(), form.before, gzip, language_of(request))
         )
         first = await export.start()
         return Exported(export, first, gzip, opened.pop_all(), "operator's log")
 
 
-def _shown(row: Row, language: str) -> Row:
+def _shown(row: LogRow, language: str) -> LogRow:
     """With its texts as a page shows them, but its values: those are JSON still."""
     entry = row.entry._replace(reason=row.entry.reason_in(language))
     cells = (

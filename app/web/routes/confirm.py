@@ -6,22 +6,20 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.access.access import Checked
-from app.access.confirmer import VALID_S
-from app.access.secrets_hash import LONGEST
-from app.access.users import LONGEST_NAME
-from app.i18n import localized, say
+from app.cell.people.access import SecretCheck
+from app.cell.people.confirmer import VALID_S
+from app.cell.people.secrets_hash import LONGEST
+from app.cell.people.users import LONGEST_NAME
+from app.cell.permission.roles import SIGN_IN
 from app.panel.widgets.hold import HoldCommand
-from app.permission.confirmations import SIGN_IN
+from app.system.texts import localized, say
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.client_cookie import caller
-from app.web.confirmations import confirmed_command, question_of
+from app.web.client import caller, confirmed_command, question_of
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, described_body, errors
-from app.web.rendering.confirm_sheet import confirm_sheet, press_subject
-from app.web.request_body import as_model, body_of, json_of
+from app.web.pages.confirm import confirm_sheet, press_subject
+from app.web.requests import PAGE, as_model, body_of, described_body, errors, json_of
 from app.web.routes.presses import INPUTS
-from app.web.routes.session import REFUSED, SignIn, attempt_of, refused_answer
+from app.web.routes.sign_in import REFUSED, SignIn, attempt_of, refused_answer
 
 router = APIRouter()
 
@@ -90,7 +88,7 @@ async def confirm(
     client = caller(request)
     who = client.principal(state)
     if not who.user:
-        return refused_answer(request, Checked(None, say(SIGN_IN), SIGN_IN))
+        return refused_answer(request, SecretCheck(None, say(SIGN_IN), SIGN_IN))
     question = question_of(state, command, body.inputs)
     own = who.user if question.confirmation == "pin" else ""
     attempt = attempt_of(body.sign_in(own))

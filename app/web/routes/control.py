@@ -1,26 +1,24 @@
 """Take, request, give and release control of a robot: JSON for scripts, forms without them."""
 
 import secrets
-from typing import Annotated, Final, TypeVar
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Request
 from fastapi.responses import RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
-from app.commands.press import PRESS_ID
-from app.errors import InputError, NotFound
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.control_acts import CONTROL_ACTS, TOO_OFTEN
+from app.cell.commands.press import PRESS_ID
+from app.cell.permission.control import for_role, role
+from app.cell.session.session import RobotSession
 from app.panel.base import ID
-from app.permission.control_authority_view import for_role, role
-from app.permission.principal import Principal
-from app.runtime.robot_session import RobotSession
-from app.web.act_answer import ActAnswer, act_answer
+from app.records.principal import Principal
+from app.system.errors import NotFound
+from app.web.answers import ActAnswer, act_answer
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.client_cookie import principal_of, principal_with_new_token, set_client_cookie
-from app.web.openapi_parts import FORM, JSON, described_body, errors, fields, refusals
-from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.client import principal_of, principal_with_new_token, set_client_cookie
+from app.web.requests import FormFields, Moment, act_body_of, as_model, described_body, errors, refusals
 
 router = APIRouter()
 
@@ -28,6 +26,9 @@ Act = Annotated[str, Path(json_schema_extra={"enum": list(CONTROL_ACTS)})]
 ASKER: Final = r"^[0-9a-f]{0,12}$"
 
 FORM_FIELDS_MOST: Final = 8
+ACT_FORM: Final = FormFields(
+    {"to": {"pattern": ASKER}, "page": {"pattern": ID}, "id": {"pattern": PRESS_ID}}
+)
 
 
 class Acting(BaseModel):
@@ -38,7 +39,7 @@ class Acting(BaseModel):
 
     to: Annotated[str, Field(pattern=ASKER)] = ""
     page: Annotated[str, Field(pattern=ID)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
 
 
@@ -48,9 +49,6 @@ class KeepAlive(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
     touched: bool = False
-
-
-Fields = TypeVar("Fields", bound=BaseModel)
 
 
 class ControlAnswer(ActAnswer):
@@ -70,7 +68,8 @@ class ControlAnswer(ActAnswer):
 )
 async def keep_alive(request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    who, touched = principal_of(request, state), (await _body(KeepAlive, request)).touched
+    _, content = await act_body_of(request)
+    who, touched = principal_of(request, state), as_model(KeepAlive, content).touched
     for shown in (session, *state.fleet.sharing(session)):
         shown.control.keepalive(who, touched)
     return Response(status_code=204)
@@ -86,19 +85,15 @@ async def keep_alive(request: Request, state: CurrentState, session: CurrentSess
         303: {"description": "of a form: back to the page"},
         503: {"model": ControlAnswer, "description": "the operator's log can't be written"},
     },
-    openapi_extra=described_body(
-        Acting,
-        fields(to={"pattern": ASKER}, page={"pattern": ID}, id={"pattern": PRESS_ID}),
-        required=False,
-    ),
+    openapi_extra=described_body(Acting, ACT_FORM.schema, required=False),
 )
 async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
     who = principal_of(request, state)
     # Without a cookie the act is refused; with this one the next succeeds.
     _, token = principal_with_new_token(request, state)
-    form = kind_of(request) == FORM
-    body = await _body(Acting, request)
+    form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
+    body = as_model(Acting, content)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
     act_id = (f"{body.id}.{act}" if form else body.id) if body.id else secrets.token_hex(8)
     at = None if form or body.at is None else body.at.timestamp()
@@ -131,13 +126,3 @@ def _json(request: Request, session: RobotSession, who: Principal, receipt: ActR
 def _required(session: RobotSession) -> None:
     if not session.control.rules.required:
         raise NotFound("this panel does not require control: its file has no [control] required = true")
-
-
-async def _body(model: type[Fields], request: Request) -> Fields:
-    """The body as a model: JSON, a form, or nothing at all."""
-    kind, content = kind_of(request), await body_of(request)
-    if kind == FORM:
-        return as_model(model, form_of(content, FORM_FIELDS_MOST))
-    if kind not in (JSON, ""):
-        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
-    return as_model(model, json_of(content or b"{}"))

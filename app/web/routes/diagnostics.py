@@ -4,61 +4,196 @@ import asyncio
 import secrets
 import time
 from collections.abc import Mapping
+from dataclasses import fields
 from datetime import datetime
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.control_acts import TOO_OFTEN
-from app.commands.diagnostic_acts import DIAGNOSTIC_ACTS
-from app.commands.press import PRESS_ID
-from app.errors import KioskError, NotFound
-from app.i18n import TextLike, localized, say
-from app.interfaces.names import Qos
-from app.robot.round_trips import RoundTripSummary
-from app.runtime.graph_survey import Survey
-from app.runtime.live_look import Look, LookedTopic
-from app.runtime.robot_session import RobotSession
-from app.survey.forwarding import topic_forwarding
-from app.survey.model import SurveyedTopic
-from app.view.diagnostic_graph import robots_in
-from app.web.act_answer import act_answer
-from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import (
-    client_of,
-    principal_of,
-    principal_with_new_token,
-    set_client_cookie,
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.control_acts import TOO_OFTEN
+from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.press import PRESS_ID
+from app.cell.robot.traffic import RoundTripSummary
+from app.cell.session.alarm_mqtt import AlarmMqtt
+from app.cell.session.doctor_process import DoctorProcess
+from app.cell.session.looks import Look, Survey, TopicPreview
+from app.cell.session.session import RobotSession
+from app.cell.view.diagnostics import (
+    TopicRow,
+    graph_topic_rows,
+    node_rows,
+    parameter_rows,
+    robots_in,
+    server_rows,
+    topic_rows,
 )
-from app.web.diagnostics_answer import (
+from app.cell.view.link_status import LinkStatus
+from app.ros.graph.model import SurveyedTopic, topic_forwarding
+from app.ros.messages.names import Qos
+from app.system.clock import iso_time
+from app.system.errors import KioskError, NotFound
+from app.system.texts import TextLike, localized, say
+from app.web.answers import act_answer
+from app.web.app_state import AppState, CurrentState
+from app.web.client import client_of, principal_of, principal_with_new_token, set_client_cookie
+from app.web.downloads import SharedLinks, links_of
+from app.web.language import language_of
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.diagnostics import (
+    TEXTS,
     DiagnosticActBody,
     DiagnosticReceipt,
     DiagnosticsAnswer,
     DiagnosticsQuery,
     LookAnswer,
     LookQuery,
+    diagnostics_context,
+    trip_note,
+    versions,
+    word,
 )
-from app.web.framed_page import FramedPage, framed_page
-from app.web.language import language_of
-from app.web.openapi_parts import JSON, PAGE, described_body, errors, fields, refusals
-from app.web.rendering.diagnostics_json import diagnostics_json, look_json, mqtt_json
-from app.web.rendering.diagnostics_page import diagnostics_context, versions
-from app.web.rendering.diagnostics_texts import TEXTS, word
-from app.web.request_body import act_body_of, as_model
-from app.web.shared_recordings import SharedLinks, links_of
+from app.web.requests import (
+    JSON,
+    PAGE,
+    FormFields,
+    act_body_of,
+    as_model,
+    described_body,
+    errors,
+    refusals,
+)
 
 if TYPE_CHECKING:
-    from app.recording import Recorder
+    from app.cell.history import Recorder
+
+
+# What the page of diagnostics shows, as JSON for programs.
+
+
+def diagnostics_json(
+    session: RobotSession, survey: Survey, doctor: DoctorProcess, versions: Mapping[str, str]
+) -> dict[str, Any]:
+    """The content of a `DiagnosticsAnswer`, with texts in no language yet."""
+    panel, robot, now = session.panel, session.robot, time.monotonic()
+    topics = topic_rows(panel, robot, now)
+    behind = robots_in(survey.graph, robot.graph.every_peer)
+    used = {row.key for row in topics}
+    trips = {"bridge": robot.round_trips.summary(now), "node": session.node_trips.summary(now)}
+    return {
+        "versions": dict(versions),
+        "links": [
+            _link(name, link, trips.get(name))
+            | {"trip_note": trip_note(name, link, trips.get(name), session.node_trips)}
+            for name, link in session.publisher.view["link"].items()
+        ],
+        "topics": [_topic(row) for row in topics],
+        "servers": [fields_of(row) for row in server_rows(panel, robot, now)],
+        "parameters": [
+            {**fields_of(row), "read_at": _at(row.read_wall)} for row in parameter_rows(panel, robot)
+        ],
+        "graph": {
+            "at": _at(survey.wall),
+            "fault": survey.fault,
+            "nodes": [fields_of(row) for row in node_rows(behind)],
+            "topics": [fields_of(row) for row in graph_topic_rows(behind, used, survey.lost_topics)],
+        },
+        "doctor": _doctor(doctor),
+        "looks": sorted(session.looks.keys),
+    }
+
+
+def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
+    """The content of an `MqttAnswer`; None for a panel that does not publish its alarms."""
+    if not mqtt.address:
+        return None
+    return {
+        "address": mqtt.address,
+        "connected": mqtt.is_connected,
+        "state": mqtt.state,
+        "since": _at(mqtt.since),
+        "last_error": mqtt.last_error,
+        "waiting": mqtt.waiting,
+        "published": mqtt.published,
+        "dropped": mqtt.dropped,
+    }
+
+
+def fields_of(row: Any) -> dict[str, Any]:
+    """The fields of a dataclass. Texts in them are not copied."""
+    return {field.name: getattr(row, field.name) for field in fields(row)}
+
+
+def _at(wall: float) -> str | None:
+    return iso_time(wall) if wall else None
+
+
+def _link(name: str, link: LinkStatus, trips: RoundTripSummary | None) -> dict[str, Any]:
+    shown = {"state": link["state"], "text": link["text"], "reason": link["reason"]}
+    return {"name": name, **shown, "round_trips": round_trips_json(trips)}
+
+
+def round_trips_json(trips: RoundTripSummary | None) -> dict[str, Any] | None:
+    """In ms."""
+    if trips is None:
+        return None
+    numbers = {name: _ms(getattr(trips, name)) for name in ("least", "median", "most", "last")}
+    return {**numbers, "medians": [_ms(seconds) for seconds in trips.medians]}
+
+
+def _ms(seconds: float) -> float:
+    return round(seconds * 1000, 3)
+
+
+def _topic(row: TopicRow) -> dict[str, Any]:
+    content, undecodable = fields_of(row), row.undecodable
+    if undecodable is not None:
+        content["undecodable"] = {
+            "first": undecodable.first.hex(" "),
+            "size": undecodable.size,
+            "reason": undecodable.reason,
+            "at": _at(undecodable.wall),
+        }
+    return content
+
+
+def _doctor(doctor: DoctorProcess) -> dict[str, Any]:
+    report = doctor.report
+    return {
+        "running": doctor.is_busy,
+        "at": _at(doctor.wall),
+        "fault": doctor.fault,
+        "well": report.well if report else None,
+        "findings": [finding.model_dump(by_alias=True) for finding in report.findings]
+        if report
+        else [],
+        "more": report.more if report else {},
+        "facts": report.facts if report else [],
+    }
+
+
+def look_json(look: Look) -> dict[str, Any]:
+    """The content of a `LookAnswer`, with texts in no language yet."""
+    return {
+        "topic": look.topic.name,
+        "types": look.topic.types,
+        "received": look.received,
+        "fault": look.fault,
+        "messages": [
+            {"number": message.number, "at": _at(message.wall), **fields_of(message.content)}
+            for message in look.messages
+        ],
+    }
+
 
 router = APIRouter()
 
 DiagnosticAct = Annotated[str, Path(json_schema_extra={"enum": list(DIAGNOSTIC_ACTS)})]
 HEADERS: Final[Mapping[str, str]] = {"cache-control": "no-store", "vary": "accept"}
 FORM_FIELDS_MOST: Final = 8
+ACT_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "page": {}, "robot": {"maxLength": 64}})
 DEPTH: Final = 10  # of the bridge's reader for a look: two messages a second are shown
 ZIP: Final = "application/zip"
 
@@ -114,13 +249,11 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
         303: {"description": "of a form: back to the page, with the receipt's id"},
         503: {"description": "the operator's log can't be written, or the bundle not be made"},
     },
-    openapi_extra=described_body(
-        DiagnosticActBody, fields(id={"pattern": PRESS_ID}, page={}, robot={}), required=False
-    ),
+    openapi_extra=described_body(DiagnosticActBody, ACT_FORM.schema, required=False),
 )
 async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Response:
     session = _session(state, "")
-    is_form, content = await act_body_of(request, FORM_FIELDS_MOST)
+    is_form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
     body = as_model(DiagnosticActBody, {k: v for k, v in content.items() if k != "page" or not is_form})
     who, token = principal_with_new_token(request, state)
     act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
@@ -160,7 +293,7 @@ async def _page(
 ) -> Response:
     """The whole page, or its content alone."""
     language = language_of(request)
-    looked, refused = await _looked(session, "" if query.paused else query.look)
+    looked, refused = await _preview(session, "" if query.paused else query.look)
     survey = await _survey(session)
     trips = _page_trips(request, state, query.rtt)
     context = diagnostics_context(
@@ -200,7 +333,7 @@ def _page_trips(request: Request, state: AppState, rtt_ms: float | None) -> Roun
     return state.page_trips.summary(browser, now)
 
 
-async def _looked(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
+async def _preview(session: RobotSession, key: str) -> tuple[Look | None, TextLike]:
     """A look for the page, or why there is none; without a key neither."""
     if not key:
         return None, ""
@@ -224,21 +357,21 @@ async def _look(session: RobotSession, key: str) -> Look:
             if topic_forwarding(behind, topic) == "denied":
                 raise NotFound(say("look_not_forwarded", topic=name))
             return await session.looks.look(
-                _looked_topic(name, topic, bool(behind.bridges) and topic.key not in used)
+                _topic_preview(name, topic, bool(behind.bridges) and topic.key not in used)
             )
     raise NotFound(say("look_no_topic", topic=f"/{key}"))
 
 
-def _looked_topic(name: str, topic: SurveyedTopic, held: bool) -> LookedTopic:
+def _topic_preview(name: str, topic: SurveyedTopic, keeps_route: bool) -> TopicPreview:
     types = dict.fromkeys(end.type for end in topic.publishers or topic.subscribers)
     hashes = {end.type_hash for end in topic.publishers} - {""}
-    return LookedTopic(
+    return TopicPreview(
         name=name,
         key=topic.key,
         types=tuple(types),
         hashes=tuple(sorted(hashes)),
         qos=Qos(topic.reliable, topic.latched, DEPTH),
-        held=held and bool(topic.publishers),
+        keeps_route=keeps_route and bool(topic.publishers),
     )
 
 

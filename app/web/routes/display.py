@@ -7,9 +7,8 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
 from app.web.app_state import CurrentState
-from app.web.openapi_parts import TEXT, described_body, errors
-from app.web.rendering.display_choice import CHOICES, COOKIE, KEPT_S, LANGUAGE
-from app.web.request_body import body_of, form_of
+from app.web.pages.display_choice import CHOICES, COOKIE, KEPT_S, LANGUAGE
+from app.web.requests import TEXT, body_of, described_body, errors, form_of
 
 router = APIRouter()
 

@@ -10,23 +10,23 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
+from app.cell.permission.roles import unmet
+from app.cell.view.publisher import ViewPublisher, beat, client_id_event
+from app.cell.view.view import EVERYONE, NOTHING, Audience, audience, audience_of
 from app.panel.rules import ControlRules
-from app.permission.role_locks import unmet
-from app.view.audience import EVERYONE, NOTHING, Audience, audience, audience_of
-from app.view.heartbeat import beat
-from app.view.publisher import ViewPublisher, client_id_event
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.asgi import server_send
-from app.web.client_cookie import (
+from app.web.client import (
     Caller,
     caller,
+    from_frame,
+    only_shows,
     principal_with_new_token,
     set_client_cookie,
 )
-from app.web.embedding import from_frame, only_shows
 from app.web.language import language_of
 from app.web.metrics import Open
-from app.web.openapi_parts import TEXT, errors
+from app.web.requests import TEXT, errors
 
 router = APIRouter()
 
@@ -65,7 +65,8 @@ async def events(
     shown = publisher.shown_page(page)
     answer: Response
     if once:
-        everything = publisher.snapshot(current(), shown) + first + beat(language)
+        with publisher.watching(shown):
+            everything = publisher.snapshot(current(), shown) + first + beat(language)
         answer = Response(everything, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
         renewed = partial(asks.signed_in_since, state)
@@ -127,7 +128,12 @@ class EventStream(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
-        with self._streams.another(), self._publisher.heartbeat.heard():
+        publisher = self._publisher
+        with (
+            self._streams.another(),
+            publisher.heartbeat.heard(),
+            publisher.watching(self._page),
+        ):
             async with asyncio.TaskGroup() as group:
                 # A task of its own: waking it wakes nothing of what the request came through.
                 writing = group.create_task(self._write(server_send(scope, send)))

@@ -20,18 +20,17 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Query, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 
-from app.clock import format_time
-from app.concurrency import spawn_logged
-from app.errors import NotFound, TooMany
-from app.i18n import render, say
-from app.panel.widgets.camera import Camera
-from app.robot.pictures import NoPicture, Picture
-from app.runtime.frames import Feed, Frame
+from app.cell.robot.pictures import NoPicture, Picture
+from app.cell.session.frames import Feed, Frame
+from app.panel.widgets.displays import Camera
+from app.system.clock import format_time
+from app.system.concurrency import spawn_logged
+from app.system.errors import NotFound, TooMany
+from app.system.texts import render, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import caller, client_of
+from app.web.client import caller, client_of
 from app.web.language import language_of
-from app.web.openapi_parts import Described, errors
-from app.web.request_body import received
+from app.web.requests import Described, errors, received
 
 log = logging.getLogger("kiosk.web")
 

@@ -7,11 +7,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from pydantic import BaseModel
 
-from app.i18n import render
+from app.system.texts import render
 from app.web.app_state import CurrentState
 from app.web.language import language_of
 from app.web.metrics import Metrics
-from app.web.openapi_parts import errors
+from app.web.requests import errors
 
 router = APIRouter()
 

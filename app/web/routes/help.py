@@ -1,15 +1,59 @@
-"""The page of help: what the signs of pages mean, and the version."""
+"""The page of help: the signs of pages, each with what it means, and the version."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Final, NamedTuple
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, Response
 
-from app.i18n import say
+from app.system.texts import Text, say
 from app.web.app_state import CurrentState
-from app.web.framed_page import FramedPage, framed_page
-from app.web.openapi_parts import errors
-from app.web.rendering.help_page import signs
+from app.web.pages.context import FramedPage, framed_page
+from app.web.requests import errors
+
+
+class Sign(NamedTuple):
+    """`kind` is how it is drawn (in `help.html`), `name` which of that kind."""
+
+    kind: str
+    name: str
+    meaning: Text
+
+
+_SIGNS: Final[Mapping[Text, tuple[Sign, ...]]] = {
+    say("help_buttons"): (
+        Sign("key", "locked", say("help_locked")),
+        Sign("key", "hold", say("help_hold")),
+        Sign("key", "stop", say("help_stop")),
+        Sign("icon", "ellipsis", say("help_more")),
+    ),
+    say("help_values"): (
+        Sign("value", "old", say("help_old")),
+        Sign("lamp", "waiting", say("help_waiting")),
+        Sign("lamp", "unknown", say("help_unknown")),
+        Sign("lamp", "unreadable", say("help_unreadable")),
+    ),
+    say("help_links"): (
+        Sign("link", "ok", say("help_link_ok")),
+        Sign("link", "wait", say("help_link_wait")),
+        Sign("link", "bad", say("help_link_bad")),
+        Sign("banner", "", say("help_simulated")),
+    ),
+}
+_ALARMS: Final[Mapping[Text, tuple[Sign, ...]]] = {
+    say("help_alarms"): (
+        Sign("alarm", "1", say("help_alarm_1")),
+        Sign("alarm", "2", say("help_alarm_2")),
+        Sign("alarm", "3", say("help_alarm_3")),
+        Sign("alarm", "4", say("help_alarm_4")),
+    ),
+}
+
+
+def signs(has_alarms: bool) -> Mapping[Text, tuple[Sign, ...]]:
+    """The signs by the title of their part; those of alarms of a panel that has some."""
+    return {**_SIGNS, **_ALARMS} if has_alarms else _SIGNS
+
 
 router = APIRouter()
 

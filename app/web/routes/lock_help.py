@@ -5,16 +5,15 @@ import time
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, Response
 
-from app.errors import NotFound
-from app.i18n import render, say
+from app.cell.view.lock_help import LockHelp, lock_help, without_page
 from app.panel.widgets.families import Command
-from app.view.lock_help import LockHelp, lock_help, without_page
+from app.system.errors import NotFound
+from app.system.texts import render, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.assets import PICTURES
-from app.web.client_cookie import principal_of
-from app.web.embedding import is_embedded, only_shows
+from app.web.client import is_embedded, only_shows, principal_of
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, errors
+from app.web.requests import PAGE, errors
 
 router = APIRouter()
 

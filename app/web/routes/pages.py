@@ -6,22 +6,26 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment
 
-from app.errors import NotFound
-from app.i18n import say
 from app.panel.layout import Page
 from app.panel.robot_panels import page_for
 from app.panel.widgets.families import EntryWidget
+from app.system.errors import NotFound
+from app.system.texts import say
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import (
+from app.web.client import (
+    QUERY,
+    frame_ancestors,
+    is_embedded,
+    only_shows,
     opened_by_person,
     principal_of,
     principal_with_new_token,
+    says_embedded,
     set_client_cookie,
 )
-from app.web.embedding import QUERY, frame_ancestors, is_embedded, only_shows, says_embedded
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, Described, errors
-from app.web.rendering.page_context import page_context
+from app.web.pages.context import page_context
+from app.web.requests import PAGE, Described, errors
 from app.web.route_needs import check_page
 from app.web.security import POLICY, content_security_policy
 
@@ -90,10 +94,15 @@ async def named_page(page: str, request: Request, state: CurrentState) -> Respon
     return _render(request, state, shown)
 
 
+def is_of_a_page(name: str) -> bool:
+    """Whether a file of the templates' folder is a template of a panel's pages."""
+    return name.endswith(".html") and name not in OTHER_PAGES
+
+
 async def compiled(templates: Environment) -> None:
     """Compiles the templates of a page, so that the first page is as quick as the next."""
     await asyncio.sleep(COMPILED_AFTER_S)
-    for name in templates.list_templates(filter_func=lambda name: name not in OTHER_PAGES):
+    for name in templates.list_templates(filter_func=is_of_a_page):
         templates.get_template(name)
         await asyncio.sleep(0)
 

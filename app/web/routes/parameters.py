@@ -5,12 +5,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
-from app.i18n import render
+from app.system.texts import render
 from app.web.app_state import CurrentSession, CurrentState, PageSession
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, errors
-from app.web.request_body import body_of, kind_of
-from app.web.routes.press_forms import page_after
+from app.web.requests import FORM, body_of, errors, kind_of
+from app.web.routes.presses import page_after
 
 router = APIRouter()
 

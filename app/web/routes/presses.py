@@ -1,59 +1,354 @@
-"""A press over HTTP as JSON; `press_forms` has what browsers without scripts send."""
+"""Presses over HTTP: as JSON, by WebSocket, and as forms for a browser without scripts."""
 
+import asyncio
+import json
+import logging
+import re
 import secrets
-from collections.abc import Mapping
-from typing import Annotated, Final
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Final, NamedTuple
+from urllib.parse import quote
 
-from fastapi import APIRouter, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
+from fastapi import APIRouter, Query, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
+from starlette.types import Message
 
-from app.commands.press import EVENT_ID, MAX_ID_LENGTH, PRESS_ID, Press
-from app.commands.press_limits import RETRY_AFTER_S
-from app.commands.receipts import Receipt
-from app.errors import InputError
-from app.i18n import localized
+from app.cell.commands.judge import RETRY_AFTER_S
+from app.cell.commands.press import EVENT_ID, MAX_ID_LENGTH, PRESS_ID, Press
+from app.cell.commands.receipts import Receipt
+from app.cell.people.access import Attempt, SecretCheck
+from app.cell.people.confirmer import Question
+from app.cell.people.secrets_hash import LONGEST
+from app.cell.people.users import LONGEST_NAME
+from app.cell.permission.roles import ConfirmedBy
+from app.cell.session.session import RobotSession
+from app.panel.layout import Page
+from app.panel.model import Panel
 from app.panel.widgets.families import PressCommand
-from app.permission.principal import Principal
-from app.runtime.robot_session import RobotSession
+from app.panel.widgets.recipe_load import RecipeLoad
+from app.panel.widgets.switch import Switch
+from app.panel.widgets.templated import is_stop
+from app.records.principal import Principal
+from app.system import clock
+from app.system.errors import InputError, KioskError, TooMany
+from app.system.printable import printable_texts
+from app.system.texts import TextLike, localized, say
+from app.web.answers import STATUS, ReceiptAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession
-from app.web.client_cookie import caller, principal_of
-from app.web.confirmations import LONGEST_TOKEN, confirmed
+from app.web.client import LONGEST_TOKEN, caller, confirmed, inputs_of, principal_of
 from app.web.language import language_of
-from app.web.openapi_parts import (
+from app.web.pages.confirm import Subject, confirm_sheet, digits_key, press_subject, question_before
+from app.web.pages.display_choice import DisplaySettings, display_of
+from app.web.requests import (
     FORM,
     JSON,
+    MOMENT,
     PAGE,
     TEXT,
     Described,
     ErrorAnswer,
+    FormFields,
+    Moment,
+    as_model,
+    body_of,
     described_body,
     errors,
-    fields,
+    form_of,
+    json_of,
+    kind_of,
+    received,
     refusals,
 )
-from app.web.receipt_answer import ReceiptAnswer
-from app.web.rendering.display_choice import display_of
-from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.confirm_forms import PressForm, Reader
-from app.web.routes.press_forms import page_after, pressed_by_form
+
+# A press that a person confirms, by forms for a browser without scripts: a page asks for the PIN.
+
+# The fields of the sheet. None of them is shown again, logged or taken for an input.
+FIELDS: Final = ("_digit", "_user", "_pin", "_password", "_badge")
+
+
+class Reader(NamedTuple):
+    """The language and the display choices of a browser."""
+
+    language: str
+    display: DisplaySettings
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmForm:
+    """A form that a person may confirm. `fields` are its texts: of inputs, and of the page, whose names
+    begin with "_"; the latter are removed as they are read. `session` is the id of the session of a
+    signed-in user."""
+
+    principal: Principal
+    fields: dict[str, str] = field(repr=False)
+    session: str = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class PressForm(ConfirmForm):
+    """A form that presses a widget. `stopped` are the robots of a press that stops several."""
+
+    widget: PressCommand
+    reader: Reader
+    stopped: Sequence[RobotSession] = ()
+
+
+def entered_fields(fields: dict[str, str]) -> dict[str, str]:
+    """What is entered in the sheet, which the fields lose with it."""
+    return {name: fields.pop(name, "")[:LONGEST] for name in FIELDS}
+
+
+async def confirmed_by_form(
+    state: AppState, session: RobotSession, form: PressForm, too_soon: bool
+) -> tuple[ConfirmedBy | None, dict[str, Any]]:
+    """Who has confirmed the press of a form; else the sheet to be shown, with what is missing. A tap
+    that comes `too_soon` confirms nothing."""
+    entered, who = entered_fields(form.fields), form.principal
+    value = form.fields.get(form.widget.id, "")
+    subject = press_subject(state, session, form.widget, value)
+    failed: TextLike = ""
+    if entered["_digit"] not in ("", "enter"):
+        state.access.typed_digits.press(who.client.id, digits_key(subject.id), entered["_digit"])
+    elif entered["_digit"] == "enter" and not too_soon:
+        inputs = inputs_of(form.widget, dict(form.fields))
+        confirmed, checked = await checked_entry(state, subject, inputs, form, entered)
+        if confirmed is not None:
+            return confirmed, {}
+        failed = checked.reason
+        if checked.tries_left:
+            failed = say("signin_tries_left", why=failed, count=str(checked.tries_left))
+    sheet = confirm_sheet(state, subject, who, entered["_user"])
+    return None, {**sheet, "failed": failed, "scripted": False}
+
+
+async def checked_entry(
+    state: AppState, subject: Subject, inputs: str, form: ConfirmForm, entered: dict[str, str]
+) -> tuple[ConfirmedBy | None, SecretCheck]:
+    """Who confirmed it with what was entered; else what was wrong. `inputs` is their fingerprint."""
+    who, digits = form.principal, digits_key(subject.id)
+    entered["_pin"] = entered["_pin"] or state.access.typed_digits.read(who.client.id, digits)
+    state.access.typed_digits.press(who.client.id, digits, "clear")
+    ways = [way for way in ("_badge", "_password", "_pin") if entered[way]]
+    if not ways:
+        return None, _missing("confirm_empty")
+    (way, *_) = ways
+    name = entered["_user"][:LONGEST_NAME] if way != "_badge" else ""
+    if subject.confirmation == "two_persons" and way != "_badge" and not name:
+        return None, _missing("confirm_who")
+    question = Question(subject.id, inputs, subject.confirmation, subject.needs)
+    attempt = Attempt(name, _WAYS[way], entered[way])
+    user_session = state.access.sessions.get(form.session, who.client.id)
+    try:
+        checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
+    except (InputError, TooMany) as error:
+        return None, SecretCheck(None, error.text, "confirm_busy")
+    return state.confirmer.take(token, form.session, subject.id, inputs), checked
+
+
+def _missing(code: str) -> SecretCheck:
+    return SecretCheck(None, say(code), code)
+
+
+_WAYS: Final[dict[str, Any]] = {"_badge": "badge", "_password": "password", "_pin": "pin"}
+
+
+# A press as a form, for a browser without scripts: the answer is the page again, with the receipt.
+
+CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
+TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
+QUESTION_LIFE_S: Final = 30.0  # the answer is a press, and no later one
+
+
+async def pressed_by_form(
+    state: AppState, page: RobotSession, session: RobotSession, form: PressForm
+) -> Response:
+    """The response to a press: a redirect to the page with its receipt, or the question before the
+    press. `session` is that of the widget's robot, `page` that of the robot whose page it was."""
+    fields, refusals = form.fields, session.presses.early_refusals
+    too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
+    if is_stop(form.widget) and not form.widget.asks:
+        too_soon = False  # to stop twice does no harm
+    shown_on = fields.pop("_page", "")
+    by, answered = None, fields.pop(CONFIRMED, "") == "yes" and not too_soon
+    if form.widget.confirmation and form.principal.user:
+        by, sheet = await confirmed_by_form(state, session, form, too_soon)
+        if by is None:
+            return _ask(state, page, session, form, shown_on, sheet)
+    elif form.widget.asks and not answered:
+        return _ask(state, page, session, form, shown_on, {})
+    press = replace(_press_of(state, session, form), confirmed=by)
+    if not state.limits.admit(press.principal):
+        receipt = refusals.limited(press, shown=True)
+    elif form.stopped and not too_soon:
+        receipt = await state.fleet.group_stops.press(form.stopped, press, state.counted)
+    else:
+        session.press_guard.receive(press)
+        work = refusals.too_soon(press, before) if too_soon else session.presses.press(press)
+        receipt = await state.counted(work)
+    path = page_after(state, page, press.widget.id, receipt.id, shown_on)
+    return RedirectResponse(path, status_code=303)
+
+
+def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[PressCommand]:
+    """The press of a form. One rendered page has one id for all its buttons, and each button is a press
+    of its own."""
+    fields, widget = form.fields, form.widget
+    page_id = fields.pop("_id", secrets.token_hex(8))
+    if not re.fullmatch(PRESS_ID, page_id):
+        raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
+    seen, until = fields.pop("_seen", ""), _until(fields)
+    language = _language(state, form)
+    inputs = session.dispatcher.parse_form(fields, language)
+    return Press(f"{page_id}.{widget.id}", widget, inputs, form.principal, seen, until)
+
+
+def _ask(
+    state: AppState,
+    page: RobotSession,
+    session: RobotSession,
+    form: PressForm,
+    shown_on: str,
+    sheet: Mapping[str, Any],
+) -> Response:
+    """The page that asks before a press; its answer is the press. `sheet` is that of a person who
+    confirms it."""
+    widget = form.widget
+    question = question_before(state.fleet, session, widget, form.fields.get(widget.id, ""))
+    html = state.templates.render(
+        "ask.html",
+        form.reader.language,
+        site=state,
+        display=form.reader.display,
+        panel=state.fleet.panel,
+        banner=session.publisher.view["notice"]["banner"],
+        **({} if sheet else {"question": question}),
+        action=f"{page.base}/widgets/{widget.id}{_robots(form)}",
+        back=page_after(state, page, widget.id, "", shown_on),
+        fields={
+            **form.fields,
+            "_page": shown_on,
+            CONFIRMED: "yes",
+            "_seen": page.publisher.id,
+            "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
+            "_since": str(round(clock.server_now(), 3)),
+        },
+        entries=printable_texts(form.fields),
+        no=say("back"),
+        empty=say("empty"),
+        label=_label(form),
+        **sheet,
+    )
+    return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+def _robots(form: PressForm) -> str:
+    """The query that names the robots of a press that stops several."""
+    names = ",".join(str(session.entry.id) for session in form.stopped if session.entry)
+    return f"?robots={names}" if names else ""
+
+
+def _label(form: PressForm) -> TextLike:
+    """The label of the button that was touched."""
+    widget = form.widget
+    if isinstance(widget, Switch):
+        return widget.on if form.fields.get(widget.id) == "true" else widget.off
+    if isinstance(widget, RecipeLoad):
+        return say("recipes_load")
+    return widget.label
+
+
+def _page_of(panel: Panel, widget: str, shown_on: str) -> Page:
+    """The page of a widget that it was `shown_on`, else the first with it; one in the frame is on every
+    page."""
+    pressed_on = panel.page(shown_on)
+    if any(shown.id == widget for shown in panel.frame.widgets):
+        return pressed_on or panel.pages[0]
+    if pressed_on and any(shown.id == widget for shown in pressed_on.widgets):
+        return pressed_on
+    return next(page for page in panel.pages if any(shown.id == widget for shown in page.widgets))
+
+
+def _until(fields: dict[str, str]) -> float | None:
+    """When a page without scripts should have reloaded, if that is over, else now.
+
+    It can't say when it was pressed, but a page that does not reload itself is none to press on.
+    """
+    until = _moment(fields, "_until")
+    return until if until is None else min(until, clock.server_now())
+
+
+def _language(state: AppState, form: PressForm) -> str:
+    """The language of the page whose form this is: another page of the browser may have changed its
+    language since. A program's form has the language of its request."""
+    language = form.fields.pop("_language", form.reader.language)
+    panel = state.fleet.panel
+    if language not in (*panel.readers_languages, panel.language):
+        raise InputError(f'_language: "{language:.40}" is not a language of this panel')
+    return language
+
+
+def _is_second_tap(fields: dict[str, str]) -> bool:
+    """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
+    brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
+    shown_at = _moment(fields, "_since")
+    return shown_at is not None and clock.server_now() - shown_at < TAP_AGAIN_S
+
+
+def _moment(fields: dict[str, str], name: str) -> float | None:
+    text = fields.pop(name, "")
+    if not text:
+        return None
+    if not re.fullmatch(MOMENT, text):
+        raise InputError(f'{name}: "{text:.40}" is not that of a page')
+    return float(text)
+
+
+def page_after(
+    state: AppState, page: RobotSession, widget: str, receipt_id: str, shown_on: str = ""
+) -> str:
+    """The path of a widget's page, with a receipt if there is one. `page` is the session of the robot
+    whose page it was, `shown_on` the page's id where it was pressed, "" if unknown."""
+    panel = state.fleet.panel
+    loads = {load.id: load for load in panel.recipe_loads}
+    if widget in loads:
+        path = f"{page.base}/recipes/{widget}"
+        recipe = recipe_of(page, loads[widget], receipt_id)
+        path += f"?recipe={quote(recipe)}" if recipe else ""
+    else:
+        path = f"{page.base}/pages/{_page_of(panel, widget, shown_on).id}"
+    receipt = f"{'&' if '?' in path else '?'}receipt={quote(receipt_id)}" if receipt_id else ""
+    return path + receipt
+
+
+def recipe_of(session: RobotSession, load: RecipeLoad, receipt_id: str) -> str:
+    """The id of the recipe of a press; "" if it is not known."""
+    receipt = session.presses.receipt(receipt_id)
+    value = receipt.inputs.get(load.id, "") if receipt else ""
+    return str(value).rpartition("@")[0]
+
+
+def is_second_tap(form: Mapping[str, str]) -> bool:
+    """Whether the form of an act, on a page without scripts, is sent sooner than anyone reads it."""
+    return _is_second_tap({"_since": form["_since"]}) if "_since" in form else False
+
 
 router = APIRouter()
 
-STATUS: Final[Mapping[str, int]] = {
-    "": 200,
-    "interlock": 409,
-    "input": 422,
-    "link": 503,
-    "log": 503,
-    "time": 504,
-    "limit": 429,
-    "role": 403,
-}
-
-
 # Pydantic's own has a reference within the model, which is not the description's.
 INPUTS: Final = {"type": "object", "description": "values by the ids of inputs"}
+
+
+Robots = Annotated[
+    str,
+    Query(
+        max_length=4000,
+        description="of a stop button of the frame: the ids of the robots to stop, by commas; each gets"
+        " the command, and `receipts` has the receipt of each",
+    ),
+]
 
 
 class PressBody(BaseModel):
@@ -64,7 +359,7 @@ class PressBody(BaseModel):
     inputs: Annotated[dict[str, JsonValue], WithJsonSchema(INPUTS)]
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(pattern=EVENT_ID)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
     confirmation: Annotated[str, Field(max_length=LONGEST_TOKEN)] = ""
 
     def press(self, widget: PressCommand, principal: Principal) -> Press[PressCommand]:
@@ -80,6 +375,8 @@ class Cancel(BaseModel):
 
     press: str = ""
 
+
+CANCEL_FORM: Final = FormFields({"_press": {}}, has_values=True)
 
 RECEIPTS: Final[Described] = (
     errors(404, 408, 413)
@@ -113,19 +410,25 @@ RECEIPTS: Final[Described] = (
     ),
 )
 async def press(
-    widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
+    widget: str,
+    request: Request,
+    state: CurrentState,
+    session: CurrentSession,
+    page: PageSession,
+    robots: Robots = "",
 ) -> Response:
     command = session.presses.widget(widget)
+    stopped = state.fleet.stopped(widget, robots) if robots else ()
     who = principal_of(request, state)
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
         posted = as_model(PressBody, json_of(body))
         pressed = confirmed(state, caller(request), posted.press(command, who), posted.confirmation)
-        return _answer(request, await receipt_of_press(state, session, pressed))
+        return _answer(request, await receipt_of_press(state, session, pressed, stopped))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        form = PressForm(who, form_of(body), caller(request).session, command, reader)
+        form = PressForm(who, form_of(body), caller(request).session, command, reader, stopped)
         return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
@@ -134,8 +437,8 @@ async def press(
     "/widgets/{widget}/cancel",
     response_model=ReceiptAnswer,
     summary="Ask the robot to cancel an action's goal",
-    responses=RECEIPTS | errors(422),
-    openapi_extra=described_body(Cancel, fields(_press={}), required=False),
+    responses=errors(422) | RECEIPTS,
+    openapi_extra=described_body(Cancel, CANCEL_FORM.schema, required=False),
 )
 async def cancel(
     widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
@@ -161,11 +464,17 @@ async def cancel(
 
 
 async def receipt_of_press(
-    state: AppState, session: RobotSession, press: Press[PressCommand]
+    state: AppState,
+    session: RobotSession,
+    press: Press[PressCommand],
+    stopped: Sequence[RobotSession] = (),
 ) -> Receipt:
-    """The receipt of a press in JSON, from HTTP or from a WebSocket."""
+    """The receipt of a press in JSON, from HTTP or from a WebSocket. `stopped` are the robots of a
+    press that stops several."""
     if not state.limits.admit(press.principal):
         return session.presses.early_refusals.limited(press)
+    if stopped:
+        return await state.fleet.group_stops.press(stopped, press, state.counted)
     session.press_guard.receive(press)
     return await state.counted(session.presses.press(press))
 
@@ -174,3 +483,121 @@ def _answer(request: Request, receipt: Receipt) -> Response:
     content = localized(receipt.as_json(), language_of(request))
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+
+
+# Presses by WebSocket: a page opens one at its first touch, and sends all its presses there.
+#
+# A press has the fields of a post's body, and `widget`. Its `id` is required, since answers come in any
+# order. `status` is that of the answer to a post, with a receipt or an `error`:
+#
+#     browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<instance>-<n>", "at": …}
+#     server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "code": "…", …}
+#     server   {"press": "5f…", "status": 404, "error": "…"}
+#
+# A client that closes the socket loses only the answers: presses that were begun are finished and
+# logged.
+
+log = logging.getLogger("kiosk.presses")
+
+
+MOST_AT_ONCE: Final = 16  # presses of one socket that have no answer yet
+MOST_REFUSED: Final = (
+    100  # messages of one socket, one after the other, that are no press or one too many
+)
+POLICY_VIOLATION: Final = 1008  # RFC 6455
+PLACE: Final = "the message"
+
+
+class SocketPress(PressBody):
+    """The message of one press; `robots` as in the query of a post."""
+
+    widget: str
+    id: Annotated[str, Field(pattern=PRESS_ID)]
+    robots: str = ""
+
+
+@router.websocket("/presses")
+async def presses(socket: WebSocket, state: CurrentState, session: CurrentSession) -> None:
+    """`session` is a dependency only to refuse the socket if there is no such robot."""
+    await socket.accept()
+    await _PressSocket(socket, state).run()
+
+
+class _PressSocket:
+    """One socket and its presses. Each press names the view that its page shows."""
+
+    __slots__ = ("_caller", "_in_flight", "_language", "_refused", "_socket", "_state")
+
+    def __init__(self, socket: WebSocket, state: AppState) -> None:
+        self._socket = socket
+        self._state = state
+        self._caller = caller(socket)
+        self._language = language_of(socket)
+        self._in_flight: set[asyncio.Task[None]] = set()
+        self._refused = 0  # one after the other
+
+    async def run(self) -> None:
+        """Reads presses until the socket is closed, then waits until all have ended."""
+        try:
+            while (message := await received(self._socket))["type"] == "websocket.receive":
+                await self._begin(message)
+                if self._refused >= MOST_REFUSED:
+                    await self._socket.close(POLICY_VIOLATION)
+                    break
+        finally:
+            await asyncio.gather(*self._in_flight)
+
+    async def _begin(self, message: Message) -> None:
+        """Starts the press of a message, without waiting for its receipt."""
+        fields: Any = None
+        try:
+            text = message.get("text")
+            if text is None:
+                raise InputError(f"{PLACE} is not text")
+            fields = json_of(text, PLACE)
+            body = as_model(SocketPress, fields, PLACE)
+        except InputError as error:
+            await self._refuse(_press_id(fields), error.status, error.text)
+            return
+        if len(self._in_flight) >= MOST_AT_ONCE:
+            await self._refuse(body.id, 429, say("press_too_many_pending", most=MOST_AT_ONCE))
+            return
+        task = asyncio.create_task(self._press(body))
+        self._in_flight.add(task)
+        task.add_done_callback(self._in_flight.discard)
+
+    async def _press(self, body: SocketPress) -> None:
+        state, socket = self._state, self._socket
+        try:
+            shown = state.fleet.session(socket.path_params.get("robot"))
+            session = state.fleet.session_for(shown, body.widget)
+            who = self._caller.principal(state)
+            press = body.press(session.presses.widget(body.widget), who)
+            press = confirmed(state, self._caller, press, body.confirmation)
+            stopped = state.fleet.stopped(body.widget, body.robots) if body.robots else ()
+            receipt = await receipt_of_press(state, session, press, stopped)
+        except KioskError as error:
+            await self._answer(body.id, error.status, error=error.text)
+        except Exception:
+            log.exception("press %s broke off", body.id)
+            await self._answer(body.id, 500, error=say("press_server_error"))
+        else:
+            self._refused = self._refused + 1 if receipt.cause == "limit" else 0
+            await self._answer(body.id, STATUS[receipt.cause], **receipt.as_json())
+
+    async def _refuse(self, press_id: str | None, status: int, error: TextLike) -> None:
+        self._refused += 1
+        await self._answer(press_id, status, error=error)
+        await asyncio.sleep(0)  # much may come in one piece: others have their turn
+
+    async def _answer(self, press_id: str | None, status: int, **fields: TextLike | None) -> None:
+        answer = localized({"press": press_id, "status": status, **fields}, self._language)
+        text = json.dumps(answer, ensure_ascii=False)
+        with suppress(WebSocketDisconnect, RuntimeError):  # the client is gone
+            await self._socket.send_text(text)
+
+
+def _press_id(fields: object) -> str | None:
+    """The press id in an invalid message, None without one."""
+    press_id = fields.get("id") if isinstance(fields, dict) else None
+    return press_id if isinstance(press_id, str) and re.fullmatch(PRESS_ID, press_id) else None

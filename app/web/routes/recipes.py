@@ -1,48 +1,191 @@
 """Recipes: their page, the acts on them, and CSV. JSON for programs, forms for pages. Loading a recipe
 is a press of its set (`POST /widgets/{set}`)."""
 
-import re
+import asyncio
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal, NamedTuple
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
-from app.errors import InputError, NotFound
-from app.i18n import Text, TextLike, localized, say
-from app.recipes.book import RecipeBook
-from app.recipes.csv_text import csv_text
-from app.recipes.recipe import clean_name
-from app.runtime.robot_session import RobotSession
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.judge import RETRY_AFTER_S
+from app.cell.commands.press import PRESS_ID
+from app.cell.commands.recipe_acts import RECIPE_ACTS
+from app.cell.permission.roles import ConfirmedBy, role_verdict
+from app.cell.recipes.book import RecipeBook
+from app.cell.recipes.recipe import (
+    MAX_CSV_BYTES,
+    BadRow,
+    ReadRow,
+    clean_name,
+    csv_text,
+    decoded,
+    differences,
+    read_rows,
+    value_text,
+)
+from app.cell.session.session import RobotSession
+from app.panel.base import ID
+from app.system.errors import InputError, NotFound
+from app.system.texts import Text, TextLike, localized, number, say
+from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client_cookie import principal_with_new_token, set_client_cookie
-from app.web.framed_page import FramedPage, framed_page
+from app.web.client import caller, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.openapi_parts import FORM, JSON, TEXT, described_body, errors, fields, refusals
-from app.web.rendering.recipe_ask import recipe_ask
-from app.web.rendering.recipes_page import Mode, entries_of, recipes_context, word
-from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.confirm_forms import entered_fields
-from app.web.routes.press_forms import is_second_tap
-from app.web.routes.presses import STATUS
-from app.web.routes.recipe_confirm import ActName, Edit, SetId, confirmed_edit
+from app.web.pages.confirm import Subject, confirm_sheet, digits_key, recipe_ask
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.recipe_comparison import comparison, seen_of
+from app.web.pages.recipes_page import Mode, entries_of, recipes_context, word
+from app.web.pages.words import Ask, AskedChange
+from app.web.requests import (
+    FORM,
+    JSON,
+    LONGEST,
+    SINCE,
+    TEXT,
+    FormFields,
+    Moment,
+    as_model,
+    body_of,
+    described_body,
+    errors,
+    form_of,
+    json_of,
+    kind_of,
+    refusals,
+)
+from app.web.routes.presses import ConfirmForm, checked_entry, entered_fields, is_second_tap
+
+# Changes of recipes that a person confirms with a PIN, password or badge: the page that asks for it.
+#
+# Only forms can be confirmed, which the pages of recipes send with scripts and without.
 
 router = APIRouter()
+
+WORDS: Final = {"create": "new", "save": "save"}  # of acts whose word has another name
+
+
+SetId = Annotated[str, Path(pattern=ID, description="the id of a [[recipe]]")]
+ActName = Annotated[str, Path(json_schema_extra={"enum": list(RECIPE_ACTS)})]
+
+
+class Edit(NamedTuple):
+    """An act on a recipe of a set as a form has it: `values` are what it sends."""
+
+    book: RecipeBook
+    act: str
+    recipe: str
+    values: dict[str, Any]
+    form: dict[str, str]
+    entered: dict[str, str]
+
+
+@router.get(
+    "/recipes/{set}/{act}",
+    summary="Back to the set: a page that asks for a PIN is not loaded again",
+    responses=errors(403, 404, 422) | {303: {"description": "to the page of the set"}},
+)
+async def asked_before(
+    set: SetId, act: ActName, state: CurrentState, session: CurrentSession
+) -> Response:
+    if state.fleet.recipes.book(set) is None:
+        raise NotFound(f'there are no recipes "{set:.64}" on this panel')
+    return RedirectResponse(f"{session.base}/recipes/{set}", status_code=303)
+
+
+@router.get(
+    "/recipes/{set}/import",
+    summary="Back to the set: the page that compares an import is not loaded again",
+    responses=errors(403, 404, 422) | {303: {"description": "to the page of the set"}},
+)
+async def compared_before(set: SetId, state: CurrentState, session: CurrentSession) -> Response:
+    return await asked_before(set, "import", state, session)
+
+
+async def confirmed_edit(
+    request: Request, state: AppState, session: RobotSession, edit: Edit
+) -> tuple[ConfirmedBy | None, Response | None]:
+    """Who has confirmed an act; else the page that asks. (None, None) for one that needs none, or
+    that is refused without a PIN."""
+    client, subject = caller(request), _subject(edit)
+    who = client.principal(state)
+    if subject is None or not who.user or role_verdict(subject.needs, who):
+        return None, None
+    entered, digit = edit.entered, edit.entered["_digit"]
+    failed: TextLike = ""
+    too_soon = is_second_tap(edit.form)
+    typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
+    if digit and digit != "enter":
+        state.access.typed_digits.press(who.client.id, digits_key(subject.id), digit)
+    elif digit and (typed or not too_soon):
+        form = ConfirmForm(who, edit.form, client.session)
+        by, checked = await checked_entry(state, subject, edit.act, form, entered)
+        if by is not None:
+            edit.form.pop("_since", None)
+            return by, None
+        failed = checked.reason
+        if checked.tries_left:
+            failed = say("signin_tries_left", why=failed, count=str(checked.tries_left))
+    elif not digit and too_soon:
+        return None, None
+    set_id, base = edit.book.load.id, session.base
+    context: dict[str, Any] = {
+        **confirm_sheet(state, subject, who, entered["_user"]),
+        "action": f"{base}/recipes/{set_id}/{edit.act}",
+        "away": f"{base}/recipes/{set_id}" + (f"?recipe={edit.recipe}" if edit.recipe else ""),
+        "no": say("back"),
+        "fields": {name: text for name, text in edit.form.items() if name != "_since"},
+        "failed": failed,
+        "scripted": False,
+    }
+    robot = session.entry.id if session.entry else ""
+    path = f"recipes/{set_id}"
+    framed = FramedPage("alarm-confirm.html", word("title"), robot, recipes_page=path)
+    return None, framed_page(request, state, framed, context)
+
+
+def _subject(edit: Edit) -> Subject | None:
+    """What is confirmed; None for a set whose changes need none."""
+    load = edit.book.load
+    confirmation = load.set.confirm_edit
+    if confirmation is None:
+        return None
+    recipe = edit.book.recipe(edit.recipe)
+    act = word(WORDS.get(edit.act, edit.act))
+    new = edit.values.get("values")
+    old = recipe.values if recipe is not None else {}
+    known = {field.id: field for field in load.fields}
+    changed = differences(known, old, new) if isinstance(new, dict) else []
+    changes = [
+        AskedChange(
+            known[change.field].label,
+            value_text(known[change.field], change.old),
+            value_text(known[change.field], change.new),
+        )
+        for change in changed
+    ]
+    name = edit.values.get("name") or (recipe.name if recipe is not None else load.label)
+    ask = Ask(
+        sentence=say("alarms_confirm", act=act, alarm=name),
+        inputs=[],
+        changes=changes,
+        note=word("loads", count=number(str(len(changes)))) if changes else "",
+    )
+    needs = frozenset({RECIPE_ACTS[edit.act].needs})
+    return Subject(f"recipe {load.id}", confirmation, needs, ask, act)
+
 
 TOO_OFTEN: Final = say("control_too_often")
 TOO_SOON: Final = say("press_too_soon")
 CSV: Final = "text/csv"
 RecipeId = Annotated[str, Field(max_length=64)]
 # Fields of a form that are not the value of an input: "-" stands before them, as before no input.
-OWN_FIELDS: Final = ("id", "recipe", "version", "to", "name", "csv")
+OWN_FIELDS: Final = ("id", "recipe", "version", "to", "name", "csv", "decimal", "seen")
 
 
 VALUES: Final = {"type": "object", "description": "values by the ids of inputs"}
@@ -63,8 +206,9 @@ class RecipesQuery(BaseModel):
 
 
 class RecipeActBody(BaseModel):
-    """`version` is that which the screen showed, `to` the one to restore. The same `id` again is the
-    same act. `at` is when it was touched, in the server's own time."""
+    """`version` is that which the screen showed, `to` the one to restore. `decimal` is the decimal sign
+    of the `csv`, where the file does not say it; `seen` is the comparison that a page has shown. The
+    same `id` again is the same act. `at` is when it was touched, in the server's own time."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -74,13 +218,17 @@ class RecipeActBody(BaseModel):
     name: Annotated[str, Field(max_length=500)] | None = None
     values: Annotated[dict[str, JsonValue], WithJsonSchema(VALUES)] | None = None
     csv: str | None = None
+    decimal: Literal[".", ","] | None = None
+    seen: Annotated[str, Field(max_length=80)] = ""
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
 
     @property
     def inputs(self) -> dict[str, Any]:
         """What the act needs, and the log keeps."""
-        return self.model_dump(include={"version", "to", "name", "values", "csv"}, exclude_none=True)
+        return self.model_dump(
+            include={"version", "to", "name", "values", "csv", "decimal"}, exclude_none=True
+        )
 
 
 class RecipeReceipt(BaseModel):
@@ -95,22 +243,27 @@ class RecipeReceipt(BaseModel):
     done: bool
 
 
-FORM_PARTS: Final[Mapping[str, dict[str, Any]]] = {
-    "-id": {"pattern": PRESS_ID},
-    "-recipe": {},
-    "-version": {"pattern": "^[0-9]{1,15}$"},
-    "-to": {"pattern": "^[0-9]{1,15}$"},
-    "-name": {"maxLength": 500},
-    "-csv": {},
-    "_since": {"description": "when the page was rendered, in the server's own time"},
-}
+ACT_FORM: Final = FormFields(
+    {
+        "-id": {"pattern": PRESS_ID},
+        "-recipe": {"maxLength": 64},
+        "-version": {"pattern": "^[0-9]{1,15}$"},
+        "-to": {"pattern": "^[0-9]{1,15}$"},
+        "-name": {"maxLength": 500},
+        "-csv": {},
+        "-decimal": {"enum": [".", ","]},
+        "-seen": {"maxLength": 80},
+        "_since": SINCE,
+    },
+    has_values=True,
+)
 
 
 @router.get("/recipes", summary="The page of the first set of recipes", responses=errors(403, 404))
 async def first(state: CurrentState, session: CurrentSession) -> Response:
     loads = session.panel.recipe_loads or state.fleet.panel.recipe_loads
     if not loads:
-        raise NotFound("this panel has no recipes")
+        raise NotFound(say("recipes_none_on_panel"))
     its = _session_of(state, session, loads[0].id)
     return RedirectResponse(f"{its.base}/recipes/{loads[0].id}", status_code=303)
 
@@ -147,7 +300,7 @@ async def page(
     if (its := _session_of(state, session, set)) is not session:
         return RedirectResponse(f"{its.base}/recipes/{set}", status_code=303)
     loads = session.panel.recipe_loads
-    said = _said(session, query.act)
+    said = _receipt_text(session, query.act)
     context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
     chosen = context["chosen"]
     shown = chosen.id if chosen else ""
@@ -156,31 +309,48 @@ async def page(
     entries = entries_of(book.load, context["mode"])
     framed = FramedPage("recipes.html", word("title"), robot, recipes_page=path, entries=entries)
     question = recipe_ask(session, book.load, chosen) if chosen and book.load.asks else None
-    return framed_page(request, state, framed, {**context, "word": word, "question": question})
+    more = {"word": word, "question": question, "comparison": None}
+    return framed_page(request, state, framed, {**context, **more})
+
+
+ACT_RESPONSES: Final = (
+    errors(404, 408, 413, 422)
+    | refusals(RecipeReceipt)
+    | {
+        303: {"description": "of a form: back to the page, with the receipt on it"},
+        503: {"model": RecipeReceipt, "description": "the disk or the operator's log refuses it"},
+    }
+)
+ACT_BODY: Final = described_body(RecipeActBody, ACT_FORM.schema, required=False)
+
+
+@router.post(
+    "/recipes/{set}/import",
+    response_model=RecipeReceipt,
+    summary="Import recipes",
+    responses=ACT_RESPONSES,
+    openapi_extra=ACT_BODY,
+    max_body_size=3 * MAX_CSV_BYTES + LONGEST,  # a form has up to three bytes for each
+)
+async def import_csv(
+    set: SetId, request: Request, state: CurrentState, session: CurrentSession
+) -> Response:
+    return await act(set, "import", request, state, session)
 
 
 @router.post(
     "/recipes/{set}/{act}",
     response_model=RecipeReceipt,
-    summary="Make, change, restore or delete a recipe, or import some",
-    responses=errors(404, 408, 413, 422)
-    | refusals(RecipeReceipt)
-    | {
-        303: {"description": "of a form: back to the page, with the receipt on it"},
-        503: {"model": RecipeReceipt, "description": "the disk or the operator's log refuses it"},
-    },
-    openapi_extra=described_body(
-        RecipeActBody,
-        {**fields(**FORM_PARTS), "additionalProperties": {"type": "string"}},
-        required=False,
-    ),
+    summary="Make, change, restore or delete a recipe",
+    responses=ACT_RESPONSES,
+    openapi_extra=ACT_BODY,
 )
 async def act(
     set: SetId, act: ActName, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     book, kind, content = _book(state, set), kind_of(request), await body_of(request)
     session = _session_of(state, session, set)
-    form = form_of(content) if kind == FORM else None
+    form = await asyncio.to_thread(_form, content) if kind == FORM else None
     entered = entered_fields(form) if form is not None else {}
     body = (
         _form_body(book, act, form, language_of(request)) if form is not None else _body(kind, content)
@@ -189,13 +359,17 @@ async def act(
     act_id = f"{body.id}.{act}.{body.recipe}"[:400] if body.id else secrets.token_hex(8)
     at = body.at.timestamp() if body.at else None
     confirmed, asking = None, None
+    read = await _read(book, act, body)
+    if form is not None and read and body.seen != seen_of(book, body.csv, body.decimal):
+        compared = _compared(request, state, session, Import(book, body, read["rows"]))
+        return set_client_cookie(compared, request, token)
     if form is not None:
         edit = Edit(book, act, body.recipe, body.inputs, form, entered)
         confirmed, asking = await confirmed_edit(request, state, session, edit)
     if asking is not None:
         return asking
     asked = ActRequest(act, who, f"{set}/{body.recipe}", body.inputs, at, form is None)
-    asked = asked._replace(confirmed=confirmed)
+    asked = asked._replace(confirmed=confirmed, read=read)
     runner = session.recipe_acts
     refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
@@ -226,12 +400,35 @@ def _session_of(state: AppState, session: RobotSession, set_id: str) -> RobotSes
     return next(s for s in every if any(load.id == set_id for load in s.panel.recipe_loads))
 
 
+class Import(NamedTuple):
+    """An import of a form, with the rows that were read."""
+
+    book: RecipeBook
+    body: RecipeActBody
+    rows: Sequence[ReadRow | BadRow]
+
+
+def _compared(request: Request, state: AppState, session: RobotSession, asked: Import) -> Response:
+    """The page that shows what an import would change, before anything is taken."""
+    book, body, rows = asked
+    loads = session.panel.recipe_loads
+    context = recipes_context(book, loads, session.robot, body.recipe, "csv", "")
+    seen = seen_of(book, body.csv, body.decimal)
+    shown = comparison(book, rows, body.csv or "", body.decimal or "", seen)
+    robot = session.entry.id if session.entry else ""
+    path = f"recipes/{book.load.id}?mode=csv"
+    framed = FramedPage("recipes.html", word("title"), robot, recipes_page=path)
+    more = {"word": word, "question": None, "comparison": shown}
+    return framed_page(request, state, framed, {**context, **more})
+
+
+def _form(content: bytes) -> dict[str, str]:
+    return ACT_FORM.filled(form_of(content))
+
+
 def _body(kind: str, content: bytes) -> RecipeActBody:
     if kind == CSV:
-        try:
-            return RecipeActBody(csv=content.decode("utf-8-sig"))
-        except UnicodeDecodeError:
-            raise InputError("the file is not UTF-8") from None
+        return RecipeActBody(csv=decoded(content))
     if kind not in (JSON, ""):
         raise InputError(f'the body must be "{JSON}", "{CSV}" or "{FORM}", not "{kind}"')
     return as_model(RecipeActBody, json_of(content or b"{}"))
@@ -240,11 +437,9 @@ def _body(kind: str, content: bytes) -> RecipeActBody:
 def _form_body(book: RecipeBook, act: str, form: Mapping[str, str], language: str) -> RecipeActBody:
     """The body of a form: its other fields are the values of inputs, as the reader writes them."""
     known = {field.id: field for field in book.load.fields}
-    own: dict[str, Any] = {key: form[f"-{key}"] for key in OWN_FIELDS if form.get(f"-{key}")}
+    own: dict[str, Any] = {key: form[f"-{key}"] for key in OWN_FIELDS if f"-{key}" in form}
     for key in ("version", "to"):
         if key in own:
-            if not re.fullmatch(r"[0-9]{1,15}", own[key]):
-                raise InputError(f"{key}: is not the number of a version")
             own[key] = int(own[key])
     typed = {key: value for key, value in form.items() if key in known}
     if act in ("save", "create"):
@@ -257,6 +452,16 @@ def _form_body(book: RecipeBook, act: str, form: Mapping[str, str], language: st
         if key not in known and key != "_since" and key.removeprefix("-") not in OWN_FIELDS:
             raise InputError(f'the form has an unknown field "{key:.40}"')
     return as_model(RecipeActBody, own)
+
+
+async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str, Any]:
+    """The rows of an import, read on a thread: they may be many."""
+    if act != "import" or body.csv is None:
+        return {}
+    if len(body.csv.encode("utf-8", "surrogatepass")) > MAX_CSV_BYTES:
+        raise InputError(f"csv is longer than {MAX_CSV_BYTES // 1_000_000} MB")
+    rows = read_rows(body.csv, book.load.fields, body.decimal or "")
+    return {"rows": await asyncio.to_thread(list, rows)}
 
 
 def _receipt(request: Request, receipt: ActReceipt) -> Response:
@@ -285,7 +490,7 @@ def _back(
     return RedirectResponse(f"{path}?{urlencode(query)}" if query else path, status_code=303)
 
 
-def _said(session: RobotSession, query: str) -> TextLike:
+def _receipt_text(session: RobotSession, query: str) -> TextLike:
     """What the receipt of an act says: `query` is its id, or the code where it is not kept."""
     known: Mapping[str, Text] = {text.code: text for text in (TOO_OFTEN, TOO_SOON)}
     if query in known:

@@ -6,11 +6,11 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 
-from app.errors import NotFound
-from app.i18n import say
+from app.system.errors import NotFound
+from app.system.texts import say
 from app.web.app_state import CurrentState
-from app.web.byte_ranges import ranged
-from app.web.openapi_parts import errors
+from app.web.downloads import ranged
+from app.web.requests import errors
 
 router = APIRouter()
 

@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from app.errors import NotFound
+from app.system.errors import NotFound
 from app.web.app_state import CurrentState
 
 router = APIRouter()

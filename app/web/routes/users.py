@@ -7,27 +7,35 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from app.access.listing import tokens_json, users_json
-from app.access.secrets_hash import LONGEST, WAYS, new_api_token
-from app.access.users import LONGEST_NAME
-from app.commands.act_receipt import ActReceipt
-from app.commands.acts import ActRequest
-from app.commands.press import PRESS_ID
-from app.commands.press_limits import RETRY_AFTER_S
-from app.commands.user_acts import TOKEN, USER_ACTS
-from app.i18n import Text, TextLike, localized, say
-from app.roles import ROLES
+from app.cell.commands.acts import ActReceipt, ActRequest
+from app.cell.commands.judge import RETRY_AFTER_S
+from app.cell.commands.press import PRESS_ID
+from app.cell.commands.user_acts import TOKEN, USER_ACTS
+from app.cell.people.edits import tokens_json, users_json
+from app.cell.people.secrets_hash import LONGEST, WAYS, new_api_token
+from app.cell.people.users import LONGEST_NAME
+from app.panel.roles import ROLES
+from app.system.texts import Text, TextLike, localized, say
+from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentState
-from app.web.client_cookie import principal_of, principal_with_new_token, set_client_cookie
-from app.web.framed_page import FramedPage, framed_page
+from app.web.client import principal_of, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.openapi_parts import PAGE, described_body, errors, fields
-from app.web.rendering.users_page import Mode, users_context, word
-from app.web.request_body import act_body_of, as_model
-from app.web.routes.press_forms import is_second_tap
-from app.web.routes.presses import STATUS
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.users_page import Mode, users_context, word
+from app.web.requests import (
+    PAGE,
+    SINCE,
+    FormFields,
+    Moment,
+    act_body_of,
+    as_model,
+    described_body,
+    errors,
+    refusals,
+)
+from app.web.routes.presses import is_second_tap
 
 router = APIRouter()
 
@@ -41,6 +49,19 @@ Secret = Annotated[str, Field(max_length=LONGEST, json_schema_extra={"format": "
 HEADERS: Final[Mapping[str, str]] = {"cache-control": "no-store", "vary": "accept"}
 NAME: Final = {"maxLength": LONGEST_NAME}
 SECRET: Final = {"maxLength": LONGEST, "format": "password"}
+ACT_FORM: Final = FormFields(
+    {
+        "name": NAME,
+        "role": {"enum": [*ROLES]},
+        "way": {"enum": [*WAYS]},
+        "secret": SECRET,
+        "none": {"enum": ["true"]},
+        "version": {"pattern": "^[0-9]{1,15}$"},
+        "id": {"pattern": PRESS_ID},
+        "_since": SINCE,
+    },
+    {f"^{GROUP}": {"enum": ["true"]}},
+)
 
 
 class UsersQuery(BaseModel):
@@ -69,7 +90,7 @@ class UserActBody(BaseModel):
     none: bool | None = None
     version: Annotated[int, Field(ge=0, lt=2**53)] | None = None
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    at: AwareDatetime | None = None
+    at: Moment | None = None
 
     @property
     def values(self) -> dict[str, Any]:
@@ -140,34 +161,13 @@ async def users(
     | {
         200: {"content": PAGE, "description": "also of a form that made a token: the page that has it"},
         303: {"description": "of a form: back to the page, with the receipt on it"},
-        409: {"model": UserReceipt, "description": "it was not done"},
-        429: {
-            "model": UserReceipt,
-            "description": "more than a client may",
-            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
-        },
+        **{status: refusals(UserReceipt)[status] for status in (409, 429)},
         503: {"model": UserReceipt, "description": "the operator's log refuses it"},
     },
-    openapi_extra=described_body(
-        UserActBody,
-        {
-            **fields(
-                name=NAME,
-                role={"enum": ["", *ROLES]},
-                way={"enum": [*WAYS]},
-                secret=SECRET,
-                none={"enum": ["true"]},
-                version={"pattern": "^[0-9]{1,15}$"},
-                id={"pattern": PRESS_ID},
-                _since={"description": "when the page was rendered, in the server's own time"},
-            ),
-            "patternProperties": {f"^{GROUP}": {"enum": ["true"]}},
-        },
-        required=False,
-    ),
+    openapi_extra=described_body(UserActBody, ACT_FORM.schema, required=False),
 )
 async def act(act: UserAct, request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, FIELDS_MOST)
+    is_form, content = await act_body_of(request, ACT_FORM, FIELDS_MOST)
     body = as_model(UserActBody, _form_body(act, content) if is_form else content)
     who, cookie = principal_with_new_token(request, state)
     act_id = f"{body.id}.{act}.{body.name}"[:400] if body.id else secrets.token_hex(8)
@@ -201,9 +201,7 @@ def _form_body(act: str, form: Mapping[str, str]) -> dict[str, Any]:
     taken = {"way", "secret", "_since"}
     groups = [name.removeprefix(GROUP) for name in form if name.startswith(GROUP)]
     body: dict[str, Any] = {
-        name: text
-        for name, text in form.items()
-        if name not in taken and not name.startswith(GROUP) and (text or name == "name")
+        name: text for name, text in form.items() if name not in taken and not name.startswith(GROUP)
     }
     way = act if act in WAYS else form.get("way", "")
     if way in WAYS and "secret" in form:

@@ -1,9 +1,34 @@
-// The keyboard: types into its text field, in which the caret is seen. Cancel gives back what was there.
+// The keyboard on the screen, and its letters in each language.
 import { isTouched, releaseEntry } from "../entries.js";
-import { capital, layoutOf, SIGNS } from "./layouts.js";
-import { Sheet, nameOf } from "./sheet.js";
-import { widgetOf } from "./place.js";
+import { nameOf, Sheet, widgetOf } from "./sheet.js";
 import { closest, find } from "../show.js";
+
+// The keyboard's letters, in a table for each language; a language without one has the English.
+const DIGITS = "1234567890";
+
+/** @type {Record<string, string[]>} */
+const LAYOUTS = {
+  en: [DIGITS, "qwertyuiop", "asdfghjkl", "zxcvbnm,.-"],
+  de: [`${DIGITS}ß`, "qwertzuiopü", "asdfghjklöä", "yxcvbnm,.-"],
+};
+
+const SIGNS = [DIGITS, '!"#$%&/()=', "+*'~^@€°<>", "?:;_|\\[]{}"];
+
+// Capitals that are no capital letter of the same key.
+/** @type {Record<string, string>} */
+const CAPITALS = { ß: "ẞ", ",": ";", ".": ":", "-": "_" };
+
+/** @param {string} letter */
+function capital(letter) {
+  return CAPITALS[letter] ?? letter.toUpperCase();
+}
+
+/** @param {string} language */
+function layoutOf(language) {
+  return LAYOUTS[language] ?? LAYOUTS[language.split("-")[0]] ?? LAYOUTS.en;
+}
+
+// The keyboard: types into its text field, in which the caret is seen. Cancel gives back what was there.
 
 const SHAPES = ["keys"];
 const SHIFTS = ["off", "once", "lock"];

@@ -1,15 +1,74 @@
-// The keypad: a number is entered beside its field and goes there with Set, if the limits permit.
+// The keypad on the screen, with the number that is being entered and the bar that shows it between its limits.
 import { isTouched, releaseEntry } from "../entries.js";
-import { Draft } from "./draft.js";
-import { markScale } from "./scale.js";
-import { Sheet, nameOf } from "./sheet.js";
-import { widgetOf } from "./place.js";
-import { numberText } from "../number-text.js";
+import { nameOf, Sheet, widgetOf } from "./sheet.js";
 import { enter, entryText, judged, limitsOf } from "../number-inputs.js";
+import { DECIMAL, MINUS, numberText } from "../number-text.js";
 import { closest, find, setText } from "../show.js";
 
+// A number while it is entered: its characters, as the reader's language writes them. None is left out.
+
+const TOO_LONG = 41; // characters: no number has so many
+
+class Draft {
+  /** @type {string} */
+  text;
+  #fresh = true; // the first character replaces the value that was there
+
+  /** @param {string} text */
+  constructor(text) {
+    this.text = text;
+  }
+
+  // A key of the keypad.
+  /** @param {string} key */
+  press(key) {
+    if (key === "delete") this.text = this.#fresh ? "" : this.text.slice(0, -1);
+    else if (key === "clear") this.text = "";
+    else if (key === "sign") this.text = /^[-−]/.test(this.text) ? this.text.slice(1) : `${MINUS}${this.text}`;
+    else if (key === ".") this.write(/\d/.test(this.#before) ? DECIMAL : `0${DECIMAL}`);
+    else this.#digit(key);
+    this.#fresh = false;
+  }
+
+  // Characters of a keyboard.
+  /** @param {string} characters */
+  write(characters) {
+    if (this.#before.length < TOO_LONG) this.text = this.#before + characters;
+    this.#fresh = false;
+  }
+
+  // Another value in place of this one; the next character begins a new one.
+  /** @param {string} text */
+  replace(text) {
+    this.text = text;
+    this.#fresh = true;
+  }
+
+  get #before() {
+    return this.#fresh ? "" : this.text;
+  }
+
+  // A digit after a single zero replaces it.
+  /** @param {string} key */
+  #digit(key) {
+    if (/^[-−]?0$/.test(this.#before)) this.text = this.text.slice(0, -1);
+    this.write(key);
+  }
+}
+
+// The bar of the keypad: where a number is between its limits, which are at 12.5 and 87.5 %.
+
+/** @param {HTMLElement} scale @param {string | null} plain @param {Limits} limits */
+function markScale(scale, plain, { min, max }) {
+  const at = 12.5 + (75 * (Number(plain) - Number(min))) / (Number(max) - Number(min));
+  scale.style.setProperty("--at", `${Math.min(Math.max(at, 0), 100)}%`);
+  scale.classList.toggle("none", plain === null);
+  setText(find(scale, "b"), plain !== null && at > 26 && at < 74 ? numberText(plain) : ""); // else it would lie on a limit
+}
+
+// The keypad: a number is entered beside its field and goes there with Set, if the limits permit.
+
 const SHAPES = ["tall", "wide", "narrow"];
-const SCANNED_MS = 50; // a bar code reader types faster: its Enter confirms nothing
 const SHORT = 9; // characters that fit in large digits
 const OF_INPUT_METHOD = 229;
 /** @type {Record<string, string>} */
@@ -24,8 +83,9 @@ export class Entry {
   #before;
   #wasTouched;
   #isPasted = false;
-  #lastKeyAt = -Infinity;
   #changed = () => this.#pasted();
+  // The first characters of a code came as from a hand.
+  #scanned = () => this.#type(() => this.#draft.replace(entryText(this.input)));
   /** @type {(event: KeyboardEvent) => void} */
   #typed = (event) => this.#key(event);
 
@@ -40,6 +100,7 @@ export class Entry {
     this.#label();
     this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(closest(target, "button")));
     addEventListener("keydown", this.#typed, true);
+    document.addEventListener("scanned", this.#scanned);
     // What is pasted, and what an input method writes, is in the field itself.
     if (input.type !== "range") input.addEventListener("input", this.#changed);
     this.#sheet.open(nameOf(input));
@@ -54,6 +115,7 @@ export class Entry {
 
   #close() {
     removeEventListener("keydown", this.#typed, true);
+    document.removeEventListener("scanned", this.#scanned);
     this.input.removeEventListener("input", this.#changed);
     this.#sheet.close();
     this.#closed();
@@ -116,19 +178,17 @@ export class Entry {
     const { target, key, isComposing, keyCode } = event;
     if (isComposing || keyCode === OF_INPUT_METHOD) return;
     const isOurs = target === this.input || target === document.body;
-    const scanned = event.timeStamp - this.#lastKeyAt < SCANNED_MS;
-    if (key !== "Shift") this.#lastKeyAt = event.timeStamp;
     if (!isOurs || event.ctrlKey || event.altKey || event.metaKey || key === "Tab") return;
     event.preventDefault();
     if (key === "Escape") this.cancel();
-    else if (key === "Enter") scanned || this.#set();
+    else if (key === "Enter") this.#set();
     else if (KEYS[key]) this.#press(KEYS[key]);
     else if (key.length === 1) this.#type(() => this.#draft.write(key));
   }
 
   #show() {
     const { dataset } = this.#sheet.root;
-    const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
+    const { plain, problem } = this.#judged();
     const isOut = problem !== null && problem !== "empty";
     setText(this.#find("output"), this.#draft.text);
     this.#find("output").toggleAttribute("data-long", this.#draft.text.length > SHORT);
@@ -141,13 +201,19 @@ export class Entry {
     markScale(this.#find(".scale"), plain, limitsOf(this.input));
   }
 
+  // What could be read in two ways is shown on the page as it was read, before anything is pressed there.
+  #judged() {
+    const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
+    return { plain, problem: problem === "unclear" ? null : problem };
+  }
+
   // As the page says them: a node may change those of its parameter.
   #limits() {
     return find(widgetOf(this.input), "[data-text=limits]").textContent;
   }
 
   #set() {
-    const { plain, problem } = judged(this.#draft.text, limitsOf(this.input));
+    const { plain, problem } = this.#judged();
     if (problem || plain === null) return;
     enter(this.input, plain);
     this.#put(this.input.value);

@@ -1,8 +1,9 @@
-// The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
-import { shield } from "./shield.js";
-import { lockHolds, unlockHolds } from "../hold-locks.js";
+// The screen is locked so that it can be cleaned, also when the page is loaded again: only Stop stays bare and works. It
+// unlocks by itself, or when its button is held.
+import { shield } from "./cover.js";
+import { lockHolds, unlockHolds } from "../show.js";
 import { find } from "../show.js";
-import { leaveStopsBare } from "./bare.js";
+import { leaveStopsBare } from "./cover.js";
 
 const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
 const COUNT_MS = 100;

@@ -1,6 +1,6 @@
 // The page gets dark when it is not touched for long. The touch that wakes it presses nothing.
-import { leaveStopsBare } from "./bare.js";
-import { shield } from "./shield.js";
+import { leaveStopsBare } from "./cover.js";
+import { shield } from "./cover.js";
 import { find } from "../show.js";
 
 const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keydown", "wheel"];

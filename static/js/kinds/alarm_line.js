@@ -5,7 +5,7 @@ import { LineView } from "../alarm-line.js";
 const lines = new WeakMap();
 
 // Called for each widget of this kind.
-/** @param {HTMLElement} root @param {import("../source.js").Source} source */
+/** @param {HTMLElement} root @param {PageSource} source */
 export const equip = (root, source) => lines.set(root, new LineView(root, source));
 
 /** @type {Record<string, Show>} */

@@ -1,5 +1,5 @@
 // A list of alarms on a page. The button of a row is its most urgent act.
-import { followLock, isLocked, markLock, sendAct } from "../alarm-acts.js";
+import { followLock, isLocked, markLock, sendAct } from "../alarm-line.js";
 import { showList } from "../alarm-rows.js";
 import { closest, find, setText } from "../show.js";
 
@@ -7,7 +7,7 @@ import { closest, find, setText } from "../show.js";
 const lists = new WeakMap();
 
 // Called for each widget of this kind.
-/** @param {HTMLElement} root @param {import("../source.js").Source} source */
+/** @param {HTMLElement} root @param {PageSource} source */
 export const equip = (root, source) => lists.set(root, new AlarmList(root, source));
 
 /** @type {Record<string, Show>} */
@@ -20,8 +20,10 @@ class AlarmList {
   /** @type {{ path: string, occurrence: number, seen: string | null } | null} */
   #touched = null; // the act under the finger when it went down
   #busy = false;
+  /** @type {Data} */
+  #texts = { more: "", below: [] };
 
-  /** @param {HTMLElement} root @param {import("../source.js").Source} source */
+  /** @param {HTMLElement} root @param {PageSource} source */
   constructor(root, source) {
     this.#root = root;
     this.#list = find(root, "ol.alarms");
@@ -29,10 +31,12 @@ class AlarmList {
     addEventListener("pointerdown", ({ target }) => this.#down(target), true);
     root.addEventListener("click", (event) => this.#act(event));
     followLock(() => this.#lock());
+    this.#list.addEventListener("scroll", () => this.#showRest());
+    new ResizeObserver(() => this.#showRest()).observe(this.#list);
   }
 
   /** @param {Data} alarms */
-  show({ rows, more }) {
+  show({ rows, more, below }) {
     showList(this.#list, find(this.#root, "template"), rows, (item, row) => {
       item.dataset.first = row.first;
       const button = find(item, "button.row-act");
@@ -42,8 +46,18 @@ class AlarmList {
       button.hidden = row.act === "";
       setText(button, row.act_text);
     });
-    setText(find(this.#root, ".rest"), more);
+    this.#texts = { more, below };
+    this.#showRest();
     this.#lock();
+  }
+
+  // How many rows are below the list's edge, or are not listed. A row of which half is seen counts as seen.
+  #showRest() {
+    const edge = this.#list.getBoundingClientRect().bottom;
+    const boxes = [...this.#list.children].map((item) => item.getBoundingClientRect());
+    const hidden = boxes.filter(({ top, bottom }) => (top + bottom) / 2 > edge).length;
+    const { more, below } = this.#texts;
+    setText(find(this.#root, ".rest"), hidden ? (below[hidden - 1] ?? "") : more);
   }
 
   #lock() {

@@ -1,8 +1,125 @@
-// A trend: draws what the server keeps, follows it while the widget can be seen, and looks back.
-import { merged } from "../trend/columns.js";
-import { Cursor } from "../trend/cursor.js";
-import { duration, Plot } from "../trend/plot.js";
+// A trend, with the columns of its pens and its cursor. `trend/plot.js` draws it.
+import { numberText } from "../number-text.js";
 import { closest, find } from "../show.js";
+import { duration, Plot } from "../trend/plot.js";
+
+// The columns of a trend's pen: [number, lowest, highest, last, whether it begins a line].
+
+// The old ones, and the server's in place of those from `since` on (0: of all): it says [number, value], [number,
+// lowest, highest, last], or null where a line ends. One before the plot stays: a line comes in from there.
+/** @param {Column[]} old @param {ColumnItem[]} items @param {number} since @param {(number: number) => boolean} isBefore @returns {Column[]} */
+function merged(old, items, since, isBefore) {
+  const columns = since ? old.filter(([number]) => number < since) : [];
+  let starts = false;
+  for (const item of items) {
+    if (item && item[0] >= since)
+      columns.push(item.length === 2 ? [item[0], item[1], item[1], item[1], starts] : [...item, starts]);
+    starts = item === null;
+  }
+  const first = columns.findIndex(([number]) => !isBefore(number));
+  if (first < 0) return columns.slice(-1);
+  return first > 0 ? columns.slice(first - 1) : columns;
+}
+
+// The cursor of a trend: a line that a finger or a keyboard sets, and the values there.
+
+const NEAR = 0.02; // of the plot's width: how far from the cursor a value may be
+const STEP = 0.02; // of the plot's width, by a key
+const NOTHING = "—";
+
+class Cursor {
+  /** @type {HTMLElement} */
+  #root;
+  /** @type {import("../trend/plot.js").Plot} */
+  #plot;
+  /** @type {View | null} */
+  #drawn = null; // {begin, end, width, span} of what the plot shows
+  /** @type {Column[][]} */
+  #columns = [];
+  /** @type {number | null} */
+  #time = null; // in seconds since the epoch
+
+  /** @param {HTMLElement} root @param {import("../trend/plot.js").Plot} plot */
+  constructor(root, plot) {
+    this.#root = root;
+    this.#plot = plot;
+    const area = find(root, ".area");
+    /** @param {PointerEvent} event */
+    const point = (event) => this.#point((event.clientX - area.getBoundingClientRect().left) / area.clientWidth);
+    area.addEventListener("pointerdown", point);
+    area.addEventListener("pointermove", (event) => event.buttons && point(event));
+    area.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  // It goes when its time has left the plot.
+  remove() {
+    this.#time = null;
+  }
+
+  /** @param {View} drawn @param {Column[][]} columns */
+  show(drawn, columns) {
+    [this.#drawn, this.#columns] = [drawn, columns];
+    this.#show(drawn);
+  }
+
+  /** @param {number} place */
+  #point(place) {
+    if (!this.#drawn) return;
+    const { begin, end } = this.#drawn;
+    this.#time = begin + Math.min(Math.max(place, 0), 1) * (end - begin);
+    this.#show(this.#drawn);
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
+    if (!this.#drawn || (!by && event.key !== "Escape")) return;
+    event.preventDefault();
+    const { begin, end } = this.#drawn;
+    if (by) return this.#point(((this.#time ?? end) - begin) / (end - begin) + by);
+    this.remove();
+    this.#show(this.#drawn);
+  }
+
+  /** @param {View} drawn */
+  #show(drawn) {
+    const { begin, end } = drawn;
+    if (this.#time !== null && this.#time < begin) this.remove();
+    const time = this.#time !== null && this.#time <= end ? this.#time : null;
+    const line = find(this.#root, "line.cursor");
+    line.setAttribute("visibility", time === null ? "hidden" : "visible");
+    const box = find(this.#root, ".cursor-values");
+    box.hidden = time === null;
+    if (time === null) return;
+    const place = (time - begin) / (end - begin);
+    for (const name of ["x1", "x2"]) line.setAttribute(name, `${place * 100}%`);
+    box.dataset.side = place < 0.5 ? "right" : "left";
+    const values = this.#plot.pens.flatMap((pen, i) => [
+      ["span", pen.name],
+      ["span", this.#valueAt(pen, this.#columns[i], time, drawn)],
+    ]);
+    const texts = [["b", this.#plot.clockOf(time)], ...values];
+    box.replaceChildren(
+      ...texts.map(([tag, text]) => Object.assign(document.createElement(tag), { textContent: text })),
+    );
+  }
+
+  /** @param {Pen} pen @param {Column[]} columns @param {number} time @param {View} drawn */
+  #valueAt(pen, columns, time, { width, span }) {
+    if (!columns.length) return NOTHING;
+    /** @param {Column} column */
+    const distance = ([number]) => Math.abs(this.#plot.timeOf(number) - time);
+    const nearest = columns.reduce((best, column) => (distance(column) < distance(best) ? column : best));
+    if (distance(nearest) > width + NEAR * span) return NOTHING;
+    const [, low, high] = nearest;
+    /** @param {number} value */
+    const text = (value) =>
+      numberText(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
+    return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();
+  }
+}
+
+// A trend: draws what the server keeps, follows it while the widget can be seen, and looks back.
 
 const LEAST_MS = 500; // between two requests
 const AGAIN_MS = 2000; // after one that failed

@@ -11,16 +11,16 @@ from typing import Any
 
 from fastapi import Request
 
-from app.commands import press_limits, service_calls
-from app.i18n import text
+from app.cell.commands import judge, services
 from app.main import app
-from app.rate_limit import Quota
+from app.system.limits import Quota
+from app.system.texts import text
 from app.web.app_state import site_of
 
 LATE_S = 0.5
 UNLIMITED = Quota(1e9, 1e9)
-vars(service_calls)["LATE_S"] = LATE_S  # Final in the application
-vars(press_limits).update(CLIENT_QUOTA=UNLIMITED, ADDRESS_QUOTA=UNLIMITED)
+vars(services)["LATE_S"] = LATE_S  # Final in the application
+vars(judge).update(CLIENT_QUOTA=UNLIMITED, ADDRESS_QUOTA=UNLIMITED)
 
 
 @app.get("/sizes")

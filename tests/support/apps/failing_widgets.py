@@ -4,9 +4,9 @@ tests.support.apps.failing_widgets:app`: a gauge above 90 has no attributes, a t
 from typing import Any
 
 from app import main
+from app.cell.view import kinds
 from app.panel.widgets.gauge import Gauge
-from app.view import kinds
-from app.web.rendering import page_words
+from app.web.pages import words
 
 shown = kinds.ATTRIBUTES[Gauge]
 
@@ -23,5 +23,5 @@ def plot(*_: Any) -> Any:
 
 
 vars(kinds)["ATTRIBUTES"] = {**kinds.ATTRIBUTES, Gauge: gauge}
-vars(page_words)["plot"] = plot
+vars(words)["plot"] = plot
 app = main.app

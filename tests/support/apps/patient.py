@@ -4,13 +4,13 @@ Its demo robot always permits operation, and a hold continues long without a hea
 """
 
 from app import main
-from app.commands.holds import controller, lease
-from app.simulator import robot
-from app.web.routes import hold_socket
+from app.cell.commands import holds
+from app.tools.simulator import robot
+from app.web.routes import holds as hold_socket
 
 LEASE_S = 20.0
 
-for module in (controller, lease):
+for module in (holds, holds):
     vars(module)["LEASE_S"] = LEASE_S
 vars(hold_socket).update(BEGIN_WITHIN_S=2 * LEASE_S, SILENCE_S=2 * LEASE_S)
 vars(robot)["PERMITTED_S"] = 1e9

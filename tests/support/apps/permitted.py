@@ -2,10 +2,10 @@
 times as long, for `uvicorn tests.support.apps.permitted:app`."""
 
 from app import main
-from app.commands.holds import controller, lease
-from app.simulator import robot
+from app.cell.commands import holds
+from app.tools.simulator import robot
 
-for module in (controller, lease):
+for module in (holds, holds):
     vars(module)["LEASE_S"] = 1.0
 vars(robot)["PERMITTED_S"] = 1e9
 app = main.app

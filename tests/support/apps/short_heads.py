@@ -4,7 +4,7 @@ tests.support.apps.short_heads:app`."""
 import os
 
 from app import main
-from app.web import connections
+from app.web import server
 
-vars(connections)["HEAD_WITHIN_S"] = float(os.environ["HEAD_WITHIN_S"])
+vars(server)["HEAD_WITHIN_S"] = float(os.environ["HEAD_WITHIN_S"])
 app = main.app

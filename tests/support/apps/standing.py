@@ -3,9 +3,9 @@
 import time
 
 from app import main
-from app.process import shutdown
-from app.runtime import wiring
-from app.transport.zenoh_session import ZenohSession
+from app.cell.session import session
+from app.ros.zenoh.session import ZenohSession
+from app.system.process import shutdown
 
 
 class Standing(ZenohSession):
@@ -13,6 +13,6 @@ class Standing(ZenohSession):
         time.sleep(60)
 
 
-vars(wiring)["ZenohSession"] = Standing
+vars(session)["ZenohSession"] = Standing
 vars(shutdown)["SHUTDOWN_TIMEOUT_S"] = 5.0
 app = main.app

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from app.i18n import ENGLISH, sentences
+from app.system.texts import ENGLISH, sentences
 from tests.support.catalogues import app_with, write_catalogue
 
 LANGUAGE = "qps"

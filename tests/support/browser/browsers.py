@@ -12,6 +12,7 @@ from typing import Any, Final
 from urllib.parse import urljoin
 
 import pytest
+from playwright._impl._api_structures import SetCookieParam
 from playwright.sync_api import (
     Browser,
     BrowserContext,
@@ -21,12 +22,15 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
+from app.web.pages.display_choice import FONTS
 from tests.support.browser.fonts import WITHOUT_OWN, fonts_file
 from tests.support.parts import CHROMIUM_FLAGS, ENOUGH_S, HEADLESS
 
 SIZE: Final = (1280, 800)
 EMPTY: Final = "/healthz"  # a page without scripts, events and style sheets
 EMPTY_WITHIN_S: Final = 2.0
+# A browser that has the shipped fonts: pages come with them.
+HAS_FONTS: Final = SetCookieParam(name=FONTS[0], value=FONTS[1], domain="127.0.0.1", path="/")
 
 
 class Browsers:
@@ -69,8 +73,8 @@ def sized(page: Page, width: int, height: int) -> Page:
 
 class ReusedPage:
     """A page that tests use one after the other. It is reset before each test: a window of 1280x800,
-    no cookies, no storage, no routes, no other page in its context. Changes that cannot be reset, such
-    as an init script, need a separate page."""
+    no cookies but that of the fonts, no storage, no routes, no other page in its context. Changes that
+    cannot be reset, such as an init script, need a separate page."""
 
     def __init__(self, browser: Browser, script: str = "", **options: Any) -> None:
         """`script` runs in each page before its own, `options` are those of the browser context."""
@@ -106,10 +110,12 @@ class ReusedPage:
 
 
 def opened(browser: Browser, **options: Any) -> BrowserContext:
-    """A browser context with this project's timeouts, in a window of 1280x800."""
+    """A browser context with this project's timeouts, in a window of 1280x800, which has the shipped
+    fonts."""
     width, height = SIZE
     context = browser.new_context(**{"viewport": {"width": width, "height": height}, **options})
     context.set_default_timeout(1000 * ENOUGH_S)
+    context.add_cookies([HAS_FONTS])
     return context
 
 
@@ -126,6 +132,7 @@ def emptied(page: Page) -> bool:
         page.evaluate("sessionStorage.clear()")
         page.mouse.move(0, 0)
         context.clear_cookies()
+        context.add_cookies([HAS_FONTS])
         sized(page, *SIZE)
         return True
     context.close()

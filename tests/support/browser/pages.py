@@ -1,9 +1,10 @@
 """Functions for any page in tests."""
 
 import time
+from contextlib import suppress
 from typing import Any, Final
 
-from playwright.sync_api import FloatRect, Frame, Locator, Page
+from playwright.sync_api import FloatRect, Frame, Locator, Page, expect
 
 from tests.support.parts import until
 
@@ -13,8 +14,16 @@ HIDE: Final = """(hidden) => {
   document.dispatchEvent(new Event("visibilitychange"));
 }"""
 
+COMES_WITHIN_MS: Final = 1000
+
 # Waits until what a new size changes is drawn.
 DRAWN: Final = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+# The texts of tiles of users that are cut.
+CUT_TILES: Final = """(tiles) => [...tiles.querySelectorAll("b, small, .tile > span")]
+  .filter((text) => text.scrollWidth > text.clientWidth + 1 || text.scrollHeight > text.clientHeight + 1
+    || text.getBoundingClientRect().bottom > text.closest(".tile").getBoundingClientRect().bottom)
+  .map((text) => text.textContent.trim())"""
 
 # The heights that the rows of a group need, without the room that is left over.
 ROWS: Final = """(number) => {
@@ -26,6 +35,12 @@ ROWS: Final = """(number) => {
     return rows.split(" ").map(parseFloat);
   });
 }"""
+
+
+def follow(link: Locator) -> None:
+    """Clicks a link, or the button of a form, and waits for the whole of the next page."""
+    with link.page.expect_navigation(wait_until="domcontentloaded"):
+        link.click()
 
 
 def widget(page: Page | Frame, name: str) -> Locator:
@@ -58,6 +73,28 @@ def asked(button: Locator) -> Locator:
 
     until(asks, "it asks", every_s=0.2)
     return dialog
+
+
+def comes(element: Locator) -> bool:
+    """Whether an element is there within a second, as what a touch has begun."""
+    with suppress(AssertionError):
+        expect(element).to_have_count(1, timeout=COMES_WITHIN_MS)
+        return True
+    return False
+
+
+def hold_by_key(button: Locator, held: Locator) -> None:
+    """Holds a button by the space bar: as soon as its script is there, and the stream has enabled it,
+    `held` is shown."""
+    keyboard = button.page.keyboard
+
+    def begins() -> bool:
+        keyboard.up(" ")
+        button.focus()
+        keyboard.down(" ")
+        return comes(held)
+
+    until(begins, "it is held")
 
 
 def place(element: Locator) -> FloatRect:

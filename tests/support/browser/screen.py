@@ -12,7 +12,7 @@ import httpx
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from app.kiosk.page_script import LOOK
+from app.tools.kiosk.browser import LOOK
 from tests.support.parts import CHROMIUM, ROOT, Process, free_port, http_client, until
 from tests.support.processes.signals import send_signal
 

@@ -201,10 +201,10 @@ class Keys:
         self._apart_s = apart_s
         self._now = float(page.evaluate("performance.timeOrigin + performance.now()")) / 1000
 
-    def type(self, text: str) -> None:
-        """Each character; a line feed is Enter."""
+    def type(self, text: str, apart_s: float | None = None) -> None:
+        """Each character; a line feed is Enter. `apart_s`: another time between these keys."""
         for character in text:
-            self._now += self._apart_s
+            self._now += self._apart_s if apart_s is None else apart_s
             enter = {"key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13}
             code = "Space" if character == " " else f"Key{character.upper()}"
             about: dict[str, Any] = (

@@ -1,5 +1,5 @@
 """A process that is controlled by JSON lines: one command in, one response out; see
-`tests/ros/commands.py`."""
+`tests/ros_nodes/commands.py`."""
 
 import json
 import os

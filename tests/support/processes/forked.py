@@ -106,7 +106,7 @@ class Forked:
 
     @classmethod
     def ros_program(cls, command: Sequence[str], env: Mapping[str, str]) -> "Forked":
-        """A program of `tests/ros` that is controlled by stdin and stdout."""
+        """A program of `tests/ros_nodes` that is controlled by stdin and stdout."""
         return cls(_parent(command[0], ROS_PARENT), command[1:], env, ["stdin", "stdout"])
 
     def _line(self, timeout_s: float | None) -> bytes | None:

@@ -22,9 +22,9 @@ from typing import Final
 
 from jinja2 import Environment, FileSystemBytecodeCache
 
-from app.cli.command_table import COMMANDS
 from app.panel import load_panel
-from app.web.rendering import page_templates
+from app.tools.cli.command import COMMANDS
+from app.web.pages import page_templates
 from tests.support.operator_log import wait_for_the_disk
 from tests.support.processes.fork_parent import ForkParent
 
@@ -38,9 +38,9 @@ UVICORN: Final = (
     "protocols.websockets.auto",
 )
 LATER: Final = (  # imported when a server starts, not by `app.main`
-    "app.simulator.panel_robot",
-    "app.simulator.zenoh_peer",
-    "app.trends.recorder",
+    "app.tools.simulator.panel_robot",
+    "app.tools.simulator.zenoh",
+    "app.cell.history.trends",
     "babel.dates",
     "babel.messages.pofile",
     "encodings.idna",
@@ -83,11 +83,11 @@ def prepare(templates: str) -> None:
 def bear_standstills() -> None:
     """Tolerates stalls: beside other tests a server or a bridge may stall for a second, which locks
     nothing here and refuses no press. A test of stalls starts its server with `EXACT_LIVENESS=1`."""
-    from app.transport import bridge_peer, liveness, readiness
+    from app.cell.link import bridge, liveness
 
     vars(liveness).update(STALLED_S=10.0, SILENT_S=4.0, LONGEST_S=10.0)
-    vars(bridge_peer)["WITHIN_S"] = 10.0
-    vars(readiness)["LIMIT_S"] = 15.0
+    vars(bridge)["WITHIN_S"] = 10.0
+    vars(liveness)["LIMIT_S"] = 15.0
 
 
 def become(arguments: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""A ROS 2 node on rmw_zenoh for the tests, driven by the same JSON lines as `tests/ros/node.py`:
+"""A ROS 2 node on rmw_zenoh for the tests, driven by the same JSON lines as `tests/ros_nodes/node.py`:
 `python -m tests.support.processes.rmw_node NAME ENDPOINT [DOMAIN]`.
 
 It is made of eclipse-zenoh alone. Key expressions, tokens, attachments and hashes are its own, so that
@@ -28,8 +28,8 @@ from zenoh.ext import (
 )
 from zenoh.handlers import Callback
 
-from app.interfaces import Interfaces
-from tests.ros.commands import obey
+from app.ros.messages import Interfaces
+from tests.ros_nodes.commands import obey
 
 INTERFACES = Interfaces("jazzy")
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -85,9 +85,11 @@ class Publisher:
         self._token = node.token("MP", topic, type_name, qos)
         self._gid = hashlib.md5(self._token[0].encode()).digest()
 
-    def put(self, fields: dict[str, Any]) -> None:
+    def put(self, fields: dict[str, Any], instead: str | None = None) -> None:
+        """`instead` is another attachment, in hexadecimal digits; "" for none."""
         attachment = struct.pack("<qqB16s", next(self._numbers), time.time_ns(), 16, self._gid)
-        self._declared.put(INTERFACES.encode(self.type, fields), attachment=attachment)
+        attached = attachment if instead is None else bytes.fromhex(instead) or None
+        self._declared.put(INTERFACES.encode(self.type, fields), attachment=attached)
 
     def end(self) -> None:
         self._token[1].undeclare()
@@ -205,8 +207,8 @@ class Commands:
             self.withdraw(topic)
         self.publishers[topic] = Publisher(self, topic, type, qos)
 
-    def publish(self, topic: str, fields: dict[str, Any]) -> None:
-        self.publishers[topic].put(fields)
+    def publish(self, topic: str, fields: dict[str, Any], instead: str | None = None) -> None:
+        self.publishers[topic].put(fields, instead)
 
     def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
         ends = self.timers[topic] = threading.Event()

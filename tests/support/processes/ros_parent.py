@@ -1,5 +1,5 @@
-"""A process that imports the libraries of nodes once, and forks the programs of `tests/ros`: imports
-take most of a node's start time.
+"""A process that imports the libraries of nodes once, and forks the programs of `tests/ros_nodes`:
+imports take most of a node's start time.
 
 ROS 2's Python runs it, as `python -m tests.support.processes.ros_parent FD` in the project's folder;
 see `fork_parent`. A child's arguments are a program and its own arguments. The
@@ -18,7 +18,7 @@ from typing import Final
 
 from tests.support.processes.fork_parent import ForkParent
 
-PROGRAMS: Final = Path(__file__).resolve().parents[2] / "ros"
+PROGRAMS: Final = Path(__file__).resolve().parents[2] / "ros_nodes"
 LIBRARIES: Final = (
     "asyncio",
     "numpy",
@@ -32,7 +32,7 @@ LIBRARIES: Final = (
     "std_msgs.msg",
     "std_srvs.srv",
     "type_description_interfaces.srv",
-    # Of `tests/ros`.
+    # Of `tests/ros_nodes`.
     "commands",
     "cyclone_action",
     "cyclone_node",

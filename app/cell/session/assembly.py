@@ -1,0 +1,157 @@
+"""Opens and closes the parts of a server in order: operator's log, recordings, robots."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cell.alarms.report import NAME as STATES
+from app.cell.people.access_log import read_rights
+from app.cell.session.doctor_process import DoctorProcess
+from app.cell.session.fleet import Fleet
+from app.cell.session.state_recorder import StateRecorder
+from app.panel import Panel
+from app.panel.model import RobotEntry
+from app.panel.widgets.trend import trends_of
+from app.records import Limits, NullLog, OperatorLog
+from app.records.starts import KeptFiles, StartRecord, read_start_files
+from app.ros.zenoh.config import Config, config_from, config_to, tls_files
+from app.system.certificates import ServedCertificate, UsedCertificates
+from app.system.settings import Mode, Settings
+
+if TYPE_CHECKING:
+    from app.cell.history import Recordings
+    from app.cell.history.trends import TrendWriter
+
+log = logging.getLogger("kiosk")
+
+# (panel, which of its robots) → a simulated robot that runs while it is entered, by its endpoint.
+SimulatedRobot = Callable[[Panel, RobotEntry | None], AbstractContextManager[str]]
+
+
+def mode_of(settings: Settings, panel: Panel) -> Mode:
+    """`KIOSK_MODE`, else what the panel file says."""
+    return settings.mode or panel.mode
+
+
+def data_folder(settings: Settings, panel: Panel) -> Path:
+    """The data folder of a server with this panel."""
+    return settings.data_folder(mode_of(settings, panel))
+
+
+def check_zenoh(settings: Settings, panel: Panel) -> None:
+    """KioskError if the Zenoh configuration can't be used."""
+    if mode_of(settings, panel) == "live":
+        for entry in panel.robots or (None,):
+            config_from(settings.zenoh, entry.connect if entry else ())
+        for fault in tls_files(settings.zenoh).faults():
+            log.error("no link to a robot: %s (%s)", fault, settings.zenoh)
+
+
+@asynccontextmanager
+async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | NullLog]:
+    """The operator's log; FolderInUse if another server has its folder."""
+    mode, rules = mode_of(settings, panel), panel.log
+    folder = data_folder(settings, panel)
+    oplog: OperatorLog | NullLog = NullLog(folder)
+    if rules.enabled:
+        limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
+        users = partial(read_rights, folder)
+        read = partial(read_start_files, settings, panel, mode, users)
+        record = StartRecord(KeptFiles(folder), read, panel.revision)
+        oplog = OperatorLog(folder, limits, mode, record, signs=True)
+    await oplog.start()
+    if isinstance(oplog, OperatorLog):
+        oplog.start_copies(settings)
+    try:
+        yield oplog
+    finally:
+        await oplog.stop()
+
+
+@asynccontextmanager
+async def open_fleet(
+    settings: Settings,
+    panel: Panel,
+    revision: str,
+    oplog: OperatorLog | NullLog,
+    simulated_robot: SimulatedRobot,
+    doctor: DoctorProcess | None = None,
+    certificate: ServedCertificate | None = None,
+) -> AsyncIterator[Fleet]:
+    """The robots of the panel, real or simulated. `revision` is that of the page's files, `certificate`
+    the server's own."""
+    demo = mode_of(settings, panel) == "demo"
+    files = [] if demo else tls_files(settings.zenoh).certificates
+    certificates = UsedCertificates(files, certificate)
+    with ExitStack() as stack:
+
+        def config_of(entry: RobotEntry | None) -> Config:
+            if not demo:
+                return config_from(settings.zenoh, entry.connect if entry else ())
+            return config_to(stack.enter_context(simulated_robot(panel, entry)))
+
+        recordings = _recordings(settings, panel)
+        fleet = Fleet(
+            panel,
+            config_of,
+            revision,
+            oplog,
+            recordings=recordings,
+            simulated=demo,
+            root_path=settings.root_path,
+            doctor=doctor,
+        )
+        trends = _trend_disk(settings, panel, fleet)
+        fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
+        states = StateRecorder(fleet.states, fleet.sessions) if panel.state else None
+        try:
+            if recordings is not None:
+                recordings.start()
+            if trends is not None:
+                await trends.start()
+            folder = settings.data_folder(mode_of(settings, panel))
+            await fleet.alarms.start(folder, oplog, certificates)
+            await fleet.recipes.start(folder, oplog)
+            await fleet.start()
+            if states is not None:
+                states.start()
+            by = "simulated" if demo else f"live by {settings.zenoh}"
+            folder = settings.data_folder(mode_of(settings, panel))
+            log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
+            yield fleet
+        finally:
+            if states is not None:
+                await states.stop()
+            await fleet.stop()
+            await fleet.alarms.stop()
+            await fleet.recipes.stop()
+            if trends is not None:
+                await trends.stop()
+            if recordings is not None:
+                await asyncio.to_thread(recordings.stop)
+
+
+def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
+    """Imports the MCAP writer only if the panel records: it takes time and memory."""
+    if panel.record is None:
+        return None
+    from app.cell.history import Recordings
+
+    folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
+    return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
+
+
+def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendWriter | None":
+    """The histories on disk, if a trend of the panel is kept there."""
+    if not any(trend.disk for trend in trends_of(panel)):
+        return None
+    from app.cell.history.trends import TrendWriter
+
+    disk = TrendWriter(settings.data_folder(mode_of(settings, panel)), panel)
+    for session in fleet.sessions:
+        disk.add(session.entry.id if session.entry else "", session.robot, session.show)
+    return disk

@@ -1,0 +1,334 @@
+"""The robots of one panel. Each has its own session, with its own link, state and presses.
+
+Sessions are isolated: a lost peer, a renewed session or a flood affects only one robot. Each page
+shows the link status of the other robots.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cell.alarms.shown import AlarmRow
+from app.cell.commands.diagnostic_acts import Doctor, NoDoctor
+from app.cell.commands.receipts import Receipt
+from app.cell.link.robot_access import ROBOT_ACCESS
+from app.cell.permission.interlocks import link_verdict, state_of
+from app.cell.permission.roles import ConfirmLocks
+from app.cell.robot.state import RobotState
+from app.cell.robot.topics import Slices
+from app.cell.session.alarms import Alarms
+from app.cell.session.group_stops import GroupStops
+from app.cell.session.recipes import Recipes
+from app.cell.session.session import RobotSession, ServerParts, wire_session
+from app.cell.view.group_stops import StopOfRobot, group_stop
+from app.cell.view.kinds import Attributes
+from app.cell.view.link_status import Lamp
+from app.cell.view.overview import TileFigure, figure_now, most_urgent, sums, tile
+from app.cell.view.publisher import ViewPublisher
+from app.cell.view.view import NO_SHARED, SharedWidgets
+from app.panel.condition import NamedCondition
+from app.panel.frame_keys import stops_of_several
+from app.panel.keys import SUMS
+from app.panel.model import Panel, RobotEntry
+from app.panel.robot_panels import widget_robots
+from app.records.press_record import Log
+from app.ros.zenoh.config import Config
+from app.system.errors import InputError, NotFound
+from app.system.texts import TextLike, joined, say
+
+if TYPE_CHECKING:
+    from app.cell.history import Recordings
+
+
+# Interlocks and conditions of one robot that widgets of another robot name.
+#
+# A widget is judged in the session of its own robot. An interlock of another robot is judged there too,
+# by that robot's state: before a press its inbox is emptied, and a change of its verdict runs a turn,
+# which ends holds and shows the lock.
+
+
+def connect_robots(sessions: Mapping[str | None, RobotSession]) -> None:
+    """Connects the sessions of a panel's robots; call it before they are started."""
+    fleet = {name: session.robot for name, session in sessions.items() if name is not None}
+    for session in sessions.values():
+        session.robot.fleet = fleet
+    for name, session in sessions.items():
+        by_others = [
+            (other, condition)
+            for other in sessions.values()
+            for condition in other.panel.of_others
+            if condition.robot == name
+        ]
+        if by_others:
+            _Watch(session, by_others).connect()
+
+
+class _Watch:
+    """The verdicts of a robot's conditions that widgets of other robots name."""
+
+    def __init__(
+        self, session: RobotSession, by_others: list[tuple[RobotSession, NamedCondition]]
+    ) -> None:
+        self._session = session
+        self._by_others = by_others
+        self._known = [self._condition_state(condition) for _, condition in by_others]
+
+    def connect(self) -> None:
+        signals = self._session.context.signals
+        signals.ran.connect(self.update)
+        for other in {id(other): other for other, _ in self._by_others}.values():
+            other.context.signals.judging.connect(self._session.turn.run)
+            other.context.awaited.append(self._session.link)
+
+    def update(self) -> None:
+        """Runs a turn of each robot whose widgets a change concerns."""
+        now = [self._condition_state(condition) for _, condition in self._by_others]
+        known, self._known = self._known, now
+        pairs = zip(self._by_others, known, now, strict=True)
+        changed = {id(other): other for (other, _), before, after in pairs if before != after}
+        for other in changed.values():
+            other.turn.changed()
+
+    def _condition_state(self, condition: NamedCondition) -> object:
+        """What others show of a condition, but for its deadline."""
+        robot, now = self._session.robot, time.monotonic()
+        state = state_of(condition, robot, now, link_verdict(robot, now))
+        verdict = state.verdict
+        return state.value, verdict.permitted, verdict.code, verdict.reason
+
+
+ConfigOf = Callable[[RobotEntry | None], Config]
+
+
+class Fleet:
+    """Opened by `start`, closed by `stop`."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        config_of: ConfigOf,
+        revision: str,
+        operators_log: Log,
+        *,
+        recordings: "Recordings | None" = None,
+        simulated: bool = False,
+        root_path: str = "",
+        doctor: Doctor | None = None,
+    ) -> None:
+        """One robot without a name, or the panel's `[[robot]]` entries."""
+        self.panel = panel
+        self._widget_robots = widget_robots(panel)
+        self._has_overview = any(page.overview for page in panel.pages)
+        self._group_stops = {entry.id: stops_of_several(panel, entry.id) for entry in panel.robots}
+        self._shown_stops: dict[str, Sequence[Attributes]] = {}  # by the robot's id
+        self._has_total = any(page.total for page in panel.pages)
+        self._alarm_rows: Mapping[str, AlarmRow] = {}
+        self._most_urgent: Mapping[str, AlarmRow] = {}
+        self.root_path = root_path
+        self._sessions: dict[str | None, RobotSession] = {}
+        self.alarms = Alarms(panel)
+        self.recipes = Recipes(panel)
+        self.group_stops = GroupStops()
+        self.confirm_locks = ConfirmLocks()  # locked until the users are known
+        self.states: Path | None = None  # the file of the machine's states
+        server = ServerParts(
+            panel,
+            revision,
+            operators_log,
+            recordings,
+            Slices(),
+            simulated,
+            root_path,
+            self.alarms,
+            doctor or NoDoctor(),
+            self.recipes,
+            self.confirm_locks,
+        )
+        for entry in panel.robots or (None,):
+            access = ROBOT_ACCESS[(entry or panel).dialect]
+            self._sessions[entry.id if entry else None] = wire_session(
+                server, config_of(entry), access, entry=entry, others=self
+            )
+        connect_robots(self._sessions)
+        for session in self.sessions:
+            session.publisher.on_watched = partial(self._watch, session)
+        for session in self.sessions:
+            session.refresher.show_shared()
+
+    async def start(self) -> None:
+        """Starts all sessions. Does not wait for the robots."""
+        for session in self.sessions:
+            await session.start()
+            session.watch()
+
+    async def stop(self) -> None:
+        """Ends all streams and sessions."""
+        self.close()
+        await asyncio.gather(*(session.stop() for session in self.sessions))
+
+    def close(self) -> None:
+        """Ends holds and streams, which would delay the shutdown."""
+        for session in self.sessions:
+            session.close()
+
+    def cancel_all(self) -> None:
+        """Ends all waiting presses; their outcome is unknown."""
+        for session in self.sessions:
+            session.presses.cancel_all()
+
+    @property
+    def sessions(self) -> list[RobotSession]:
+        return list(self._sessions.values())
+
+    @property
+    def state(self) -> TextLike:
+        """The state of the link to each robot, as text."""
+        states = [
+            (session.robot.name, session.link_verdict.reason or say("ready"))
+            for session in self.sessions
+        ]
+        return joined(say("ready_robot", name=n, state=s) if n else s for n, s in states)
+
+    @property
+    def first(self) -> RobotSession:
+        return self.sessions[0]
+
+    def session(self, robot: str | None) -> RobotSession:
+        """The session of a robot; None for the robot without a name. NotFound lists the robots."""
+        if robot in self._sessions:
+            return self._sessions[robot]
+        if robot is None:
+            has = "several robots" if len(self.sessions) > 1 else "a robot with a path of its own"
+            raise NotFound(f"this panel has {has}: begin with {self.first.base}/")
+        known = ", ".join(str(name) for name in self._sessions if name) or "one robot without a name"
+        raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
+
+    def of_robot(self, robot_id: str) -> RobotSession:
+        """The session of the robot with this id; the first for another id, and for a robot without."""
+        return self._sessions.get(robot_id, self.first)
+
+    def session_for(self, session: RobotSession, widget: str) -> RobotSession:
+        """The session of a widget on a page of `session`: that of the widget's own robot if it has
+        one."""
+        return self._sessions[robot] if (robot := self._widget_robots.get(widget)) else session
+
+    def sharing(self, session: RobotSession) -> list[RobotSession]:
+        """The sessions of other robots with widgets on the pages of `session`."""
+        names = dict.fromkeys(self._widget_robots.values())
+        return [other for name in names if (other := self._sessions[name]) is not session]
+
+    def receipt(self, session: RobotSession, press_id: str) -> Receipt | None:
+        """The receipt of a press on a page of `session`; None for unknown ids."""
+        receipts = (each.presses.receipt(press_id) for each in (session, *self.sharing(session)))
+        own = next((receipt for receipt in receipts if receipt), None)
+        return own or self.group_stops.receipt(press_id)
+
+    def stopped(self, widget: str, robots: str) -> list[RobotSession]:
+        """The sessions of the robots that a stop button of the frame is pressed for; `robots` are their
+        ids, by commas. InputError if the button is not for several robots."""
+        keys = {key.widget.id for keys in self._group_stops.values() for key in keys.values()}
+        if widget not in keys:
+            raise InputError(f'robots: "{widget:.64}" is not a stop button of several robots')
+        return [self.session(robot) for robot in dict.fromkeys(robots.split(","))]
+
+    # The protocol `refresh.OtherRobots`, for each robot's session.
+
+    def link_statuses(self) -> Mapping[str, Lamp]:
+        return {entry: k.refresher.lamp for entry, k in self._sessions.items() if entry is not None}
+
+    def instance_ids(self) -> Collection[str]:
+        return {session.publisher.instance_id for session in self.sessions}
+
+    def publisher(self, instance_id: str) -> ViewPublisher | None:
+        publishers = (session.publisher for session in self.sessions)
+        return next((each for each in publishers if each.instance_id == instance_id), None)
+
+    def shared_with(self, robot: RobotState) -> SharedWidgets:
+        others = [name for name in dict.fromkeys(self._widget_robots.values()) if name != robot.id]
+        sessions = {name: self._sessions[name] for name in others if name in self._sessions}
+        widgets = {**self._tiles()} if self._has_overview else {}
+        widgets |= self._stops_of_several(robot)
+        if not (sessions or widgets):
+            return NO_SHARED
+        without: dict[str, Mapping[str, Attributes]] = {}
+        for name, session in sessions.items():
+            own = session.refresher.own
+            ids = [widget for widget, robot_id in self._widget_robots.items() if robot_id == name]
+            widgets |= {widget: own.view["widgets"][widget] for widget in ids}
+            locks = own.without_control
+            without[name] = {widget: locks[widget] for widget in ids if widget in locks}
+        controls = {name: each.refresher.own.view["control"] for name, each in sessions.items()}
+        return SharedWidgets(widgets, without, controls)
+
+    def share(self, robot: RobotState) -> None:
+        if not (
+            self._has_overview or robot.id in self._widget_robots.values() or self._stops_differ(robot)
+        ):
+            return
+        for session in self.sessions:
+            if session.robot is not robot:
+                session.refresher.show_shared()
+
+    def watched(self, robot: RobotState, widgets: Collection[str]) -> frozenset[str]:
+        own = {widget for widget, name in self._widget_robots.items() if name == robot.id}
+        if not own:
+            return frozenset()
+        own = own.intersection(widgets)
+        others = (session.publisher for session in self.sessions if session.robot is not robot)
+        return frozenset().union(*(publisher.watched(own) for publisher in others))
+
+    def _watch(self, session: RobotSession) -> None:
+        """Clients see other pages of the session than before."""
+        for other in (session, *self.sharing(session)):
+            other.watch()
+
+    def _stops_of_several(self, robot: RobotState) -> Mapping[str, Attributes]:
+        """The attributes of the stop buttons of several robots on pages of `robot`, by their ids."""
+        return {
+            shown_id: group_stop([self._stop_of(name, key.widget.id) for name in key.robots])
+            for shown_id, key in self._group_stops.get(robot.id or "", {}).items()
+            if all(name in self._sessions for name in key.robots)  # else not wired yet
+        }
+
+    def _stop_of(self, robot: str, widget: str) -> StopOfRobot:
+        session = self._sessions[robot]
+        return StopOfRobot(session.robot.title, session.refresher.own.view["widgets"][widget])
+
+    def _stops_differ(self, robot: RobotState) -> bool:
+        """Whether a stop button of the robot has changed since this was asked the last time."""
+        name = robot.id or ""
+        keys = self._group_stops.get(name, {}).values()
+        if not keys or name not in self._sessions:
+            return False
+        shown = [self._stop_of(name, key.widget.id).attributes for key in keys]
+        before, self._shown_stops[name] = self._shown_stops.get(name), shown
+        return shown != before
+
+    def _tiles(self) -> Mapping[str, Attributes]:
+        """The attributes of the tile of each robot and of the line of sums, by their ids."""
+        figures: list[TileFigure] = []
+        tiles: dict[str, Attributes] = {}
+        for entry in self.panel.robots:
+            session = self._sessions.get(entry.id)
+            if session is None:  # not wired yet
+                continue
+            if entry.figure and self._has_total:
+                figures.append(figure_now(entry.figure, session.robot, time.monotonic()))
+            view = session.refresher.own.view
+            if view["alarms"]["rows"] is not self._alarm_rows:
+                self._alarm_rows = view["alarms"]["rows"]
+                self._most_urgent = most_urgent(self._alarm_rows)
+            figure = str(entry.figure.id) if entry.figure else ""
+            alarm = self._most_urgent.get(entry.id)
+            tiles[entry.tile_id] = tile(view, session.refresher.lamp, figure, alarm)
+        words = [state.text for state in self.panel.state.states] if self.panel.state else []
+        readout = next((entry.figure for entry in self.panel.robots if entry.figure), None)
+        return tiles | {SUMS: sums(tiles.values(), words, figures, readout)}
+
+    def show_but(self, robot: RobotState) -> None:
+        for session in self.sessions:
+            if session.robot is not robot:
+                session.show()

@@ -1,1 +1,0 @@
-"""Action goals: sending, tracking, canceling, and recovery after a restart."""

@@ -1,1 +1,0 @@
-"""The parameters of a robot's nodes: reading, updates by events, setting."""

@@ -1,1 +1,0 @@
-"""The CDR codec: bytes to and from values."""

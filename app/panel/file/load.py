@@ -1,0 +1,214 @@
+"""Loads a panel file and reports every fault with its place."""
+
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from pydantic import ValidationError
+
+from app.panel.alarm import Alarm
+from app.panel.base import FileContext
+from app.panel.checks.panel import find_faults
+from app.panel.checks.robots import duplicate_ids
+from app.panel.constants import resolve_condition
+from app.panel.file.toml_file import TomlFile, parse_toml, read_toml
+from app.panel.file.wording import closest_name
+from app.panel.model import Panel
+from app.panel.rules import StateRules
+from app.panel.source import NAME
+from app.panel.widgets.families import BaseWidget
+from app.ros.messages import Interfaces, load_interfaces
+from app.system.errors import Fault, InterfaceError, Note, PanelError, Remark
+from app.system.texts import ENGLISH
+
+if TYPE_CHECKING:
+    from app.panel.file.same_widgets import WithCopies
+    from app.panel.file.source_tables import Expanded
+
+NOT_WRITTEN: Final = (
+    "revision",
+    "copies",
+    "inputs_of_others",
+    "of_others",
+)  # fields of a panel that are no keys of its file
+
+
+def load_panel(path: Path) -> Panel:
+    """The checked panel. PanelError has every fault; it is `unreadable` if the file is no TOML."""
+    return _load(read_toml(path))
+
+
+class CheckedPanel(NamedTuple):
+    """A panel without faults, with hints (`notes`) and the messages of each press (`previews`)."""
+
+    panel: Panel
+    notes: tuple[Note, ...]
+    previews: tuple[Remark, ...]
+
+
+def check_panel(path: Path) -> CheckedPanel:
+    """The checked panel with notes and previews; PanelError as in `load_panel`."""
+    from app.panel.checks.notes import find_notes
+    from app.panel.file.keys import add_locations
+    from app.panel.file.preview import previews
+
+    file = read_toml(path)
+    panel = _load(file)
+    interfaces = load_interfaces(panel.distro, panel.interfaces)
+    own = _with_sources(file.tables).notes if _names_source(file.tables) else []
+    notes = add_locations([*find_notes(panel, interfaces), *own], file.text, file.tables)
+    sent = add_locations(previews(panel, interfaces), file.text, file.tables)
+    return CheckedPanel(panel, tuple(notes), tuple(sent))
+
+
+def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
+    """The faults of a panel file in `folder` that would have this text."""
+    try:
+        _load(parse_toml(folder / "panel.toml", text.encode()))
+    except PanelError as error:
+        return error.faults
+    return ()
+
+
+def _load(file: TomlFile) -> Panel:
+    written = {key: value for key, value in file.tables.items() if key not in NOT_WRITTEN}
+    if faults := _source_faults(written, file):
+        raise PanelError(str(file.path), _sorted_faults(faults, file))
+    with_sources = _with_sources(written) if _names_source(written) else None
+    if with_sources and with_sources.faults:
+        raise PanelError(str(file.path), _sorted_faults(with_sources.faults, file))
+    tables = with_sources.tables if with_sources else written
+    copies = _with_copies(tables)
+    if copies and copies.faults:
+        raise PanelError(str(file.path), _sorted_faults(copies.faults, file))
+    tables = copies.tables if copies else tables
+    faults = [Fault(key, "unknown key") for key in NOT_WRITTEN if key in file.tables]
+    own = {"revision": file.revision, "copies": frozenset(copies.origins if copies else ())}
+    try:
+        panel = Panel.model_validate(tables | own, context=_context(file))
+    except ValidationError as error:
+        faults += _shape_faults(error, tables | own, _context(file))
+    else:
+        faults += _type_faults(panel)
+    if faults:
+        faults = list(copies.own_faults(faults)) if copies else faults
+        moved = {with_sources.at_origin(f): None for f in faults} if with_sources else faults
+        raise PanelError(str(file.path), _sorted_faults(moved, file))
+    return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
+
+
+def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
+    """The faults of the tables of sources, which come first: other tables have their keys."""
+    lists = (key for key in tables if key != NAME and isinstance(tables[key], list))
+    if misspelt := [key for key in lists if closest_name(key, (NAME,))]:
+        return [Fault(key, f'unknown key; did you mean "{NAME}"?') for key in misspelt]
+    if NAME not in tables:
+        return []
+    try:
+        sources = Panel.model_validate(
+            {"title": "?", "page": [], NAME: tables[NAME]}, context=_context(file)
+        ).sources
+    except ValidationError as error:
+        from app.panel.file.shape import find_shape_faults
+
+        return find_shape_faults(error, tables).faults
+    return [*duplicate_ids(NAME, [source.id for source in sources])]
+
+
+def _names_source(value: Any) -> bool:
+    """Whether a table is a source, or names one."""
+    if isinstance(value, dict):
+        return NAME in value or any(map(_names_source, value.values()))
+    return isinstance(value, list) and any(map(_names_source, value))
+
+
+def _with_sources(tables: dict[str, Any]) -> "Expanded":
+    """Imported only where a panel speaks of sources, for a faster start."""
+    from app.panel.file.source_tables import expanded
+
+    return expanded(tables)
+
+
+def _with_copies(tables: dict[str, Any]) -> "WithCopies | None":
+    """None where no widget is on several pages."""
+    from app.panel.file.same_widgets import names_same, with_copies
+
+    return with_copies(tables) if names_same(tables) else None
+
+
+def _context(file: TomlFile) -> FileContext:
+    """With the panel's language, in which texts are shown that lack the reader's."""
+    language = file.tables.get("language", ENGLISH)
+    return FileContext(file.path.parent, language if isinstance(language, str) else ENGLISH)
+
+
+def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
+    """The panel with values in place of constants' names in lamps and interlocks."""
+
+    def resolved(widgets: Iterable[BaseWidget]) -> tuple[BaseWidget, ...]:
+        return tuple(widget.with_constants(interfaces) for widget in widgets)
+
+    pages = []
+    for page in panel.pages:
+        groups = [
+            group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
+        ]
+        pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
+    interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
+    conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
+    state = panel.state and panel.state.with_constants(interfaces)
+    alarms = tuple(_resolve_alarm(alarm, panel.state, interfaces) for alarm in panel.alarms)
+    resolved_parts = {
+        "interlocks": interlocks,
+        "own_conditions": conditions,
+        "alarms": alarms,
+        "state": state,
+    }
+    return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
+
+
+def _resolve_alarm(alarm: Alarm, state: StateRules | None, interfaces: Interfaces) -> Alarm:
+    """The alarm with values in place of constants' names in its conditions and its state."""
+    conditions = {"when": alarm.when, "suppressed_while": alarm.suppressed_while}
+    resolved: dict[str, Any] = {
+        key: resolve_condition(condition, interfaces)
+        for key, condition in conditions.items()
+        if condition is not None
+    }
+    if alarm.state is not None and state is not None:
+        resolved["state"] = state.value_of(alarm.state, interfaces)
+    return alarm.model_copy(update=resolved) if resolved else alarm
+
+
+def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
+    try:
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
+    except InterfaceError as error:
+        at = next((i for i, folder in enumerate(panel.interfaces) if folder == error.source), 0)
+        yield Fault(f"interfaces[{at}]", str(error))
+        return
+    yield from find_faults(panel, interfaces, faulty)
+
+
+# Modules for panels with faults are imported only when needed, for a faster start.
+
+
+def _shape_faults(error: ValidationError, tables: dict[str, Any], context: FileContext) -> list[Fault]:
+    """Faults of keys and values, and all others that can still be found."""
+    from app.panel.file.shape import find_demo_faults, find_shape_faults, make_stand_ins
+
+    shape, rest = find_shape_faults(error, tables), make_stand_ins(tables, error)
+    panel = rest and rest.validate(context)
+    others = filter(rest.is_real, _type_faults(panel, rest.faulty)) if rest and panel else ()
+    faults = shape.faults + [fault for fault in others if not shape.covers(fault)]
+    places = {fault.place for fault in faults}
+    return faults + [fault for fault in find_demo_faults(tables) if fault.place not in places]
+
+
+def _sorted_faults(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
+    """One fault for each mistake, with its line, in the order of the file."""
+    from app.panel.file.keys import add_locations
+    from app.panel.file.shape import merge_duplicates
+
+    merged = add_locations(merge_duplicates(faults), file.text, file.tables)
+    return tuple(sorted(merged, key=lambda fault: fault.line))

@@ -1,0 +1,1 @@
+"""The Zenoh session: samples, liveliness tokens, queries. It depends on no panel."""

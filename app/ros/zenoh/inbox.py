@@ -1,0 +1,282 @@
+"""The samples and tokens that a link has received, as latest values: never a queue that grows.
+
+The link's threads only replace values, under a lock. The event loop is woken once, until it drains the
+inbox. Knows nothing of Zenoh.
+"""
+
+import itertools
+import threading
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from app.ros.zenoh.sample import Buffer, Sample, SkippedPayload
+from app.system.limits import BoundedQueue
+
+UNSEEN_MOST: Final = 256  # changes of a lossless topic that are kept from one drain to the next
+UNSEEN_BYTES: Final = 1_000_000  # and their bytes
+KEPT_MOST: Final = 4_000  # samples of all recorded topics that are kept from one drain to the next
+KEPT_BYTES: Final = 32_000_000  # and their bytes
+
+NO_KEYS: Final[frozenset[str]] = frozenset()
+
+
+class Stamp(Protocol):
+    """When a sample was sent, by the sender's clock, and the sender's id."""
+
+    def get_id(self) -> Any: ...
+    def get_time(self) -> Any: ...
+
+
+@dataclass(slots=True)
+class Token:
+    """The changes of a liveliness token since the last drain.
+
+    `lost_seq` and `came_seq` order its last loss and its last appearance among the samples; 0 means
+    none. `came_at` (monotonic seconds) is when it appeared, `lost_before` the `lost_seq` before that.
+    """
+
+    alive: bool = False
+    lost_seq: int = 0
+    came_seq: int = 0
+    came_at: float = 0.0
+    lost_before: int = 0
+
+
+@dataclass(slots=True)
+class Changes:
+    """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
+    `recorded_samples` has every sample of the recorded topics. `caches` are (key, token) of the
+    publishers that keep their last message for late subscribers. `reopen`: the session has to be opened
+    again."""
+
+    samples: dict[str, Sample]
+    tokens: dict[str, Token]
+    link_up: bool
+    recorded_samples: Collection[tuple[str, Sample]] = ()
+    caches: Collection[tuple[str, str]] = ()
+    reopen: bool = False
+
+
+class Superseded:
+    """The messages of a topic since the last drain, without the newest: each change once. If there are
+    too many, the newest of them."""
+
+    __slots__ = ("overrun", "values")
+
+    def __init__(self) -> None:
+        self.values: BoundedQueue[SkippedPayload] = BoundedQueue(UNSEEN_MOST, UNSEEN_BYTES)
+        self.overrun = False
+
+    def add(self, arrived: "_Arrived") -> None:
+        if self.values.add(
+            SkippedPayload(arrived.payload, arrived.at, arrived.wall), len(arrived.payload)
+        ):
+            self.overrun = True
+
+
+@dataclass(slots=True)
+class _Arrived:
+    """A sample as received. Its stamp is read when it is drained."""
+
+    payload: Buffer
+    stamp: Stamp | None
+    seq: int
+    at: float
+    wall: float
+    cached: bool = False
+    skipped: int = 0
+    unseen: Superseded | None = None
+
+    def sample(self, kept: bool = False) -> Sample:
+        """`sent` is set for kept samples only: reading a stamp's time is slow."""
+        source = None if self.stamp is None else str(self.stamp.get_id())
+        sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
+        sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
+        if self.cached:
+            sample = sample._replace(cached=True)
+        if self.unseen is None:
+            return sample
+        return sample._replace(skipped_payloads=tuple(self.unseen.values), overrun=self.unseen.overrun)
+
+
+def _kept_samples() -> BoundedQueue[tuple[str, _Arrived]]:
+    return BoundedQueue(KEPT_MOST, KEPT_BYTES)
+
+
+class Inbox:
+    """Samples and tokens received by the current session of a link. Those of earlier sessions are
+    dropped."""
+
+    def __init__(self, wake: Callable[[bool], None]) -> None:
+        """`wake` is called on the link's threads, under the lock: with False for the first data after a
+        drain, with True for the first immediate data, which must not wait for the next frame."""
+        self._wake_loop = wake
+        self._lock = threading.Lock()
+        self._seq = itertools.count(1)
+        self._session = 0
+        self._immediate = self._lossless = self._recorded = self._idle = NO_KEYS
+        self._forget()
+
+    def _forget(self) -> None:
+        self._woken = self._has_immediate = False
+        self._samples: dict[str, _Arrived] = {}
+        self._idle_samples: dict[str, _Arrived] = {}
+        self._connections_changed = False
+        self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
+        self._tokens: dict[str, Token] = {}
+        self._caches: list[tuple[str, str]] = []
+        self._transports: set[str] = set()
+        self._kept = _kept_samples()
+
+    def set_topics(
+        self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
+    ) -> None:
+        """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
+        loop at once. Of `lossless` topics values that were replaced between two drains are kept. Every
+        sample of a `recorded` topic is kept."""
+        self._immediate = frozenset(immediate)
+        self._lossless = frozenset(lossless)
+        self._recorded = frozenset(recorded)
+
+    def set_idle(self, idle: Collection[str]) -> None:
+        """Sets the keys of the topics that no one looks at: their samples do not wake the event
+        loop."""
+        with self._lock:
+            self._idle = frozenset(idle)
+            self._samples |= self._idle_samples
+            self._idle_samples = {key: self._samples.pop(key) for key in idle if key in self._samples}
+
+    def renew(self) -> None:
+        """Begins a new session, with an empty inbox."""
+        with self._lock:
+            self._session += 1
+            self._forget()
+
+    def guarded(self, function: Callable[[Any], None]) -> Callable[[Any], None]:
+        """`function`, called under the lock. It does nothing once the session has been renewed."""
+        session = self._session
+
+        def handle(event: Any) -> None:
+            with self._lock:
+                if session == self._session:
+                    function(event)
+
+        return handle
+
+    def probe(self) -> None:
+        """Returns when the lock is free. Blocks while a callback holds it."""
+        with self._lock:
+            pass
+
+    @property
+    def has_idle(self) -> bool:
+        """Whether samples of topics that no one looks at are waiting."""
+        return bool(self._idle_samples)
+
+    def drain(self, whole: bool = True) -> Changes:
+        """Returns and removes everything received since the last call. Unless `whole`, what no one
+        looks at stays, as long as there is no change of the graph or of a connection: a sample counts
+        before what came after it."""
+        with self._lock:
+            self._woken = self._has_immediate = False
+            samples, self._samples = self._samples, {}
+            if self._idle_samples and (
+                whole or self._tokens or self._caches or self._connections_changed
+            ):
+                samples |= self._idle_samples
+                self._idle_samples = {}
+            self._connections_changed = False
+            tokens, self._tokens = self._tokens, {}
+            caches, self._caches = self._caches, []
+            kept, self._kept = self._kept, _kept_samples()
+            link_up = bool(self._transports)
+        return Changes(
+            {key: arrived.sample() for key, arrived in samples.items()},
+            tokens,
+            link_up,
+            [(key, arrived.sample(kept=True)) for key, arrived in kept] if kept else (),
+            caches,
+        )
+
+    @property
+    def has_immediate(self) -> bool:
+        """Whether immediate data has been received since the last drain."""
+        return self._has_immediate
+
+    # Below: on the link's threads, under the lock. No work here, and nothing may raise.
+
+    def put(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+        """A sample of a topic. Samples are in the order of reception, not of stamps: clocks may be
+        wrong."""
+        self._live[key] = stamp
+        self._add(key, payload, stamp)
+
+    def put_cached(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+        """A sample from a publisher's cache; ignored if the publisher has published since."""
+        if key in self._live:
+            last = self._live[key]
+            if last is None or stamp is None or last.get_id() == stamp.get_id():
+                return
+        self._add(key, payload, stamp, cached=True)
+
+    def _add(self, key: str, payload: Buffer, stamp: Stamp | None, cached: bool = False) -> None:
+        arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time(), cached)
+        is_idle = key in self._idle
+        samples = self._idle_samples if is_idle else self._samples
+        replaced = samples.get(key)
+        if replaced is not None:
+            arrived.skipped = replaced.skipped + 1
+            if key in self._lossless:
+                arrived.unseen = _unseen(replaced, payload)
+        samples[key] = arrived
+        if key in self._recorded:
+            self._keep(key, arrived)
+        if not is_idle:
+            self._wake(key in self._immediate)
+
+    def _keep(self, key: str, arrived: _Arrived) -> None:
+        self._kept.add((key, arrived), len(arrived.payload))
+
+    def token(self, key: str, alive: bool) -> None:
+        """A liveliness token appeared or was lost."""
+        seq = next(self._seq)
+        token = self._tokens.setdefault(key, Token())
+        token.alive = alive
+        if alive:
+            token.came_seq, token.came_at, token.lost_before = seq, time.monotonic(), token.lost_seq
+        else:
+            token.lost_seq = seq
+        self._wake(True)
+
+    def cache(self, key: str, token: str) -> None:
+        """The token of a cache of a topic's publisher appeared."""
+        self._caches.append((key, token))
+        self._wake(True)
+
+    def transport(self, zid: str, up: bool) -> None:
+        """A connection was opened or closed."""
+        if up:
+            self._transports.add(zid)
+        else:
+            self._transports.discard(zid)
+        self._connections_changed = True
+        self._wake(True)
+
+    def _wake(self, immediate: bool) -> None:
+        if immediate and not self._has_immediate:
+            self._has_immediate = self._woken = True
+            self._wake_loop(True)
+        elif not self._woken:
+            self._woken = True
+            self._wake_loop(False)
+
+
+def _unseen(replaced: _Arrived, newest: Buffer) -> Superseded | None:
+    """The messages before `newest` that have not been drained."""
+    unseen = replaced.unseen
+    if bytes(replaced.payload) != bytes(newest):
+        unseen = unseen or Superseded()
+        unseen.add(replaced)
+    return unseen

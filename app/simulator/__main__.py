@@ -1,8 +1,0 @@
-"""`python -m app.simulator`: the same as `operator-panel simulate`."""
-
-import sys
-
-from app.cli.simulate import main
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

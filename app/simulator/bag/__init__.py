@@ -1,1 +1,0 @@
-"""Recordings that are played in place of a simulated robot."""

@@ -1,1 +1,0 @@
-"""The story `palletizing`: a cell in which an arm stacks boxes on a pallet."""

@@ -1,1 +1,0 @@
-"""Values of messages, made from their types and what a panel says of its fields."""

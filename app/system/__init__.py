@@ -1,0 +1,1 @@
+"""What every room may use: texts, clock, disk, settings, logging, certificates, processes."""

@@ -1,0 +1,1 @@
+"""The commands, and what only they use: doctor, simulator, scaffold, install, kiosk."""

@@ -1,0 +1,1 @@
+"""The configurations of a cell's bridges and routers, which commands write from a panel file."""

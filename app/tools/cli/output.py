@@ -1,0 +1,55 @@
+"""Files that commands write. A file that exists is kept unless --force is given."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from app.system.errors import KioskError
+from app.tools.cli.parser import Parser
+
+NAME: Final = "give another name with -o"
+NAME_OR_FORCE: Final = f"{NAME}, or --force to replace it"
+
+
+class OutputError(KioskError):
+    """A file that can't be written."""
+
+
+def add_force(parser: Parser) -> None:
+    parser.add_argument("--force", action="store_true", help="replace FILE if it exists")
+
+
+def check_absent(file: Path, force: bool) -> None:
+    """OutputError if the file exists and is not to be replaced."""
+    if file.exists() and not force:
+        raise OutputError(f"{file} exists: {NAME_OR_FORCE}")
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """OSError of the block becomes an OutputError that names the file."""
+    try:
+        yield
+    except FileExistsError as error:
+        raise OutputError(f"{file} exists: {NAME}") from error
+    except OSError as error:
+        raise OutputError(f"{file} can't be written: {error.strerror}") from error
+
+
+@contextmanager
+def draft_of(file: Path, force: bool) -> Iterator[Path]:
+    """A file beside `file` that takes its place after the block: `file` is written whole or not at all.
+    OutputError if it can't be."""
+    target = file.resolve()  # a link stays one
+    draft = target.with_name(f".{target.name}.new")
+    try:
+        with writing(file):
+            draft.unlink(missing_ok=True)
+            draft.touch(exist_ok=False)  # not a link that somebody has put there
+            yield draft
+            check_absent(file, force)
+            draft.replace(target)
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)

@@ -1,0 +1,220 @@
+"""Downloads: exports as CSV, parts of a file, and recordings that are shared with Foxglove."""
+
+import asyncio
+import logging
+import re
+import secrets
+import time
+from collections import OrderedDict
+from collections.abc import AsyncIterator, Mapping
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final, NamedTuple
+from urllib.parse import urlencode
+
+from fastapi import Request
+from fastapi.responses import Response, StreamingResponse
+from starlette.types import Message, Receive, Scope, Send
+
+from app.records import ReaderProcess
+from app.system.errors import LogError
+
+# The response with an export as CSV, which another process makes.
+
+log = logging.getLogger("kiosk.log")
+
+TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
+START: Final = "http.response.start"
+BODY: Final = "http.response.body"
+
+
+class Exported(Response):
+    """The response with an export, sent piece by piece. An export that fails, or that no client reads,
+    is not terminated: no client takes it for complete."""
+
+    media_type = "text/csv"
+
+    def __init__(
+        self, export: ReaderProcess, first: bytes, gzip: bool, opened: AsyncExitStack, name: str
+    ) -> None:
+        """`opened` is closed when it is over; `name` says what is exported: "operator's log"."""
+        self._name = name
+        begin = name.replace(" ", "-").replace("'", "")
+        name = f"{begin}-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
+        headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+        if gzip:
+            headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
+        self._export = export
+        self._first = first
+        self._opened = opened
+        self.status_code = 200
+        self.background = None
+        self.init_headers(headers)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async with self._opened, asyncio.TaskGroup() as group:
+            going = group.create_task(self._gone(receive))
+            try:
+                await self._send(send, going)
+            except TimeoutError:
+                log.warning("an export of the %s was not taken for %g s", self._name, TAKEN_WITHIN_S)
+            except LogError as error:
+                if not going.done():
+                    log.warning("an export of the %s broke off: %s", self._name, error)
+            going.cancel()
+
+    async def _send(self, send: Send, going: "asyncio.Task[None]") -> None:
+        await _send_in_time(send, {"type": START, "status": 200, "headers": self.raw_headers})
+        piece = self._first
+        while piece and not going.done():
+            await _send_in_time(send, {"type": BODY, "body": piece, "more_body": True})
+            piece = await self._export.read_next()
+        await self._opened.aclose()  # who has it whole may ask for the next
+        await _send_in_time(send, {"type": BODY, "body": b"", "more_body": False})
+
+    async def _gone(self, receive: Receive) -> None:
+        """Returns when the client has disconnected."""
+        while (await receive())["type"] != "http.disconnect":
+            pass
+        self._export.kill()
+
+
+async def _send_in_time(send: Send, message: Message) -> None:
+    """TimeoutError where no client takes it."""
+    async with asyncio.timeout(TAKEN_WITHIN_S):
+        await send(message)
+
+
+# Ranges of a file in memory (RFC 9110, 14): the answer to a GET with or without a `Range`.
+
+PIECE: Final = 256_000  # bytes sent at once
+RANGE: Final = re.compile(r"bytes=[ \t]*(?P<first>\d{0,18})-(?P<last>\d{0,18})[ \t]*")
+
+
+def ranged(request: Request, content: bytes, etag: str, headers: Mapping[str, str]) -> Response:
+    """200 with the file, 206 with the range that is asked for, 416 where the file has none of it.
+    Several ranges and what is not a range are answered with the whole file, as is a range of another
+    version (`If-Range`)."""
+    size = len(content)
+    headers = {**headers, "accept-ranges": "bytes", "etag": etag}
+    wanted = RANGE.fullmatch(request.headers.get("range", ""))
+    if wanted is None or wanted[0].endswith("=-") or request.headers.get("if-range", etag) != etag:
+        return _streamed(content, 0, size, 200, headers)
+    first, end = _bounds(wanted["first"], wanted["last"], size)
+    if wanted["last"] and wanted["first"] and int(wanted["last"]) < int(wanted["first"]):
+        return _streamed(content, 0, size, 200, headers)
+    if first >= end:
+        return Response(status_code=416, headers={**headers, "content-range": f"bytes */{size}"})
+    headers["content-range"] = f"bytes {first}-{end - 1}/{size}"
+    return _streamed(content, first, end, 206, headers)
+
+
+def _bounds(first: str, last: str, size: int) -> tuple[int, int]:
+    """The first byte and the one after the last; "-500" are the last 500."""
+    if not first:
+        return max(size - int(last), 0), size
+    return int(first), min(int(last) + 1, size) if last else size
+
+
+def _streamed(
+    content: bytes, first: int, end: int, status: int, headers: Mapping[str, str]
+) -> Response:
+    """In pieces: no more is waiting for a slow client than one of them."""
+    view = memoryview(content)
+
+    async def pieces() -> AsyncIterator[memoryview]:
+        for at in range(first, end, PIECE):
+            yield view[at : min(at + PIECE, end)]
+
+    length = {"content-length": str(end - first)}
+    return StreamingResponse(pieces(), status, {**headers, **length})
+
+
+# Recordings that are shared with Foxglove for some minutes, each below an address with a secret token.
+#
+# Foxglove reads a file from another origin, without the panel's cookies: the token in the address is
+# what permits it. Recordings are in memory only and end with the server. Used on the event loop only.
+
+VALID_S: Final = 600.0
+COUNT_MOST: Final = 3
+BYTES_MOST: Final = 64_000_000  # of all together; the newest is kept, however large it is
+TOKEN_BYTES: Final = 32
+BROWSER: Final = "https://app.foxglove.dev/~/view"
+DESKTOP: Final = "foxglove://open"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SharedRecording:
+    """An MCAP file as it was at `at`; `until` is when it ends: both in seconds since the epoch. `robot`
+    is the robot's id, "" on a panel with one robot; `act_id` is the act that shared it."""
+
+    token: str
+    content: bytes
+    etag: str
+    robot: str
+    act_id: str
+    at: float
+    until: float
+
+
+class SharedRecordings:
+    """The latest recordings, at most `COUNT_MOST` of `BYTES_MOST` together, each for `valid_s`."""
+
+    def __init__(self, valid_s: float = VALID_S) -> None:
+        self._valid_s = valid_s
+        self._by_token: OrderedDict[str, SharedRecording] = OrderedDict()  # the oldest first
+
+    def share(self, content: bytes, robot: str, act_id: str) -> SharedRecording:
+        """Shares a file under a new token; the oldest ones end if there are too many."""
+        now = time.time()
+        recording = SharedRecording(
+            token=secrets.token_urlsafe(TOKEN_BYTES),
+            content=content,
+            etag=f'"{secrets.token_hex(16)}"',
+            robot=robot,
+            act_id=act_id,
+            at=now,
+            until=now + self._valid_s,
+        )
+        self._by_token[recording.token] = recording
+        while len(self._by_token) > 1 and self._too_many():
+            self._by_token.popitem(last=False)
+        asyncio.get_running_loop().call_later(self._valid_s, self._end, recording.token)
+        return recording
+
+    def by_token(self, token: str) -> SharedRecording | None:
+        """The recording with this token, until it ends."""
+        return self._by_token.get(token)
+
+    def by_act(self, act_id: str) -> SharedRecording | None:
+        """The recording that this act shared, until it ends."""
+        return next((shared for shared in self._by_token.values() if shared.act_id == act_id), None)
+
+    def latest(self, robot: str) -> SharedRecording | None:
+        """The newest recording of a robot, until it ends."""
+        return next((s for s in reversed(self._by_token.values()) if s.robot == robot), None)
+
+    def _too_many(self) -> bool:
+        size = sum(len(recording.content) for recording in self._by_token.values())
+        return len(self._by_token) > COUNT_MOST or size > BYTES_MOST
+
+    def _end(self, token: str) -> None:
+        self._by_token.pop(token, None)
+
+
+class SharedLinks(NamedTuple):
+    """Where a shared recording is, and the links that open it in Foxglove in a browser and in its
+    desktop app."""
+
+    recording: SharedRecording
+    address: str
+    browser: str
+    desktop: str
+
+
+def links_of(recording: SharedRecording, base_url: str) -> SharedLinks:
+    """The links of a recording; `base_url` is that of the panel as the client names it."""
+    address = f"{base_url.rstrip('/')}/recordings/shared/{recording.token}.mcap"
+    source = urlencode({"ds": "remote-file", "ds.url": address})
+    return SharedLinks(recording, address, f"{BROWSER}?{source}", f"{DESKTOP}?{source}")

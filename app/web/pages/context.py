@@ -1,0 +1,348 @@
+"""The context of a page: the frame around it, and what its scripts read when they start."""
+
+import json
+import secrets
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Any, Final, NamedTuple, TypedDict
+from urllib.parse import urlencode
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse, Response
+from markupsafe import Markup
+
+from app.cell.commands.control_acts import TOO_OFTEN
+from app.cell.commands.receipts import Receipt
+from app.cell.permission.roles import role_reason, unmet
+from app.cell.session.session import RobotSession
+from app.cell.view.publisher import SECTIONS, Section
+from app.cell.view.times import BAD_S, GOOD_S
+from app.cell.view.view import View, audience, audience_of
+from app.panel.frame_keys import FrameKey, frame_keys
+from app.panel.layout import FRAME_OF_ALL, FRAME_ONLY, FRAMES, Page
+from app.panel.model import Panel
+from app.panel.roles import OPERATOR
+from app.panel.widgets.families import BaseWidget, Command
+from app.panel.widgets.key_parts import confirmation_of
+from app.records.entry import GOOD_OUTCOMES
+from app.records.principal import Principal
+from app.system import clock
+from app.system.clock import format_datetime, format_day, format_time, iso_time
+from app.system.printable import printable_texts
+from app.system.texts import Text, TextLike, localized, say
+from app.web.alarm_runs import command_text
+from app.web.app_state import AppState
+from app.web.assets import PICTURES
+from app.web.client import QUERY as EMBED
+from app.web.client import only_shows, opened_by_person, principal_with_new_token, set_client_cookie
+from app.web.language import language_of
+from app.web.pages.alarms import sheet_words
+from app.web.pages.display_choice import (
+    Choice,
+    DisplaySettings,
+    choices,
+    display_of,
+    language_choice,
+)
+from app.web.pages.sign_in import SignedIn, signed_in
+from app.web.pages.words import page_words
+
+# What the scripts of a page read when they start: one block of JSON in its markup.
+
+# The sentences that the browser shows by itself, by their names in the scripts.
+SENTENCES: Final = {
+    "lost": say("server_lost"),
+    "lostShort": say("lost"),
+    "locksAll": say("locks_all"),
+    "unknown": say("unknown"),
+    "unsure": say("server_no_response"),
+    "broken": say("widget_failed"),
+    "unsent": say("page_press_not_sent"),
+    "faulty": say("page_incomplete"),
+    "tooOld": say("browser_too_old"),
+    "stateUnknown": say("state_unknown"),
+}
+ESCAPED: Final = str.maketrans({sign: f"\\u{ord(sign):04x}" for sign in "<>&"})
+
+
+def panel_data(panel: Panel, page: Page, scripts: Mapping[str, str]) -> Mapping[str, Any]:
+    """What a page has from the panel file; `scripts` has the script of each kind of widgets that has
+    one."""
+    kinds = dict.fromkeys(widget.kind for widget in (*page.widgets, *panel.frame.widgets))
+    return {
+        "page": page.id,
+        "keyboard": panel.keyboard,
+        "dimAfterS": panel.screen.dim_after_s,
+        "sections": [section.name for section in SECTIONS if section.on_page],
+        "confirms": [widget.id for widget in confirmed_commands(panel, page)],
+        "kinds": {kind: scripts[kind] for kind in kinds if kind in scripts},
+    }
+
+
+def confirmed_commands(panel: Panel, page: Page) -> list[Command]:
+    """The commands that a page may press and that a person confirms."""
+    shown = (*page.widgets, *panel.frame.widgets, *panel.recipe_loads)
+    return [w for w in shown if isinstance(w, Command) and confirmation_of(w)]
+
+
+def page_json(data: Mapping[str, Any], language: str) -> Markup:
+    """`data` and the sentences as JSON for a `script` element that is not executed."""
+    text = json.dumps(
+        localized({**data, "sentences": SENTENCES}, language), ensure_ascii=False, separators=(",", ":")
+    )
+    return Markup(text.translate(ESCAPED))
+
+
+# The context of `frame.html`, the frame around every page.
+
+TOO_SOON: Final = say("press_too_soon")
+RELOADED: Final = "reloaded"  # by itself, without a tap
+RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a press on it is refused
+
+
+class PageContext(TypedDict):
+    """The variables of `frame.html` and `screen.html`."""
+
+    site: AppState
+    display: DisplaySettings
+    choices: Sequence[Choice]
+    panel: Panel
+    tabs: Sequence[Page]
+    page: Page
+    railed: bool
+    is_log: bool
+    is_alarms: bool
+    is_diagnostics: bool
+    is_help: bool
+    is_recipes: bool
+    inside: Markup | None
+    base: str
+    robot: str
+    view: View
+    sections: Sequence[Section]
+    event_id: str
+    clock: Text
+    day: Text
+    clock_at: str
+    loaded: Text
+    press_id: str
+    receipt: Receipt | None
+    inputs: dict[str, Any]
+    words: dict[str, Any]
+    page_json: Markup
+    refresh_s: int
+    since: float | None
+    again: str
+    until: float
+    browser: str
+    refused: TextLike
+    back: str
+    alarm_refused: TextLike
+    own_path: str
+    me: SignedIn
+    confirms: bool
+    frame_keys: Sequence[FrameKey]
+    good_outcomes: Collection[str]
+
+
+def page_context(
+    request: Request,
+    state: AppState,
+    session: RobotSession,
+    page: Page,
+    who: Principal,
+    refresh_s: int,
+    embedded: bool = False,
+    alarms_page: str | None = None,
+    diagnostics_query: str | None = None,
+    is_help: bool = False,
+    recipes_page: str | None = None,
+    own_path: str = "",
+) -> PageContext:
+    """The context of a page for one request, but `inside`, which the page's own template renders.
+    `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
+    query of the page of diagnostics, for that page; `is_help`: it is the page of help;
+    `recipes_page` as `alarms_page`, for recipes; `own_path`: the path of a page like that of sign-in.
+    `embedded`: it is for a frame of another page."""
+    publisher, rules = session.publisher, session.control.rules
+    receipt = _faded(state.fleet.receipt(session, request.query_params.get("receipt", "")))
+    again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
+    again |= {EMBED: 1} if embedded else {}
+    now, wall = clock.server_now(), time.time()
+    panel, language = state.fleet.panel, language_of(request)
+    lacks = unmet(panel.needs.named, who)
+    no_role = OPERATOR in lacks
+    if only_shows(session.panel.embed, embedded):
+        of_client = audience("embedded", language, lacks=lacks)
+    else:
+        others = publisher.shared.controls
+        of_client = audience_of(
+            who, publisher.view["control"], rules, language, others, panel.needs.named
+        )
+    with publisher.watching(publisher.shown_page(page.id)):
+        view = publisher.for_audience(of_client)
+    display = display_of(request, panel)
+    embed = f"?{EMBED}=1" if embedded else ""
+    is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
+    is_recipes = recipes_page is not None
+    is_other = is_alarms or is_diagnostics or is_help or is_recipes or bool(own_path)
+    is_log = page.id in FRAMES and not is_other
+    back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
+    if is_diagnostics:
+        back = f"{state.root}/diagnostics?{diagnostics_query}"
+    if is_help:
+        back = f"{state.root}/help"
+    if is_recipes:
+        back = f"{session.base}/{recipes_page}"
+    if own_path:
+        back = f"{state.root}{own_path}"
+    data = {
+        **panel_data(panel, page, state.assets.scripts),
+        "base": session.base,
+        "embed": embed,
+        "revision": publisher.revision,
+        "seen": publisher.id,
+        "now": round(now * 1000),
+        "sounds": display.sounds == "on",
+    }
+    return PageContext(
+        site=state,
+        display=display,
+        choices=[*language_choice(panel, language), *choices(display)],
+        panel=panel,
+        tabs=[other for other in panel.pages if who.meets(other.needs or "")],
+        page=page,
+        railed=panel.has_rail or page.id in FRAMES,
+        is_log=is_log,
+        is_alarms=is_alarms,
+        is_diagnostics=is_diagnostics,
+        is_help=is_help,
+        is_recipes=is_recipes,
+        own_path=own_path,
+        me=signed_in(state, who),
+        confirms=bool(confirmed_commands(panel, page)),
+        frame_keys=[*frame_keys(panel, session.entry.id if session.entry else None, page.id)],
+        good_outcomes=GOOD_OUTCOMES,
+        inside=None,
+        base=session.base,
+        robot=session.entry.id if session.entry else "",
+        view=view,
+        sections=SECTIONS,
+        event_id=publisher.id,
+        clock=format_time(wall),
+        day=format_day(wall),
+        clock_at=iso_time(wall),
+        loaded=format_datetime(wall),
+        press_id=secrets.token_hex(8),
+        receipt=receipt,
+        inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
+        words={
+            "embed": embed,
+            "root": state.root,
+            "may_act": of_client.has_control and not no_role,
+            "no_role": no_role,
+        }
+        | page_words(
+            state.fleet,
+            session,
+            page,
+            f"{state.root}/static/{state.assets.revision}/{PICTURES}",
+            language,
+        )
+        | sheet_words(who)
+        | ({"alarm_needs_control": role_reason(OPERATOR)} if no_role else {}),
+        page_json=page_json(data, language),
+        refresh_s=refresh_s,
+        since=None if RELOADED in request.query_params else round(now, 3),
+        again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
+        until=round(now + refresh_s + RELOADED_S, 3),
+        browser=who.client.id,
+        refused=_refused(session, request.query_params.get("control", "")),
+        back=f"{state.root}/{alarms_page}" if is_alarms else back,
+        alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
+    )
+
+
+def _faded(receipt: Receipt | None) -> Receipt | None:
+    """The receipt, without its sentence once that is too old to be shown."""
+    if receipt is None:
+        return None
+    age_s = time.time() - datetime.fromisoformat(receipt.at).timestamp()
+    kept_s = GOOD_S if receipt.outcome in GOOD_OUTCOMES else BAD_S
+    return receipt if age_s < kept_s else replace(receipt, reason="")
+
+
+def _refused(session: RobotSession, query: str) -> TextLike:
+    """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
+    if query == TOO_OFTEN.code:
+        return TOO_OFTEN
+    receipt = session.control_acts.receipt(query)
+    return receipt.reason if receipt else ""
+
+
+def _alarm_refused(state: AppState, query: str) -> TextLike:
+    """What the receipt of an act on alarms says: `query` is its id, or the code where it is not
+    kept."""
+    if query in (TOO_OFTEN.code, TOO_SOON.code):
+        return say(query)
+    for session in state.fleet.sessions:
+        if receipt := session.alarm_acts.receipt(query):
+            return command_text(session, query) or receipt.reason
+    return ""
+
+
+# A page that is none of the panel's own, such as the operator's log, in the frame of the panel.
+
+REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not been loaded for so long
+
+
+class FramedPage(NamedTuple):
+    """`robot` is the id of the robot whose frame is around the page, "" for that of all, which has the
+    state of the first. `alarms_page` is
+    the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
+    for another page. `is_help`: it is the page of help. `vary` names the request header by which the
+    address has another content. `recipes_page` is the path and query of the page of recipes, `entries`
+    is what is entered on it. `own_path` is the path of another page, such as that of sign-in. `status`
+    is that of the answer, such as 404."""
+
+    template: str
+    title: Text
+    robot: str = ""
+    alarms_page: str | None = None
+    diagnostics_query: str | None = None
+    is_help: bool = False
+    vary: str = ""
+    recipes_page: str | None = None
+    entries: Sequence[BaseWidget] = ()
+    own_path: str = ""
+    status: int = 200
+
+
+def framed_page(
+    request: Request, state: AppState, page: FramedPage, context: Mapping[str, Any]
+) -> Response:
+    """The page with the variables `context`, in the language of the request."""
+    session = state.fleet.of_robot(page.robot)
+    who, token = principal_with_new_token(request, state, embedded=False)
+    if session.control.rules.required:
+        session.control.loaded(who, REFRESH_S, opened_by_person(request))
+        session.show()
+    own, page_id = tuple(page.entries), FRAME_ONLY if page.robot else FRAME_OF_ALL
+    frame = page_context(
+        request,
+        state,
+        session,
+        Page.model_construct(None, id=page_id, title=page.title, own=own, groups=()),
+        who,
+        REFRESH_S,
+        alarms_page=page.alarms_page,
+        diagnostics_query=page.diagnostics_query,
+        is_help=page.is_help,
+        recipes_page=page.recipes_page,
+        own_path=page.own_path,
+    )
+    html = state.templates.render(page.template, language_of(request), **frame, **context)
+    headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})
+    return set_client_cookie(HTMLResponse(html, page.status, headers), request, token)

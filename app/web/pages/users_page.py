@@ -1,0 +1,168 @@
+"""The page of users: the list of users or of tokens, one of them, and the forms that change it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Final, Literal, TypedDict
+
+from app.cell.commands.acts import ActRequest
+from app.cell.people.access import Access
+from app.cell.people.secrets_hash import WAYS, Way
+from app.cell.people.users import User
+from app.panel.roles import ENGINEER, OPERATOR, ROLES
+from app.records.principal import Principal
+from app.system.clock import format_datetime
+from app.system.texts import Param, Text, TextLike, joined, number, say
+from app.web.pages.sign_in import ROLE_WORDS
+
+Mode = Literal["show", "add", "role", "pin", "password", "badge", "remove", "token", "revoke"]
+OF_TOKENS: Final = frozenset({"token", "revoke"})
+
+
+@dataclass(frozen=True, slots=True)
+class UserRow:
+    """A user or token in the list."""
+
+    name: str
+    about: TextLike
+    mark: TextLike = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SelectedAccount:
+    """The user or token that is shown: its facts as (name, text); `version` is the number of its last
+    change."""
+
+    name: str
+    role: str
+    groups: Sequence[str]
+    ways: Sequence[Way]
+    disabled: bool
+    facts: list[tuple[Text, TextLike]]
+    version: int
+
+
+class UsersContext(TypedDict):
+    """The variables of `users.html`, beside those of the frame. `typed` is what a refused form had."""
+
+    tokens: bool
+    mode: Mode
+    rows: list[UserRow]
+    count: Text
+    chosen: SelectedAccount | None
+    detailed: bool
+    roles: Mapping[str, TextLike]
+    groups: Sequence[str]
+    typed: Mapping[str, Any]
+    said: TextLike
+    token: str
+    is_open: bool
+
+
+def word(name: str, /, **about: Param) -> Text:
+    return say(f"users_page_{name}", **about)
+
+
+def users_context(
+    access: Access,
+    groups: Sequence[str],
+    who: Principal,
+    name: str,
+    tokens: bool,
+    mode: Mode,
+    said: TextLike = "",
+    refused: ActRequest | None = None,
+    token: str = "",
+) -> UsersContext:
+    """What the page shows now. `name` is that of the chosen user or token, `refused` an act whose form
+    is shown again, `token` one that was made just now."""
+    tokens = tokens or mode in OF_TOKENS
+    book = access.book
+    rows = _token_rows(access) if tokens else [_row(user, who) for user in book.users]
+    names = [row.name for row in rows]
+    shown = name if name in names else next(iter(names), "") if not name else ""
+    chosen = (_token if tokens else _user)(access, shown) if shown else None
+    if not access.configured and mode == "show":
+        mode = "add"
+    needs_one = mode not in ("show", "add", "token")
+    typed = _typed(refused, chosen if mode == "role" else None, ENGINEER if not rows else OPERATOR)
+    of_user = chosen.groups if chosen else ()
+    return UsersContext(
+        tokens=tokens,
+        mode="show" if needs_one and chosen is None else mode,
+        rows=rows,
+        count=word("count", count=number(str(len(rows)))),
+        chosen=chosen,
+        detailed=bool(name) and chosen is not None,
+        roles={role: ROLE_WORDS[role] for role in ROLES},
+        groups=tuple(dict.fromkeys((*groups, *of_user))),
+        typed=typed,
+        said=said,
+        token=token,
+        is_open=not access.configured,
+    )
+
+
+def _typed(refused: ActRequest | None, chosen: SelectedAccount | None, role: str) -> dict[str, Any]:
+    """What the fields of the form have at first."""
+    empty = {"name": "", "role": role, "groups": ()}
+    if refused is not None:
+        return {**empty, **refused.values, "name": refused.object}
+    if chosen is not None:
+        return {**empty, "role": chosen.role, "groups": chosen.groups}
+    return empty
+
+
+def _row(user: User, who: Principal) -> UserRow:
+    is_self = user.name == who.user
+    mark: TextLike = word("you") if is_self else word("disabled") if user.disabled else ""
+    return UserRow(user.name, _role(user.role, user.groups), mark)
+
+
+def _token_rows(access: Access) -> list[UserRow]:
+    return [UserRow(token.name, ROLE_WORDS[token.role]) for token in access.book.tokens]
+
+
+def _role(role: str, groups: Sequence[str]) -> TextLike:
+    return joined((ROLE_WORDS[role], *groups), "between_names")
+
+
+def _user(access: Access, name: str) -> SelectedAccount | None:
+    user = access.book.user(name)
+    if user is None:
+        return None
+    ways = [word(way) for way in WAYS if way in user.ways]
+    facts: list[tuple[Text, TextLike]] = [
+        (word("role"), _role(user.role, user.groups)),
+        (word("ways"), joined(ways, "between_names") if ways else word("none")),
+        (word("last"), _time(access.log.last.users.get(user.name, ""))),
+        (word("created"), _time(user.created)),
+        (word("changed"), _time(user.changed)),
+    ]
+    version = access.book.version(user.name)
+    about = (user.name, user.role, user.groups, user.ways, user.disabled)
+    return SelectedAccount(*about, facts, version)
+
+
+def _token(access: Access, name: str) -> SelectedAccount | None:
+    token = next((token for token in access.book.tokens if token.name == name), None)
+    if token is None:
+        return None
+    facts: list[tuple[Text, TextLike]] = [
+        (word("role"), ROLE_WORDS[token.role]),
+        (word("last_used"), _time(access.log.last.tokens.get(token.name, ""))),
+        (word("created"), _time(token.created)),
+    ]
+    return SelectedAccount(
+        token.name, token.role, (), (), False, facts, access.book.version(token.name)
+    )
+
+
+def _time(text: str) -> TextLike:
+    """A time of the users' file in the reader's language; "never" for none."""
+    if not text:
+        return word("never")
+    try:
+        return format_datetime(datetime.fromisoformat(text).timestamp())
+    except ValueError:
+        return text

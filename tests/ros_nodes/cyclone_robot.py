@@ -1,0 +1,204 @@
+"""A robot on Cyclone DDS for the tests, driven by JSON lines: see `commands.py`.
+
+It is a true DDS peer of the bridge, without ROS 2: services, an action, parameters and topics, on
+the wire as rmw_cyclonedds writes them. It runs in an environment of its own, with `cyclonedds` and
+nothing of the kiosk. Unlike a node of rmw_cyclonedds, it drops a request that is too short for its
+type.
+"""
+
+import os
+import sys
+import threading
+from typing import Any
+
+from commands import obey
+from cyclone_action import ABORTED, CANCELED, Fibonacci
+from cyclone_node import Answer, Node, publishers, qos_of, subscribers
+from cyclone_parameters import Parameters
+from cyclone_types import (
+    AddTwoInts_Request,
+    AddTwoInts_Response,
+    Bool,
+    GetTypeDescription_Request,
+    GetTypeDescription_Response,
+    Gripper,
+    Jaw,
+    SetBool_Request,
+    SetBool_Response,
+    String,
+    Trigger_Request,
+    Trigger_Response,
+    described,
+    plain,
+)
+
+# Types of plain topics, each with the hash that ROS 2 computes of its definition.
+TOPIC_TYPES: dict[str, tuple[type, str]] = {
+    "std_msgs/msg/String": (
+        String,
+        "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    ),
+    "std_msgs/msg/Bool": (
+        Bool,
+        "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
+    ),
+}
+HEADER = ("guid", "sequence_number", "structure_needs_at_least_one_member")
+
+
+class Commands:
+    def __init__(self, name: str, domain: int) -> None:
+        self._node = Node(name, domain, self._called)
+        self._calls: list[dict[str, Any]] = []
+        self._readers: dict[str, Any] = {}
+        self._heard_on: dict[str, list[Any]] = {}
+        self._answer_of_set_enabled = (True, "")
+        self._slow_s: float | None = 1.0
+        self._node.serve("/set_enabled", SetBool_Request, SetBool_Response, self._on_set_enabled)
+        self._node.serve("/reset", Trigger_Request, Trigger_Response, self._on_reset)
+        self._node.serve("/add_two_ints", AddTwoInts_Request, AddTwoInts_Response, self._on_add)
+        for slow in ("/slow", "/slow_2", "/slow_3"):
+            self._node.serve(slow, Trigger_Request, Trigger_Response, self._on_slow)
+        self._fibonacci = Fibonacci(self._node)
+        self._parameters = Parameters(self._node)
+        self._node.start()
+
+    def unmatched(self) -> list[str]:
+        """The services that no client's reader and writer have found yet."""
+        return [name for name, service in self._node.services.items() if not service.matched]
+
+    def calls(self, service: str = "") -> list[dict[str, Any]]:
+        """Every request that was executed, in order."""
+        return [call for call in self._calls if service in ("", call["service"])]
+
+    def answer_set_enabled(self, success: bool, message: str = "") -> None:
+        self._answer_of_set_enabled = (success, message)
+
+    def answer_slow(self, seconds: float | None) -> None:
+        """After how many seconds /slow, /slow_2 and /slow_3 answer; None: never."""
+        self._slow_s = seconds
+
+    def fibonacci(self, **settings: Any) -> None:
+        self._fibonacci.configure(**settings)
+
+    def goals(self) -> list[dict[str, Any]]:
+        return self._fibonacci.goals()
+
+    def abort(self, goal: str = "") -> int:
+        return self._fibonacci.end(ABORTED, goal)
+
+    def cancel(self, goal: str = "") -> int:
+        return self._fibonacci.end(CANCELED, goal)
+
+    def parameters(self) -> dict[str, Any]:
+        return self._parameters.values()
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        self._parameters.take(name, value)
+
+    def set_parameters(self, values: dict[str, Any]) -> None:
+        self._parameters.take_all(values)
+
+    def declare_parameter(self, name: str, value: Any, **descriptor: Any) -> None:
+        self._parameters.declare(name, value, **descriptor)
+
+    def undeclare_parameter(self, name: str) -> None:
+        self._parameters.undeclare(name)
+
+    def answer_parameters(self, service: str, seconds: float | None) -> None:
+        self._parameters.answer(service, seconds)
+
+    def refuse_parameters(self, reason: str) -> None:
+        self._parameters.refusal = reason
+
+    def refuse_value(self, name: str, value: Any) -> None:
+        """The node does not take this value of a parameter, which its descriptor permits."""
+        self._parameters.odd[name] = value
+
+    def parameter_requests(self, service: str) -> int:
+        return self._parameters.requests(service)
+
+    def advertise(self, topic: str, type: str, hash: str = "", **qos: Any) -> None:
+        """`hash` is that of another definition of the type."""
+        idl, own_hash = TOPIC_TYPES[type]
+        hash_ = hash or own_hash
+        profile = qos_of(**qos, user_data=f"typehash={hash_};")
+        self._node.advertise(topic, idl, profile)
+        self._node.tell()
+
+    def publish(self, topic: str, fields: dict[str, Any]) -> None:
+        publisher = self._node.published[topic]
+        publisher.write(publisher.data_type(**fields))
+
+    def subscribers(self, topic: str) -> int:
+        """How many listen to a topic, be it the action's or `/parameter_events`."""
+        return subscribers(self._node.published[topic])
+
+    def subscribe(self, topic: str, type: str, **qos: Any) -> None:
+        idl, hash_ = TOPIC_TYPES[type]
+        heard = self._heard_on.setdefault(topic, [])
+        profile = qos_of(**qos, user_data=f"typehash={hash_};")
+        self._readers[topic] = self._node.subscribe(
+            topic, idl, profile, lambda message: heard.append(plain(message))
+        )
+        self._node.tell()
+
+    def publishers(self, topic: str) -> int:
+        return publishers(self._readers[topic])
+
+    def heard(self, topic: str) -> list[Any]:
+        return self._heard_on[topic]
+
+    def describe_gripper(self, types: list[dict[str, Any]], hash: str) -> None:
+        """Publishes gripper_msgs/msg/Gripper on /gripper, and describes it by `get_type_description`
+        to who gives its hash."""
+
+        def describe(request: GetTypeDescription_Request, answer: Answer) -> None:
+            good = (request.type_name, request.type_hash) == (types[0]["type_name"], hash)
+            reason = "" if good else "no such type"
+            answer(GetTypeDescription_Response(good, reason, described(types), [], []))
+
+        service = f"/{self._node.name}/get_type_description"
+        self._node.serve(service, GetTypeDescription_Request, GetTypeDescription_Response, describe)
+        self._node.advertise(
+            "/gripper",
+            Gripper,
+            qos_of(depth=1, durability="transient_local", user_data=f"typehash={hash};"),
+        )
+        self._node.tell()
+        self._node.published["/gripper"].write(Gripper(0.05, [Jaw("left", 2.5), Jaw("right", 3.0)]))
+
+    def close(self) -> None:
+        self._node.close()
+
+    def _called(self, service: str, request: Any) -> None:
+        """Keeps what came, without what is not of its definition."""
+        sent = {name: value for name, value in plain(request).items() if name not in HEADER}
+        self._calls.append({"service": service, "request": sent})
+
+    def _on_set_enabled(self, request: SetBool_Request, answer: Answer) -> None:
+        success, message = self._answer_of_set_enabled
+        answer(SetBool_Response(success, message))
+
+    def _on_reset(self, request: Trigger_Request, answer: Answer) -> None:
+        answer(Trigger_Response(True, "reset"))
+
+    def _on_add(self, request: AddTwoInts_Request, answer: Answer) -> None:
+        answer(AddTwoInts_Response(request.a + request.b))
+
+    def _on_slow(self, request: Trigger_Request, answer: Answer) -> None:
+        if self._slow_s is None:
+            return
+        later = threading.Timer(self._slow_s, answer, [Trigger_Response(True, "done")])
+        later.daemon = True
+        later.start()
+
+
+def main() -> None:
+    commands = Commands(sys.argv[1], int(os.environ["ROS_DOMAIN_ID"]))
+    obey(commands)
+    commands.close()
+
+
+if __name__ == "__main__":
+    main()
