@@ -14,7 +14,7 @@ from app.panel.widgets.tiles import Screen
 from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.finger import Touch
-from tests.support.browser.pages import DRAWN, HIDE, middle, place
+from tests.support.browser.pages import DRAWN, HIDE, middle, place, widget
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server, panel_file
 from tests.web.test_alarms import LOW, PANEL, act, listed, server_with
@@ -25,6 +25,31 @@ SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 LINE: Final = ".alarm-line"
 BUTTON: Final = ".alarm-line button"
 NOW_AND_THEN: Final = "values = [6.0, 4.5], period_s = 8.0"
+TILE: Final = """
+[[page.group]]
+title = "{id}"
+[[page.group.widget]]
+id = "{id}"
+label = "{id}"
+topic = "/{id}"
+"""
+NUMBER: Final = TILE + 'kind = "readout"\ntype = "std_msgs/msg/Float64"\n'
+LAMP: Final = (
+    TILE
+    + 'kind = "indicator"\ntype = "std_msgs/msg/Bool"\nstates = [{{ value = true, text = "On", shape = "circle" }}]\n'
+)
+WITH_AND_WITHOUT_NOTE: Final = "".join(
+    (
+        'title = "Cell"\n[[page]]\nid = "main"\ntitle = "Main"\n',
+        *(
+            tile.format(id=f"{state}_{kind}")
+            for tile, kind in ((NUMBER, "number"), (LAMP, "lamp"))
+            for state in ("live", "silent")
+        ),
+        '[demo]\n"/live_number" = { values = [1.0] }\n"/live_lamp" = { values = [true] }\n',
+        '"/silent_number" = { silent = true }\n"/silent_lamp" = { silent = true }\n',
+    )
+)
 CONTROL: Final = "\n[control]\nrequired = true\n"
 
 
@@ -140,6 +165,21 @@ def test_nothing_moves_when_an_alarm_comes(tmp_path: Path, page: Page) -> None:
         before = until(places_without_alarm, "no alarm is shown", every_s=0.5)  # acts have a rate
         until(lambda: bool(shown()), "an alarm comes again", within_s=40)
         assert places() == before
+
+
+@pytest.mark.parametrize("text_size", ["normal", "large"])
+def test_a_note_moves_nothing(tmp_path: Path, page: Page, text_size: str) -> None:
+    with demo_server(tmp_path, WITH_AND_WITHOUT_NOTE) as server:
+        size = {"name": "kiosk_text_size", "value": text_size, "url": server.url}
+        page.context.add_cookies([size])  # type: ignore[list-item]
+        page.goto(server.url)
+        for kind in ("number", "lamp"):
+            live, silent = (widget(page, f"{state}_{kind}") for state in ("live", "silent"))
+            expect(live).to_have_attribute("data-state", "live")
+            expect(silent.locator(".note")).not_to_be_empty()
+            for width, height in SIZES:
+                sized(page, width, height).evaluate(DRAWN)
+                assert place(live)["height"] == place(silent)["height"], f"{kind}, {width}"
 
 
 def test_without_a_connection_alarms_are_not_known_and_acknowledge_is_locked(
