@@ -36,7 +36,8 @@ topic = "/{id}"
 NUMBER: Final = TILE + 'kind = "readout"\ntype = "std_msgs/msg/Float64"\n'
 LAMP: Final = (
     TILE
-    + 'kind = "indicator"\ntype = "std_msgs/msg/Bool"\nstates = [{{ value = true, text = "On", shape = "circle" }}]\n'
+    + 'kind = "indicator"\ntype = "std_msgs/msg/Bool"\n'
+    + 'states = [{{ value = true, text = "On", shape = "circle" }}]\n'
 )
 WITH_AND_WITHOUT_NOTE: Final = "".join(
     (

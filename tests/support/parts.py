@@ -409,6 +409,15 @@ class Server:
         content: dict[str, Any] = json.loads(events_in(text)[0][1])
         return content
 
+    def alarms_shown(self, **expected: Any) -> dict[str, Any]:
+        """The section of alarms, when it has these values: pages get it some frames after the list has
+        changed."""
+        section: Any = until(
+            lambda: shown if expected.items() <= (shown := self.snapshot()["alarms"]).items() else None,
+            f"alarms are shown with {expected}",
+        )
+        return dict(section)
+
     def widget(self, name: str) -> dict[str, Any]:
         shown: dict[str, Any] = self.snapshot()["widgets"][name]
         return shown

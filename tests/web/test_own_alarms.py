@@ -57,7 +57,7 @@ def test_a_disk_that_is_nearly_full_is_raised_without_an_alarm_in_the_file(full:
     assert (alarm["source"], alarm["state"], alarm["priority"]) == ("panel", "active", 3)
     assert "are free. The limit is 1000000 MB." in alarm["cause"]
     assert alarm["action"].startswith("Delete recordings")
-    assert full.snapshot()["alarms"]["line"]["id"] == "panel_disk"
+    assert full.alarms_shown(standing=1)["line"]["id"] == "panel_disk"
     page = full.http.get("/").text
     assert "data-own" in page
     assert "The disk of the panel is nearly full" in page
@@ -68,7 +68,7 @@ def test_it_is_acknowledged_and_needs_no_disk(full: Server, tmp_path: Path) -> N
     done = full.http.post("/alarms/panel_disk/acknowledge", json={"occurrence": 1})
     assert done.status_code == 200
     assert done.json()["done"]
-    assert full.snapshot()["alarms"]["line"] is None
+    full.alarms_shown(line=None)
     assert listed(full)["panel_disk"]["acknowledged"]
     assert not (tmp_path / "data" / "alarms.sqlite3").exists()
     full.end(signal.SIGKILL)
