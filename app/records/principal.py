@@ -3,13 +3,13 @@
 import hashlib
 import re
 import secrets
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import lru_cache
 from ipaddress import IPv6Address, ip_address
 from typing import Final
 
 from app.panel.roles import ENGINEER, meets
+from app.system.limits import BoundedDict
 from app.system.texts import Text, TextLike, render, say
 
 # The clients that press: one identity for each browser, by a random token that it keeps, with a short
@@ -65,7 +65,7 @@ class Clients:
     """The known browsers, by their tokens; forgets those not seen for the longest time."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, Client] = OrderedDict()
+        self._known = BoundedDict[str, Client](BROWSERS_KEPT)
 
     def identify(self, token: str, address: str) -> Client:
         """The browser with this token, now at this address."""
@@ -74,10 +74,8 @@ class Clients:
         if browser is None or (browser.address, browser.local) != (address, local):
             kept = browser is not None and browser.local == local
             number = browser.number if browser is not None and kept else self._free_number(local)
-            browser = self._known[token] = Client(public_id(token), address, local, number)
-        self._known.move_to_end(token)
-        while len(self._known) > BROWSERS_KEPT:
-            self._known.popitem(last=False)
+            browser = Client(public_id(token), address, local, number)
+        self._known[token] = browser
         return browser
 
     def _free_number(self, local: bool) -> int:

@@ -1,4 +1,4 @@
-"""Limits of what robots and clients send: a bounded queue, and rate limits."""
+"""Limits of what robots and clients send: a bounded queue, a bounded dictionary, and rate limits."""
 
 import time
 from collections import OrderedDict, deque
@@ -54,6 +54,23 @@ class BoundedQueue(Generic[Item]):
         return self._items[index]
 
 
+Key = TypeVar("Key")
+
+
+class BoundedDict(OrderedDict[Key, Item]):
+    """The `most` entries that were set last."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._most = most
+
+    def __setitem__(self, key: Key, item: Item) -> None:
+        super().__setitem__(key, item)
+        self.move_to_end(key)
+        if len(self) > self._most:
+            self.popitem(last=False)
+
+
 # Rate limits: one token bucket for each client.
 
 MAX_BUCKETS: Final = 500
@@ -81,7 +98,7 @@ class TokenBuckets:
     def __init__(self, quota: Quota, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._quota = quota
         self._monotonic = monotonic
-        self._buckets: OrderedDict[Hashable, _Bucket] = OrderedDict()
+        self._buckets = BoundedDict[Hashable, _Bucket](MAX_BUCKETS)
 
     def has_token(self, key: Hashable) -> bool:
         """Whether the key has a token now."""
@@ -90,11 +107,9 @@ class TokenBuckets:
 
     def take_token(self, key: Hashable) -> None:
         """Takes a token. Without one the bucket owes it: it is refilled later."""
-        bucket = self._buckets.setdefault(key, _Bucket(self._quota.burst, self._monotonic()))
-        self._buckets.move_to_end(key)
+        bucket = self._buckets.get(key) or _Bucket(self._quota.burst, self._monotonic())
+        self._buckets[key] = bucket
         bucket.tokens = self._refill(bucket) - 1
-        while len(self._buckets) > MAX_BUCKETS:
-            self._buckets.popitem(last=False)
 
     def __len__(self) -> int:
         """The number of buckets that are kept."""

@@ -2,7 +2,6 @@
 exports the counters."""
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Final
 
 from app.cell.robot.traffic import RoundTrips, RoundTripSummary
 from app.cell.session.fleet import Fleet
+from app.system.limits import BoundedDict
 
 
 @dataclass(slots=True)
@@ -70,14 +70,12 @@ class PageTrips:
     """The round trips of each browser over the last minutes. Used on the event loop only."""
 
     def __init__(self) -> None:
-        self._browsers: OrderedDict[str, RoundTrips] = OrderedDict()
+        self._browsers = BoundedDict[str, RoundTrips](MOST_BROWSERS)
 
     def record(self, browser: str, took_s: float, now: float) -> None:
         """A browser has measured a round trip, at `now` (monotonic seconds)."""
-        self._browsers.setdefault(browser, RoundTrips()).record(took_s, now)
-        self._browsers.move_to_end(browser)
-        if len(self._browsers) > MOST_BROWSERS:
-            self._browsers.popitem(last=False)
+        trips = self._browsers[browser] = self._browsers.get(browser) or RoundTrips()
+        trips.record(took_s, now)
 
     def summary(self, browser: str, now: float) -> RoundTripSummary | None:
         """Those of a browser in the last five minutes; None without one."""

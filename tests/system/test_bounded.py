@@ -1,8 +1,8 @@
-"""A queue that is bounded in number and in bytes."""
+"""A queue that is bounded in number and in bytes, and a dictionary of the newest entries."""
 
 import pytest
 
-from app.system.limits import BoundedQueue
+from app.system.limits import BoundedDict, BoundedQueue
 
 
 def test_the_oldest_leave_when_there_are_too_many() -> None:
@@ -28,3 +28,11 @@ def test_taking_an_item_makes_room() -> None:
     queue.take()
     with pytest.raises(IndexError):
         queue.take()
+
+
+def test_a_dictionary_keeps_the_entries_that_were_set_last() -> None:
+    kept = BoundedDict[str, int](2)
+    kept["a"], kept["b"] = 1, 2
+    kept["a"] = 3  # again: "b" is the older one now
+    kept["c"] = 4
+    assert kept == {"a": 3, "c": 4}

@@ -9,7 +9,6 @@ returned when its entry is on the disk. The same id again is the same act.
 import asyncio
 import hashlib
 import logging
-from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -24,6 +23,7 @@ from app.records.entry import Kind, OutcomeCode
 from app.records.press_record import PressLog, origin_of
 from app.records.principal import Principal
 from app.system.errors import Cause, NotFound
+from app.system.limits import BoundedDict
 from app.system.log import RobotLog
 from app.system.texts import Text, TextLike, joined, say
 
@@ -180,7 +180,7 @@ class ActRunner(Generic[Subject]):
         self._context = context
         self._press_log = context.press_log
         self._log = RobotLog(logging.getLogger(f"kiosk.{kind}"), context.robot)
-        self._made: OrderedDict[str, tuple[ActRequest, asyncio.Task[ActReceipt]]] = OrderedDict()
+        self._made = BoundedDict[str, tuple[ActRequest, asyncio.Task[ActReceipt]]](RECEIPTS_KEPT)
 
     async def act(self, request: ActRequest, act_id: str) -> ActReceipt:
         """Applies an act or refuses it; NotFound for an act that is not in the table."""
@@ -214,8 +214,6 @@ class ActRunner(Generic[Subject]):
         receipt, entry, applied = self._applied(request, act_id)
         task = asyncio.ensure_future(self._ended(request, receipt, entry, applied))
         self._made[act_id] = _comparable(request), task
-        while len(self._made) > RECEIPTS_KEPT:
-            self._made.popitem(last=False)
         return task
 
     def _applied(self, request: ActRequest, act_id: str) -> tuple[ActReceipt, TextLike, Applied]:

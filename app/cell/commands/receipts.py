@@ -1,7 +1,6 @@
 """Receipts of presses and holds."""
 
 import time
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -15,7 +14,7 @@ from app.panel.widgets.templated import is_stop
 from app.records import Entry, Origin
 from app.records.entry import GOOD_OUTCOMES as GOOD_OUTCOMES
 from app.records.entry import Outcome, OutcomeCode
-from app.records.press_record import LoggedPress, PendingEntry
+from app.records.press_record import PendingEntry
 from app.ros.dialects.peer_traits import EVERY_SENTENCES
 from app.system.clock import format_time
 from app.system.errors import Cause
@@ -124,57 +123,6 @@ class PressRecorder(Protocol):
 
     def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
     def record_receipt(self, receipt: Receipt) -> None: ...
-
-
-class Receipts:
-    """The last receipts, by the ids of their presses."""
-
-    def __init__(self, recorder: PressRecorder | None = None) -> None:
-        self._recorder = recorder
-        self._receipts: OrderedDict[str, Receipt] = OrderedDict()
-        self._unlogged: OrderedDict[str, Receipt] = OrderedDict()
-        self._from_log: OrderedDict[str, Receipt] = OrderedDict()
-        self._past_ids: OrderedDict[str, None] = OrderedDict()
-
-    def get(self, press_id: str) -> Receipt | None:
-        """The current receipt of a press; None for unknown ids."""
-        return self.get_own(press_id) or self._from_log.get(press_id)
-
-    def get_own(self, press_id: str) -> Receipt | None:
-        """The receipt of a press of this server's run. Receipts from the log are read again each time,
-        as their entries may change."""
-        return self._receipts.get(press_id) or self._unlogged.get(press_id)
-
-    def is_past(self, press_id: str) -> bool:
-        """Whether this press was made, but its receipt is no longer kept."""
-        return press_id in self._past_ids
-
-    def record_press(self, press: LoggedPress) -> None:
-        """Records a new press."""
-        if self._recorder is not None:
-            who = origin_text(press.origin)
-            self._recorder.record_press(press.id, press.widget, who, press.inputs)
-
-    def keep(self, receipt: Receipt) -> None:
-        if receipt.recalled:
-            _keep(self._from_log, receipt)
-            return
-        if self._recorder is not None:
-            self._recorder.record_receipt(receipt)
-        for press_id in _keep(self._receipts, receipt):
-            self._past_ids[press_id] = None
-        while len(self._past_ids) > PAST_IDS_KEPT:
-            self._past_ids.popitem(last=False)
-
-    def keep_unlogged(self, receipt: Receipt) -> None:
-        """Keeps a refusal that the log only counts, apart from others: these never displace them."""
-        _keep(self._unlogged, receipt)
-
-
-def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> list[str]:
-    """Keeps a receipt, and drops the oldest beyond `RECEIPTS_KEPT`; returns the ids dropped."""
-    receipts[receipt.id] = receipt
-    return [receipts.popitem(last=False)[0] for _ in range(len(receipts) - RECEIPTS_KEPT)]
 
 
 def receipt_of(press: Press[Command], answer: Outcome, cause: Cause = "") -> Receipt:

@@ -8,7 +8,6 @@ import math
 import os
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -36,7 +35,7 @@ from app.panel.roles import ROLES, VIEWER
 from app.panel.rules import AccessRules
 from app.records.principal import Client, Principal, public_id
 from app.system.errors import TooMany
-from app.system.limits import Quota, TokenBuckets
+from app.system.limits import BoundedDict, Quota, TokenBuckets
 from app.system.texts import TextLike, say
 
 # Hashes secrets beside the event loop, on one thread for the kiosk's own machine and one for all
@@ -169,7 +168,7 @@ class SignInDelays:
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._monotonic = monotonic
         self._buckets: dict[Key, _Bucket] = {}
-        self._known: OrderedDict[Key, None] = OrderedDict()  # where users elsewhere have signed in
+        self._known = BoundedDict[Key, None](MAX_BUCKETS)  # where users elsewhere have signed in
 
     def wait_s(self, user: str, address: str, local: bool) -> int:
         """Whole seconds until the next try; 0 if it may be made now."""
@@ -207,9 +206,6 @@ class SignInDelays:
                 bucket.level = max(0.0, bucket.level - 1.0)
         if not local:
             self._known[own] = None
-            self._known.move_to_end(own)
-            if len(self._known) > MAX_BUCKETS:
-                self._known.popitem(last=False)
 
     @property
     def guessed(self) -> Guessed | None:
@@ -362,7 +358,7 @@ class Access:
         self._stamp: Stamp | None = NEVER_READ
         self._monotonic = monotonic
         self.typed_digits = TypedDigits(monotonic)
-        self._end_reasons: OrderedDict[str, EndReason] = OrderedDict()  # client → why its session ended
+        self._end_reasons = BoundedDict[str, EndReason](MAX_END_REASONS)  # by client
         self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
@@ -576,8 +572,6 @@ class Access:
         self._end_reasons.pop(session.client.id, None)
         if reason in END_SENTENCES:
             self._end_reasons[session.client.id] = reason
-        if len(self._end_reasons) > MAX_END_REASONS:
-            self._end_reasons.popitem(last=False)
         for listener in self._listeners:
             listener(session, reason)
         self._changed()

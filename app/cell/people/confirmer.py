@@ -6,7 +6,6 @@ it, within `VALID_S`. The secret itself goes no further than the check: presses 
 
 import secrets
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
@@ -25,6 +24,7 @@ from app.cell.permission.roles import (
     unmet,
 )
 from app.records.principal import Principal, anonymous
+from app.system.limits import BoundedDict
 from app.system.texts import say
 
 VALID_S: Final = 30.0
@@ -59,7 +59,7 @@ class Confirmer:
     def __init__(self, access: Access, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._access = access
         self._monotonic = monotonic
-        self._unused: OrderedDict[str, _Given] = OrderedDict()
+        self._unused = BoundedDict[str, _Given](MOST)
 
     async def confirm(
         self, who: Principal, session: Session | None, question: Question, attempt: Attempt
@@ -88,8 +88,6 @@ class Confirmer:
         token = secrets.token_urlsafe(16)
         until = self._monotonic() + VALID_S
         self._unused[token] = _Given(session.id, question, by, rights_of(checked.user), until)
-        while len(self._unused) > MOST:
-            self._unused.popitem(last=False)
         return checked, token
 
     def _refused_person(

@@ -9,7 +9,6 @@ import os
 import secrets
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -26,7 +25,7 @@ from app.panel.roles import ROLES
 from app.panel.rules import OidcRules, is_protected
 from app.records.principal import Client
 from app.system.errors import KioskError, TooMany
-from app.system.limits import Quota, TokenBuckets
+from app.system.limits import BoundedDict, Quota, TokenBuckets
 from app.system.printable import printable
 from app.system.texts import Text, TextLike, say
 
@@ -349,7 +348,7 @@ class OidcSignIns:
         self.provider = OidcProvider(rules)
         self._groups = groups
         self._monotonic = monotonic
-        self._pending: OrderedDict[str, PendingSignIn] = OrderedDict()
+        self._pending = BoundedDict[str, PendingSignIn](MAX_PENDING)
         self._threads = ThreadPoolExecutor(2, "oidc")
         self._quota = TokenBuckets(BEGIN_QUOTA, monotonic)
         self._waiting = 0
@@ -375,8 +374,6 @@ class OidcSignIns:
         for other in [b for b in self._pending.values() if b.client.id == client.id]:
             del self._pending[other.state]
         self._pending[pending.state] = pending
-        while len(self._pending) > MAX_PENDING:
-            self._pending.popitem(last=False)
         return url, pending.state
 
     def take(self, state: str) -> PendingSignIn:

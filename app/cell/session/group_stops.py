@@ -6,11 +6,12 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 
 from app.cell.commands.press import Press
-from app.cell.commands.receipts import Receipt, Receipts, receipt_of
+from app.cell.commands.receipts import RECEIPTS_KEPT, Receipt, receipt_of
 from app.cell.commands.stop_receipts import StopOutcome, id_of_robot, receipt_of_several
 from app.cell.session.session import RobotSession
 from app.panel.widgets.families import PressCommand
 from app.records.entry import Outcome
+from app.system.limits import BoundedDict
 from app.system.texts import say
 
 log = logging.getLogger("kiosk.presses")
@@ -22,7 +23,7 @@ class GroupStops:
     """The receipts are kept as those of other presses are. The same id again is the same press."""
 
     def __init__(self) -> None:
-        self._receipts = Receipts()
+        self._receipts = BoundedDict[str, Receipt](RECEIPTS_KEPT)
 
     def receipt(self, press_id: str) -> Receipt | None:
         """The receipt of a press; None for unknown ids."""
@@ -40,7 +41,7 @@ class GroupStops:
             for session, receipt in zip(sessions, receipts, strict=True)
         ]
         receipt = receipt_of_several(press.id, stops)
-        self._receipts.keep(receipt)
+        self._receipts[press.id] = receipt
         return receipt
 
 

@@ -167,7 +167,7 @@ async def pressed_by_form(
 ) -> Response:
     """The response to a press: a redirect to the page with its receipt, or the question before the
     press. `session` is that of the widget's robot, `page` that of the robot whose page it was."""
-    fields, refusals = form.fields, session.presses.early_refusals
+    fields, presses = form.fields, session.presses
     too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
     if is_stop(form.widget) and not form.widget.asks:
         too_soon = False  # to stop twice does no harm
@@ -181,12 +181,12 @@ async def pressed_by_form(
         return _ask(state, page, session, form, shown_on, {})
     press = replace(_press_of(state, session, form), confirmed=by)
     if not state.limits.admit(press.principal):
-        receipt = refusals.limited(press, shown=True)
+        receipt = presses.limited(press, shown=True)
     elif form.stopped and not too_soon:
         receipt = await state.fleet.group_stops.press(form.stopped, press, state.counted)
     else:
         session.press_guard.receive(press)
-        work = refusals.too_soon(press, before) if too_soon else session.presses.press(press)
+        work = presses.too_soon(press, before) if too_soon else presses.press(press)
         receipt = await state.counted(work)
     path = page_after(state, page, press.widget.id, receipt.id, shown_on)
     return RedirectResponse(path, status_code=303)
@@ -456,8 +456,7 @@ async def cancel(
     if state.limits.admit_cancel(who, session.base, widget, press_id[:MAX_ID_LENGTH]):
         receipt = await state.counted(session.presses.cancel(canceling, press_id))
     else:
-        refusals = session.presses.early_refusals
-        receipt = refusals.limited(canceling, "cancel_too_often", shown=form)
+        receipt = session.presses.limited(canceling, "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(page_after(state, page, widget, receipt.id), status_code=303)
     return _answer(request, receipt)
@@ -472,7 +471,7 @@ async def receipt_of_press(
     """The receipt of a press in JSON, from HTTP or from a WebSocket. `stopped` are the robots of a
     press that stops several."""
     if not state.limits.admit(press.principal):
-        return session.presses.early_refusals.limited(press)
+        return session.presses.limited(press)
     if stopped:
         return await state.fleet.group_stops.press(stopped, press, state.counted)
     session.press_guard.receive(press)

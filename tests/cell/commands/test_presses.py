@@ -84,7 +84,7 @@ class Bench:
         guard = guard_of(panel, self.robot, control)
         self._presses = presses_of(panel, self.robot, self.way, guard=guard, monotonic=lambda: self.now)
         self.receipt = self._presses.receipt
-        self.command, self.early_refusals = self._presses.widget, self._presses.early_refusals
+        self.command, self.limited = self._presses.widget, self._presses.limited
         self.typed = sending_of(panel, self.robot, self.way).parse_form
 
     def press(
@@ -392,11 +392,10 @@ def test_the_same_id_again_is_the_same_press(bench: Bench) -> None:
 
 def test_a_press_over_the_limit_is_no_press_and_may_be_made_again(bench: Bench) -> None:
     press = press_of(bench.command("free"), {"message": "hello"}, "p1")
-    refusals = bench.early_refusals
-    limited = refusals.limited(press)
+    limited = bench.limited(press)
     assert (limited.id, limited.outcome, limited.cause) == ("p1", "refused", "limit")
     assert bench.receipt("p1") is None
-    shown = refusals.limited(press, shown=True)  # a page without scripts reads it
+    shown = bench.limited(press, shown=True)  # a page without scripts reads it
     assert shown.id != "p1"
     assert bench.receipt(shown.id) == shown
     assert bench.press().outcome == "published"

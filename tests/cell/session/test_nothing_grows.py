@@ -172,9 +172,9 @@ def test_thousands_of_calls_leave_nothing_behind(kiosk: Server, robot: Robot) ->
     assert robot.unanswered == UNANSWERED + FIRST_UNANSWERED
     after, memory_after = rest(kiosk)
     assert after.pop("objects") - before.pop("objects") < STRAY_OBJECTS
-    assert after.pop("Receipts._past_ids") - before.pop("Receipts._past_ids") == CALLS < PAST_IDS_KEPT
+    assert after.pop("Presses._past_ids") - before.pop("Presses._past_ids") == CALLS < PAST_IDS_KEPT
     assert max(after.pop("LiveGraph.cache"), before.pop("LiveGraph.cache")) < MOST_KNOWN
     assert abs(after.pop("tasks") - before.pop("tasks")) < PASSING_TASKS
     assert after == before
-    assert before["Receipts._receipts"] == RECEIPTS_KEPT
+    assert before["Presses._receipts"] == RECEIPTS_KEPT
     assert memory_after - memory_before < GROWTH_KB + CALLS * PAST_ID_BYTES // 1000

@@ -35,7 +35,7 @@ async def sizes(request: Request) -> dict[str, int]:
     wholes = (kiosk, kiosk.context, kiosk.commands, kiosk.peer, chosen)
     held_by = [part for whole in wholes for part in vars(whole).values()]
     parts = [holder for holder in held_by if type(holder).__module__.startswith("app.")]
-    for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):
+    for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses):
         held |= {f"{type(part).__name__}.{name}": len(value) for name, value in sized(part)}
     return held
 
