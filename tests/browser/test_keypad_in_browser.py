@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from tests.support.browser.pages import hold_by_key, place
 from tests.support.browser.touch import (
@@ -129,6 +129,33 @@ def test_value_outside_the_limits_stays_on_the_keypad_and_cannot_be_set(screen: 
         screen.locator(".cancel-entry").tap()
         expect(screen.locator("#input-speed")).to_have_value("120")
         settled(screen)
+
+
+def test_what_is_typed_before_it_is_there_is_kept_or_cancelled(
+    touchscreen: Page, kiosk: Server
+) -> None:
+    late: list[Route] = []
+    touchscreen.route("**/entry/key*.js", lambda route: late.append(route))
+    page = touched(touchscreen, kiosk)
+    for field, typed, shown in (
+        ("#input-speed", "2", page.locator(".sheet output")),
+        ("#input-note", "x", None),  # the keyboard types into its field
+    ):
+        entry = page.locator(field)
+        before = entry.input_value()
+        entry.tap()
+        until(lambda: page.evaluate("1") and late, "its script is asked for")
+        entry.select_text()
+        page.keyboard.type(typed)
+        expect(entry).to_have_value(typed)
+        late.pop().continue_()
+        expect(page.locator(".sheet")).to_be_visible()
+        page.keyboard.type("5")
+        if shown is not None:
+            expect(shown).to_have_text(f"{typed}5")
+        page.locator(".sheet .cancel-entry").tap()
+        expect(entry).to_have_value(before)
+        settled(page)
 
 
 @pytest.mark.long("detail")

@@ -242,6 +242,7 @@ def test_the_keypad_reads_by_the_same_rules(
     expect(page.locator("body[data-settling]")).to_have_count(0)
     for enters, text in ((by_hand, f"2{other}5"), (pasted, f"2{other}5"), (composed, "２ー５")):
         page.locator("#input-level").tap()
+        expect(sheet).to_be_visible()
         page.locator("#input-level").select_text()
         enters(page, text)
         expect(sheet.locator("output")).to_have_text(text)
@@ -252,6 +253,7 @@ def test_the_keypad_reads_by_the_same_rules(
         expect(entry(page)).to_have_value(f"1{decimal}5")
         expect(page.locator("body[data-settling]")).to_have_count(0)
     page.locator("#input-level").tap()
+    expect(sheet).to_be_visible()
     page.locator("#input-level").select_text()
     composed(page, "－２．５".replace("．", "，" if language == "de" else "．"))
     sheet.locator(".set-entry").tap()

@@ -1,5 +1,5 @@
 // The keyboard on the screen, and its letters in each language.
-import { isTouched, releaseEntry } from "../entries.js";
+import { releaseEntry } from "../entries.js";
 import { nameOf, Sheet, widgetOf } from "./sheet.js";
 import { closest, find } from "../show.js";
 
@@ -46,12 +46,12 @@ export class Entry {
   #typed = (event) => this.#key(event);
   #changed = () => this.#limit();
 
-  /** @param {HTMLInputElement} input @param {() => void} closed */
-  constructor(input, closed) {
+  /** @param {HTMLInputElement} input @param {import("./touch-entry.js").Before} before @param {() => void} closed */
+  constructor(input, before, closed) {
     this.input = input;
     this.#closed = closed;
-    this.#before = input.value;
-    this.#wasTouched = isTouched(input);
+    this.#before = before.text;
+    this.#wasTouched = before.isTouched;
     this.#sheet = new Sheet("keyboard", SHAPES, input, () => this.cancel());
     this.#draw();
     this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(closest(target, "button")));

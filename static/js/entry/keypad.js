@@ -1,5 +1,5 @@
 // The keypad on the screen, with the number that is being entered and the bar that shows it between its limits.
-import { isTouched, releaseEntry } from "../entries.js";
+import { releaseEntry } from "../entries.js";
 import { nameOf, Sheet, widgetOf } from "./sheet.js";
 import { enter, entryText, judged, limitsOf } from "../number-inputs.js";
 import { DECIMAL, MINUS, numberText } from "../number-text.js";
@@ -12,11 +12,12 @@ const TOO_LONG = 41; // characters: no number has so many
 class Draft {
   /** @type {string} */
   text;
-  #fresh = true; // the first character replaces the value that was there
+  #fresh; // the first character replaces the value that was there
 
-  /** @param {string} text */
-  constructor(text) {
+  /** @param {string} text @param {boolean} fresh */
+  constructor(text, fresh) {
     this.text = text;
+    this.#fresh = fresh;
   }
 
   // A key of the keypad.
@@ -82,20 +83,21 @@ export class Entry {
   #closed;
   #before;
   #wasTouched;
-  #isPasted = false;
+  #isPasted; // or typed before the keypad was there
   #changed = () => this.#pasted();
   // The first characters of a code came as from a hand.
   #scanned = () => this.#type(() => this.#draft.replace(entryText(this.input)));
   /** @type {(event: KeyboardEvent) => void} */
   #typed = (event) => this.#key(event);
 
-  /** @param {HTMLInputElement} input @param {() => void} closed */
-  constructor(input, closed) {
+  /** @param {HTMLInputElement} input @param {import("./touch-entry.js").Before} before @param {() => void} closed */
+  constructor(input, before, closed) {
     this.input = input;
     this.#closed = closed;
-    this.#before = input.value;
-    this.#wasTouched = isTouched(input);
-    this.#draft = new Draft(entryText(input));
+    this.#before = before.text;
+    this.#wasTouched = before.isTouched;
+    this.#isPasted = before.isTyped;
+    this.#draft = new Draft(entryText(input), !this.#isPasted);
     this.#sheet = new Sheet("keypad", SHAPES, input, () => this.cancel());
     this.#label();
     this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(closest(target, "button")));

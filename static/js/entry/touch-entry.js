@@ -1,11 +1,13 @@
 // Opens the keypad or the keyboard on the screen at a touch in an input. With panel key `keyboard = "auto"` only
 // where a finger is the main pointer.
+import { isTouched } from "../entries.js";
 import { closest } from "../show.js";
 
 const coarse = matchMedia("(pointer: coarse)");
 const always = pageGuard.page.keyboard === "on";
 const TOUCHED = ":is([data-widget], [data-typed]) :is(input[type=text], input[type=password], output)";
-/** @type {Record<"keypad" | "keyboard", () => Promise<{ Entry: new (input: HTMLInputElement, closed: () => void) => { input: HTMLElement, cancel(): void } }>>} */
+/** @typedef {{ text: string, isTouched: boolean, isTyped: boolean }} Before  What the input had at the touch, and whether something was typed since. */
+/** @type {Record<"keypad" | "keyboard", () => Promise<{ Entry: new (input: HTMLInputElement, before: Before, closed: () => void) => { input: HTMLElement, cancel(): void } }>>} */
 const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
 
 /** @type {{ input: HTMLElement, cancel(): void } | null} */
@@ -30,10 +32,14 @@ async function openFor(place) {
   if (!input || open?.input === input) return;
   open?.cancel();
   const touch = ++touches;
+  const { value } = input;
+  const wasTouched = isTouched(input);
   try {
     const module = await KINDS[input.matches("[data-number]") ? "keypad" : "keyboard"]();
     if (touch !== touches) return;
-    open = new module.Entry(input, () => (open = null));
+    const isTyped = isTouched(input) && input.value !== value; // else the robot's value may have changed
+    const before = { text: isTyped ? value : input.value, isTouched: wasTouched, isTyped };
+    open = new module.Entry(input, before, () => (open = null));
   } catch {
     input.inputMode = input.dataset.inputmode ?? ""; // the next touch has the browser's own
   }
