@@ -4,14 +4,10 @@ It knows nothing of the robot: what it makes in a language is the same in every 
 widgets in it. So it runs once, when the panel is loaded, and a page puts its widgets in between.
 """
 
-import json
-import os
 import re
 import secrets
 import signal
-import subprocess
-import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -22,11 +18,10 @@ from markupsafe import Markup
 from app.panel.file.wording import closest_name, list_names
 from app.panel.layout import Page
 from app.system.icons import icons
-from app.system.page_process import NAME, SECONDS, Answer, PageRequest
-from app.system.settings import PACKAGE
+from app.system.page_process import BYTES, NAME, SECONDS, Answer, PageRequest
 from app.system.texts import ENGLISH, render
+from app.system.worker import Limits, Worker, WorkerError
 
-COMMAND: Final = (sys.executable, "-P", "-c", "from app.system.page_process import run; run()")
 WITHIN_S: Final = 30.0  # on a machine that is busy; its own time is limited by itself
 MOST_BYTES: Final = 1_000_000
 MAX_TEMPLATES: Final = 64  # templates of a panel that are not run again
@@ -104,31 +99,24 @@ def _run(
         "pictures": list(pictures),
         "mark": mark,
     }
-    path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
-    environment = {**os.environ, "PYTHONPATH": path, "PYTHONUTF8": "1"}
+    limits = Limits(within_s=WITHIN_S, memory=BYTES, nice=0)
+    results = []
     try:
-        done = subprocess.run(
-            COMMAND,
-            input=json.dumps(request).encode(),
-            capture_output=True,
-            env=environment,
-            timeout=WITHIN_S,
-        )
-    except subprocess.TimeoutExpired:
-        return TemplateFault(0, ENDED)
+        for result in Worker("app.system.page_process:render", request, limits=limits).results():
+            results.append(result)
+    except WorkerError as error:
+        return _ended(error, results[0] if results else [])
     except OSError as error:
         return TemplateFault(0, f"can't be tried: {error.strerror}")
-    if done.returncode:
-        return _ended(done)
-    return _answered(json.loads(done.stdout.splitlines()[-1]), mark, request)
+    return _answered(results[-1], mark, request)
 
 
-def _ended(done: subprocess.CompletedProcess[bytes]) -> TemplateFault:
-    """A process that could not even say what is wrong."""
-    if done.returncode != -signal.SIGVTALRM:
-        return TemplateFault(0, f"can't be tried: its process ended with status {done.returncode}")
-    at = _FRAME.search(done.stderr.decode(errors="replace"))
-    lines = json.loads((done.stdout.splitlines() or [b"[]"])[0])
+def _ended(error: WorkerError, lines: Iterable[tuple[int, int]]) -> TemplateFault:
+    """Of a process that could not even say what is wrong; `lines` are those of the template, with those
+    of its code."""
+    if error.ended_with not in (-signal.SIGVTALRM, -signal.SIGALRM):
+        return TemplateFault(0, f"can't be tried: its process ended with status {error.ended_with}")
+    at = _FRAME.search(error.output)
     before = [line for line, code in lines if at is not None and code <= int(at[1])]
     return TemplateFault(before[-1] if before else 0, ENDED)
 

@@ -3,7 +3,6 @@
 from app.records.database import Filter, LogRow, OpenPress
 from app.records.entry import Entry, Origin, new_entry, same_values
 from app.records.log import NullLog, OperatorLog
-from app.records.reader import ReaderProcess
 from app.records.store import Limits, Repeated
 
 __all__ = [
@@ -15,7 +14,6 @@ __all__ = [
     "OpenPress",
     "OperatorLog",
     "Origin",
-    "ReaderProcess",
     "Repeated",
     "new_entry",
     "same_values",

@@ -17,7 +17,7 @@ from app.records.copy import LogCopier, log_copiers
 from app.records.data_dir import DataDir
 from app.records.database import Filter, Head, LogRow, OpenPress
 from app.records.entry import Entry, Origin, new_entry
-from app.records.reader import ReaderProcess, Readers
+from app.records.reader import Readers
 from app.records.starts import StartRecord
 from app.records.store import Limits, Results, Ticket
 from app.records.writer import LogWriter
@@ -26,6 +26,7 @@ from app.system.errors import FolderInUse, LogError
 from app.system.limits import Quota, TokenBuckets
 from app.system.settings import Settings
 from app.system.texts import ENGLISH, TextLike, number, render, say
+from app.system.worker import RunningWorker
 
 # Limits how many refusals get their own entries in the operator's log; the others are summarised.
 #
@@ -302,7 +303,7 @@ class OperatorLog:
 
     def export(
         self, wanted: Filter, before: int | None, gzip: bool, language: str = ENGLISH
-    ) -> AbstractAsyncContextManager[ReaderProcess]:
+    ) -> AbstractAsyncContextManager[RunningWorker]:
         """All entries that match before the entry number `before`, as CSV in a language; LogError,
         TooMany."""
         return self._readers.export(wanted, before, gzip, language)

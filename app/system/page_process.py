@@ -1,19 +1,15 @@
-"""The process that compiles and renders a page's own template: `run`. A template may run for ever, or
-take all memory: here it can take one second of the processor and 50 MB.
+"""Compiles and renders a page's own template, in a process (`app.system.worker`). A template may run
+for ever, or take all memory: here it can take one second of the processor and 50 MB.
 
 It is Jinja in a sandbox, with `title` (the page's), `language` (the reader's), `widget(id)`,
-`picture(name, alt)` and `icon(name)`. The request is JSON on stdin (`PageRequest`), stdout has two
-lines of JSON: the lines of the compiled template, then what it makes (`Answer`). A single expression
-that takes more than a second and a half ends the process by SIGVTALRM, with its line on stderr.
+`picture(name, alt)` and `icon(name)`. A single expression that takes more than a second and a half ends
+the process by SIGVTALRM, with its line on stderr.
 """
 
 import faulthandler
-import json
-import os
-import resource
 import signal
-import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final, NoReturn, TypedDict
 
@@ -140,19 +136,25 @@ def _joined(template: Template, made: Any) -> str:
     return "".join(parts)
 
 
-def rendered(request: PageRequest, compiled: Any = lambda lines: None) -> Answer:
-    """What the template makes. `compiled` gets the lines of the template and of its Python code."""
-    try:
-        environment = _environment()
-        code = environment.compile(request["source"], filename=NAME)
-        template = Template.from_code(environment, code, environment.make_globals(None))
-        compiled(template.debug_info)
-        page = _Page(request)
-        return {
-            "rendered": {language: page.render(template, language) for language in request["titles"]}
-        }
-    except Exception as error:  # a template may raise anything: 1 / 0, None.upper()
-        return _fault(error)
+def render(request: PageRequest) -> Iterator[Any]:
+    """Two results: the lines of the template with those of its Python code, and what it makes, an
+    `Answer`. A template that can't be compiled has the second only."""
+    icons()
+    with _limited_time():
+        try:
+            environment = _environment()
+            code = environment.compile(request["source"], filename=NAME)
+            template = Template.from_code(environment, code, environment.make_globals(None))
+            yield template.debug_info
+            page = _Page(request)
+            answer: Answer = {
+                "rendered": {
+                    language: page.render(template, language) for language in request["titles"]
+                }
+            }
+        except Exception as error:  # a template may raise anything: 1 / 0, None.upper()
+            answer = _fault(error)
+    yield answer
 
 
 def _fault(error: Exception) -> Answer:
@@ -183,33 +185,17 @@ def _lines(error: Exception) -> Iterator[int]:
         step = step.tb_next
 
 
-def _limit() -> None:
-    """From now on: time of the processor, and memory beside that which is used already."""
+@contextmanager
+def _limited_time() -> Iterator[None]:
+    """Limits the time of the processor within the block."""
 
     def end(*_: object) -> NoReturn:
         raise TooLong
 
-    with open("/proc/self/statm") as file:
-        used = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    resource.setrlimit(resource.RLIMIT_AS, (used + BYTES, used + BYTES))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.register(signal.SIGVTALRM, all_threads=False, chain=True)
     signal.signal(signal.SIGPROF, end)
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     signal.setitimer(signal.ITIMER_VIRTUAL, LAST_SECONDS)
-
-
-def _write(value: Any) -> None:
-    sys.stdout.write(f"{json.dumps(value)}\n")
-    sys.stdout.flush()
-
-
-def run() -> None:
-    """The entry point of the process."""
-    request: PageRequest = json.load(sys.stdin)
-    icons()
-    _limit()
-    answer = rendered(request, _write)
+    yield
     signal.setitimer(signal.ITIMER_PROF, 0)
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-    _write(answer)

@@ -6,8 +6,8 @@ import re
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Final, NamedTuple
@@ -17,8 +17,8 @@ from fastapi import Request
 from fastapi.responses import Response, StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from app.records import ReaderProcess
 from app.system.errors import LogError
+from app.system.worker import RunningWorker
 
 # The response with an export as CSV, which another process makes.
 
@@ -36,7 +36,7 @@ class Exported(Response):
     media_type = "text/csv"
 
     def __init__(
-        self, export: ReaderProcess, first: bytes, gzip: bool, opened: AsyncExitStack, name: str
+        self, export: RunningWorker, first: bytes, gzip: bool, opened: AsyncExitStack, name: str
     ) -> None:
         """`opened` is closed when it is over; `name` says what is exported: "operator's log"."""
         self._name = name
@@ -66,10 +66,10 @@ class Exported(Response):
 
     async def _send(self, send: Send, going: "asyncio.Task[None]") -> None:
         await _send_in_time(send, {"type": START, "status": 200, "headers": self.raw_headers})
-        piece = self._first
-        while piece and not going.done():
+        piece: bytes | None = self._first
+        while piece is not None and not going.done():
             await _send_in_time(send, {"type": BODY, "body": piece, "more_body": True})
-            piece = await self._export.read_next()
+            piece = await self._export.next_result()
         await self._opened.aclose()  # who has it whole may ask for the next
         await _send_in_time(send, {"type": BODY, "body": b"", "more_body": False})
 
@@ -78,6 +78,19 @@ class Exported(Response):
         while (await receive())["type"] != "http.disconnect":
             pass
         self._export.kill()
+
+
+async def exported(
+    request: Request,
+    export: Callable[[bool], AbstractAsyncContextManager[RunningWorker]],
+    name: str,
+) -> Exported:
+    """The response with an export, which gets whether it is compressed; LogError if it can't begin."""
+    gzip = "gzip" in request.headers.get("accept-encoding", "")
+    async with AsyncExitStack() as opened:
+        running = await opened.enter_async_context(export(gzip))
+        first = await running.next_result()
+        return Exported(running, first, gzip, opened.pop_all(), name)
 
 
 async def _send_in_time(send: Send, message: Message) -> None:

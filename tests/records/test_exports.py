@@ -23,8 +23,9 @@ import pytest
 
 from app.records import Filter, OperatorLog, Origin, database, new_entry, reader
 from app.records.database import NAME
-from app.records.reader import FIELDS, csv_chunks
+from app.records.reader import FIELDS, export
 from app.records.store import Store
+from app.system import worker
 from app.system.errors import LogError, TooMany
 from app.web import downloads
 from tests.support.holds import PANEL, permit
@@ -223,9 +224,9 @@ def test_exports_run_one_at_a_time_and_are_complete(kiosk: Server) -> None:
     assert plain.content == answer.content
 
 
-def children(kiosk: Server) -> list[int]:
+def children(pid: int) -> list[int]:
     pids: list[int] = []
-    for task in Path(f"/proc/{kiosk.process.pid}/task/").iterdir():
+    for task in Path(f"/proc/{pid}/task/").iterdir():
         with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
             pids += map(int, (task / "children").read_text().split())
     return pids
@@ -233,11 +234,11 @@ def children(kiosk: Server) -> list[int]:
 
 def test_an_export_that_breaks_off_is_not_taken_for_whole(kiosk: Server) -> None:
     with kiosk.http.stream("GET", "/log.csv?every=true", timeout=30) as export:
-        (child,) = until(lambda: children(kiosk), "its process runs")
+        (child,) = until(lambda: children(kiosk.process.pid), "its process runs")
         os.kill(child, signal.SIGKILL)
         with pytest.raises(httpx.RemoteProtocolError):
             export.read()
-    until(lambda: not children(kiosk), "it is gone")
+    until(lambda: not children(kiosk.process.pid), "it is gone")
     until(lambda: "an export of the operator's log broke off" in kiosk.process.text, "it is said")
     assert "Traceback" not in kiosk.process.text
     assert kiosk.http.get("/log.csv?before=100").status_code == 200
@@ -246,8 +247,8 @@ def test_an_export_that_breaks_off_is_not_taken_for_whole(kiosk: Server) -> None
 @pytest.mark.long("flood")
 def test_client_that_leaves_an_export_leaves_no_process_and_no_log_line(kiosk: Server) -> None:
     with unread(kiosk, 1):
-        until(lambda: children(kiosk), "its process runs")
-    until(lambda: not children(kiosk), "it is gone")
+        until(lambda: children(kiosk.process.pid), "its process runs")
+    until(lambda: not children(kiosk.process.pid), "it is gone")
     assert "export" not in kiosk.process.text
     assert "Traceback" not in kiosk.process.text
 
@@ -255,7 +256,7 @@ def test_client_that_leaves_an_export_leaves_no_process_and_no_log_line(kiosk: S
 @pytest.mark.long("real time")
 def test_the_end_of_the_server_waits_for_no_export(kiosk: Server) -> None:
     with exporting(kiosk):
-        until(lambda: children(kiosk), "its process runs")
+        until(lambda: children(kiosk.process.pid), "its process runs")
         began = time.monotonic()
         kiosk.end()
         assert time.monotonic() - began < 15  # it took 20 s, and a traceback
@@ -300,17 +301,17 @@ def test_an_export_that_no_client_reads_is_given_up(
             await asyncio.Event().wait()
 
     async def work(log: OperatorLog) -> None:
+        before = children(os.getpid())
         async with AsyncExitStack() as stack:
             export = await stack.enter_async_context(log.export(Filter(every=True), None, False))
             answer = downloads.Exported(
-                export, await export.start(), False, stack.pop_all(), "operator's log"
+                export, await export.next_result(), False, stack.pop_all(), "operator's log"
             )
         await answer({"type": "http"}, never, send)
         assert [message.get("more_body") for message in sent] == [None, True, True]
-        assert export._process is not None
-        assert export._process.returncode is not None
+        assert children(os.getpid()) == before
         async with log.export(Filter(), None, False) as export:
-            assert (await export.start()).startswith(b"\xef\xbb\xbfseq,at,")
+            assert (await export.next_result()).startswith(b"\xef\xbb\xbfseq,at,")
 
     run(tmp_path, work)
     assert "was not taken for 0.2 s" in caplog.text
@@ -321,7 +322,7 @@ def test_export_of_an_unreadable_log_says_why(tmp_path: Path) -> None:
         mine = reader.Readers(tmp_path)
         async with mine.export(Filter(), None, True) as export:
             with pytest.raises(LogError, match="cannot be read: no such file or folder"):
-                await export.start()
+                await export.next_result()
         mine.stop()
 
     asyncio.run(work())
@@ -334,13 +335,13 @@ def test_where_no_process_can_be_begun_an_export_says_why_and_leaves_its_place(
 
     async def work(log: OperatorLog) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(reader, "COMMAND", (str(tmp_path / "gone"),))
+            patch.setattr(worker, "COMMAND", (str(tmp_path / "gone"),))
             for _ in range(2):
                 async with log.export(Filter(), None, False) as export:
                     with pytest.raises(LogError, match="cannot be read: no such file or folder"):
-                        await export.start()
+                        await export.next_result()
         async with log.export(Filter(), None, False) as export:
-            assert (await export.start()).startswith(b"\xef\xbb\xbfseq,at,")
+            assert (await export.next_result()).startswith(b"\xef\xbb\xbfseq,at,")
 
     run(tmp_path, work)
 
@@ -369,7 +370,7 @@ def test_a_csv_has_every_column_of_an_entry_and_no_formula(tmp_path: Path) -> No
     texts = {"press": "-1", "widget": "a\u202eb", "reason": 'said "no",\nand no'}
     (written,) = store.append([new_entry("refused", origin, {"text": "+\x7f"}, **texts)])
     store.close()
-    text = b"".join(csv_chunks(tmp_path, Filter(), None)).decode()
+    text = b"".join(export(tmp_path, Filter(), None)).decode()
     (row,) = csv.DictReader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
     assert tuple(row) == FIELDS
     assert set(FIELDS) == {*written._fields, "pressed_at"}

@@ -12,7 +12,7 @@ import pytest
 from app.records import Entry, Filter, Limits, OperatorLog, Origin, new_entry
 from app.records.database import NAME, OpenPress, open_presses, rows
 from app.records.entry import reason_as_json
-from app.records.reader import csv_chunks
+from app.records.reader import export
 from app.records.verify import verify
 from app.system.texts import ENGLISH, PanelText, Text, number, render, say, sentences, time_of_day
 from app.system.texts.catalogue import catalogues_in, renamed_codes
@@ -139,8 +139,10 @@ def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
             "Gesendet auf /say, 11:00:00.",
             str(say("published", topic="/say", time="11:00:00")),
         )
-        german = b"".join(csv_chunks(folder, Filter(), None, "de")).decode("utf-8-sig").splitlines()
-        english = b"".join(csv_chunks(folder, Filter(), None)).decode("utf-8-sig").splitlines()
+        german = (
+            b"".join(export(folder, Filter(), None, language="de")).decode("utf-8-sig").splitlines()
+        )
+        english = b"".join(export(folder, Filter(), None)).decode("utf-8-sig").splitlines()
     assert german[0] == english[0]
     assert german[0].endswith(",reason,prev,hash,text")
     assert "Gesendet auf /say, 11:00:00." in german[1]
@@ -165,7 +167,7 @@ def test_texts_numbers_and_times_of_an_entry_are_in_the_readers_language(
             last.reason_in("de") == "Nicht gesendet um 11:00:00: Grenze ist 7,5 m: erlaubt ist 1.234,5"
         )
         assert last.reason_in("fr") == last.reason
-        csv = b"".join(csv_chunks(folder, Filter(), None, "de")).decode("utf-8-sig")
+        csv = b"".join(export(folder, Filter(), None, language="de")).decode("utf-8-sig")
         assert "Grenze ist 7,5 m: erlaubt ist 1.234,5" in csv
     assert (verify(folder).count, verify(folder).fault) == (len(entries(folder)), "")
 

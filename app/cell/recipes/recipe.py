@@ -17,6 +17,7 @@ from app.panel.values import same_value
 from app.panel.widgets.families import Input
 from app.panel.widgets.inputs import SelectInput, ToggleInput
 from app.panel.widgets.numbers import Numeric
+from app.system.csv_text import BOM, Cell, csv_text, quoted_cell, text_in_cell
 from app.system.errors import InputError
 from app.system.printable import printable
 from app.system.texts import ENGLISH, Text, TextLike, joined, number, render, say
@@ -246,8 +247,6 @@ FALSE: Final = ("false", "0", "falsch", "faux", "falso", "onwaar")
 SEPARATORS: Final = ",;\t"
 MAX_CSV_BYTES: Final = 4_000_000  # of a file that is imported
 _SEP: Final = re.compile(r"sep=([,;\t])\r?\n", re.IGNORECASE)  # a line for a spreadsheet
-# What a spreadsheet would take as a formula; a "'" before it, and before another one, keeps it a text.
-FORMULA: Final = ("=", "+", "-", "@", "\t", "\r", "'")
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,42 +290,33 @@ def decoded(content: bytes) -> str:
     raise InputError("the file is neither UTF-8, UTF-16 nor Windows-1252: save it as CSV in UTF-8")
 
 
-def csv_text(fields: Iterable[Input], recipes: Iterable[Recipe], at: Mapping[str, str]) -> str:
-    """The recipes as CSV with a byte order mark; `at` has when each was changed, by its id."""
+def recipes_csv(fields: Iterable[Input], recipes: Iterable[Recipe], at: Mapping[str, str]) -> str:
+    """The recipes as CSV; `at` has when each was changed, by its id."""
     every = list(fields)
-    made = io.StringIO(newline="")
-    writer = csv.writer(made)
-    writer.writerow([NAME, *(field.id for field in every), *ABOUT, HALF[0]])
-    for recipe in recipes:
-        cells = (_cell(field, recipe.values.get(field.id)) for field in every)
-        about = (recipe.now.number, at.get(recipe.id, ""), _text(recipe.now.by))
-        writer.writerow([_text(recipe.name), *cells, *about, ""])
-    return "\ufeff" + made.getvalue()
+
+    def row(recipe: Recipe) -> Iterator[Cell]:
+        yield quoted_cell(recipe.name)
+        yield from (_cell(field, recipe.values.get(field.id)) for field in every)
+        yield from (recipe.now.number, at.get(recipe.id, ""), quoted_cell(recipe.now.by), "")
+
+    return csv_text([NAME, *(field.id for field in every), *ABOUT, HALF[0]], map(row, recipes))
 
 
 def _cell(field: Input, value: Any) -> str:
     if value is None:
         return ""
     if isinstance(field, SelectInput):
-        return _text(value if isinstance(value, str) else json.dumps(value))
+        return quoted_cell(value if isinstance(value, str) else json.dumps(value))
     if isinstance(value, bool):
         return "true" if value else "false"
-    return number_of(value) if isinstance(value, int | float) else _text(str(value))
-
-
-def _text(text: str) -> str:
-    return f"'{text}" if text.startswith(FORMULA) else text
-
-
-def _untext(cell: str) -> str:
-    return cell[1:] if cell.startswith("'") and cell[1:].startswith(FORMULA) else cell
+    return number_of(value) if isinstance(value, int | float) else quoted_cell(str(value))
 
 
 def read_rows(text: str, fields: Iterable[Input], decimal: str = "") -> Iterator[ReadRow | BadRow]:
     """The rows of a CSV, in their order; a file that has none is one bad row. `decimal` is its decimal
     sign, "" if only the file says it."""
     every = list(fields)
-    plain = text.removeprefix("\ufeff")
+    plain = text.removeprefix(BOM)
     lines = 0
     if named := _SEP.match(plain):
         plain, lines = plain[named.end() :], 1
@@ -425,7 +415,7 @@ def _row(
     if len(cells) > len(columns) or not {*lacking} <= {*ABOUT, *HALF}:
         return BadRow(line, say("recipe_csv_cells", count=len(cells), wanted=len(columns)))
     row = dict(zip(columns, cells, strict=False))
-    name = clean_name(_untext(row[NAME]))
+    name = clean_name(text_in_cell(row[NAME]))
     if fault := name_fault(name, names):
         return BadRow(line, fault)
     names.add(name)
@@ -438,8 +428,8 @@ def _row(
 
 def _value(field: Input, cell: str, language: str) -> Any:
     if isinstance(field, SelectInput):
-        return _untext(cell)
-    text = _untext(cell) if cell.startswith("'") else cell
+        return text_in_cell(cell)
+    text = text_in_cell(cell) if cell.startswith("'") else cell
     if isinstance(field, Numeric):
         value = read_number(text, language, whole=field.is_whole)
         return text.strip() if value is None else value

@@ -7,7 +7,7 @@ import asyncio
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any, Final
 
@@ -39,6 +39,11 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     else:
         print(as_text(diagnosis.report, parsed.verbose))
     return WELL if diagnosis.report.is_well else FINDINGS
+
+
+def check(settings: Settings, host: str, port: int) -> Iterator[dict[str, Any]]:
+    """The result for a server that listens there; KioskError if it could not look."""
+    yield as_json(settings, asyncio.run(diagnose(settings, Options(host=host, port=port))))
 
 
 def settings_of(options: Any) -> Settings:

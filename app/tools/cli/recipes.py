@@ -24,10 +24,10 @@ from app.cell.recipes.command_line import LineChanges, account
 from app.cell.recipes.recipe import (
     MAX_CSV_BYTES,
     NOTATIONS,
-    csv_text,
     decoded,
     differences,
     read_rows,
+    recipes_csv,
     value_text,
 )
 from app.panel import load_panel
@@ -91,7 +91,7 @@ def _list(_: Any, data: Path, books: dict[str, RecipeBook]) -> int:
 
 def _export(options: Any, _: Path, books: dict[str, RecipeBook]) -> int:
     book = _book(options, books)
-    text = csv_text(book.load.fields, book.recipes, {r.id: _at(r.now.at) for r in book.recipes})
+    text = recipes_csv(book.load.fields, book.recipes, {r.id: _at(r.now.at) for r in book.recipes})
     if options.output is None:
         print(text.removeprefix("\ufeff"), end="")
         return 0

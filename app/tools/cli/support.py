@@ -7,16 +7,17 @@ import asyncio
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
 from app.system.errors import KioskError
+from app.system.settings import Settings
 from app.tools.cli.doctor import add_options, options_of, settings_of
 from app.tools.cli.output import OutputError, writing
 from app.tools.cli.parser import Parser
-from app.tools.doctor.bundle import Part, Sources, parts, write
-from app.tools.doctor.doctor import diagnose
+from app.tools.doctor.bundle import Part, Sources, packed, parts, write
+from app.tools.doctor.doctor import Options, diagnose
 from app.tools.doctor.journal import journal
 
 ONLY: Final = "Only names, numbers, codes and times that are known to be harmless: no texts, no values."
@@ -35,8 +36,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     except KioskError as error:
         print(error, file=sys.stderr)
         return 2
-    sources = Sources(environment=os.environ, journal=journal)
-    made = parts(settings, options, diagnosis, sources)
+    made = parts(settings, options, diagnosis, Sources(environment=os.environ, journal=journal))
     print(listed(made))
     if parsed.list:
         return 0
@@ -51,6 +51,14 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         return 1
     print(f"{file}: {_size(size)}")
     return 0
+
+
+def bundle(settings: Settings, host: str, port: int) -> Iterator[bytes]:
+    """The zip for a server that listens there; KioskError if the doctor could not look."""
+    options = Options(host=host, port=port)
+    diagnosis = asyncio.run(diagnose(settings, options))
+    sources = Sources(environment=os.environ, journal=journal)
+    yield packed(parts(settings, options, diagnosis, sources))
 
 
 def listed(made: Sequence[Part]) -> str:

@@ -1,6 +1,7 @@
 """The support bundle: a zip of what one who helps from afar needs to know. Only what is known to be
 harmless is in it, it is of a limited size, and listed before it is written."""
 
+import io
 import json
 import os
 import platform
@@ -270,10 +271,19 @@ def _of_server(options: Options, diagnosis: Diagnosis) -> Iterator[Part]:
     yield text_part("state/metrics.txt", "metrics", redact_metrics(str(ask("/metrics"))))
 
 
+def packed(made: Sequence[Part]) -> bytes:
+    """The zip."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
+        for part in made:
+            file.writestr(part.name, part.text)
+    return content.getvalue()
+
+
 def write(file: Path, made: Sequence[Part]) -> int:
     """Writes the zip, readable by its owner only; its size. OSError, FileExistsError if it is there."""
+    content = packed(made)
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(descriptor, "wb") as raw, zipfile.ZipFile(raw, "w", zipfile.ZIP_DEFLATED) as packed:
-        for part in made:
-            packed.writestr(part.name, part.text)
-    return file.stat().st_size
+    with os.fdopen(descriptor, "wb") as raw:
+        raw.write(content)
+    return len(content)

@@ -4,7 +4,6 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AsyncExitStack
 from datetime import datetime
 from functools import partial
 from itertools import groupby
@@ -25,7 +24,7 @@ from app.system.clock import format_time, iso_time
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, joined, localized, number, say
 from app.web.app_state import AppState, CurrentState
-from app.web.downloads import Exported
+from app.web.downloads import exported
 from app.web.language import language_of
 from app.web.pages.alarm_figures import FiguresAnswer, FiguresContext, figures_context, figures_json
 from app.web.pages.alarms import word
@@ -325,11 +324,6 @@ async def figures(
 async def as_csv(
     request: Request, state: CurrentState, form: Annotated[HistoryQuery, Query()]
 ) -> Response:
-    gzip = "gzip" in request.headers.get("accept-encoding", "")
-    exports = state.fleet.alarms.history
-    async with AsyncExitStack() as opened:
-        export = await opened.enter_async_context(
-            exports.export(form.filter(now()), gzip, language_of(request))
-        )
-        first = await export.start()
-        return Exported(export, first, gzip, opened.pop_all(), "alarms")
+    history = state.fleet.alarms.history
+    wanted, language = form.filter(now()), language_of(request)
+    return await exported(request, lambda gzip: history.export(wanted, gzip, language), "alarms")

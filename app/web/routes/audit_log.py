@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from contextlib import AsyncExitStack
 from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import partial
@@ -21,7 +20,7 @@ from app.system.errors import NotFound
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, number, say
 from app.web.app_state import CurrentState
-from app.web.downloads import Exported
+from app.web.downloads import exported
 from app.web.language import language_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import (
@@ -182,15 +181,13 @@ async def page(request: Request, state: CurrentState, form: Annotated[LogQuery, 
     responses=errors(403, 404, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
 )
 async def as_csv(request: Request, state: CurrentState, form: Annotated[LogQuery, Query()]) -> Response:
-    if not isinstance(state.log, OperatorLog):
+    if not isinstance(log := state.log, OperatorLog):
         raise NotFound(say("log_off"))
-    gzip = "gzip" in request.headers.get("accept-encoding", "")
-    async with AsyncExitStack() as opened:
-        export = await opened.enter_async_context(
-            state.log.export(form.filter(), form.before, gzip, language_of(request))
-        )
-        first = await export.start()
-        return Exported(export, first, gzip, opened.pop_all(), "operator's log")
+    arguments = (form.filter(), form.before)
+    language = language_of(request)
+    return await exported(
+        request, lambda gzip: log.export(*arguments, gzip, language), "operator's log"
+    )
 
 
 def _shown(row: LogRow, language: str) -> LogRow:

@@ -23,10 +23,10 @@ from app.cell.recipes.recipe import (
     BadRow,
     ReadRow,
     clean_name,
-    csv_text,
     decoded,
     differences,
     read_rows,
+    recipes_csv,
     value_text,
 )
 from app.cell.session.session import RobotSession
@@ -278,7 +278,7 @@ async def as_csv(set: SetId, state: CurrentState) -> Response:
     book = _book(state, set)
     at = {r.id: datetime.fromtimestamp(r.now.at, UTC).isoformat("T", "seconds") for r in book.recipes}
     headers = {"content-disposition": f'attachment; filename="{set}.csv"', "cache-control": "no-store"}
-    text = csv_text(book.load.fields, book.recipes, at)
+    text = recipes_csv(book.load.fields, book.recipes, at)
     return Response(text.encode(), media_type=f"{CSV}; charset=utf-8", headers=headers)
 
 

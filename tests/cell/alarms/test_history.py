@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from app.cell.alarms.export import FIELDS, csv_chunks
+from app.cell.alarms.export import FIELDS, export
 from app.cell.alarms.history import (
     MAX_PAGE,
     HistoryFilter,
@@ -208,7 +208,7 @@ def test_each_transition_has_a_name_and_how_long_it_lasted() -> None:
 def test_the_csv_has_all_rows_in_the_readers_language(tmp_path: Path) -> None:
     formula = row(601, act="shelve", actor="=1+1", event="shelved")
     path = store_with(tmp_path, [row(n, lasted_s=1.5) for n in range(601)] + [formula])
-    text = b"".join(csv_chunks(path, HistoryFilter(), "ja")).decode()
+    text = b"".join(export(path, HistoryFilter(), False, "ja")).decode()
     assert text.startswith("\ufeff")
     rows = list(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))
     assert len(rows) == 602

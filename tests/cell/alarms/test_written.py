@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.cell.alarms.export import csv_chunks
+from app.cell.alarms.export import export
 from app.cell.alarms.history import HistoryFilter, HistoryRow
 from app.cell.alarms.records import record_of
 from app.cell.alarms.shown import limit_text, row_of, value_text
@@ -91,5 +91,5 @@ def csv_row(folder: Path, row: HistoryRow) -> Any:
     store = AlarmStore(folder / "alarms.sqlite", days=1000, size_mb=64)
     store.write([row], {})
     store.close()
-    text = b"".join(csv_chunks(folder / "alarms.sqlite", HistoryFilter(), "en")).decode()
+    text = b"".join(export(folder / "alarms.sqlite", HistoryFilter(), False, "en")).decode()
     return next(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))

@@ -15,10 +15,10 @@ from app.cell.recipes.recipe import (
     ReadRow,
     Recipe,
     UnclearRow,
-    csv_text,
     decoded,
     id_for,
     read_rows,
+    recipes_csv,
 )
 from app.system.errors import InputError
 from app.system.texts import Text, render
@@ -184,7 +184,7 @@ def test_a_deleted_recipe_leaves_its_file_in_the_folder_of_deleted_ones(book: Re
 def test_a_csv_changes_recipes_by_their_names_and_refuses_bad_rows(book: RecipeBook) -> None:
     made(book)
     made(book, "Tray", TRAY)
-    text = csv_text(book.load.fields, book.recipes, {})
+    text = recipes_csv(book.load.fields, book.recipes, {})
     head, carton, tray = text.removeprefix("\ufeff").splitlines()
     assert head.startswith("name,length,speed,gripper,fast,note,version")
     bad = carton.replace("Carton 400 × 300", "Too long").replace(",400,", ",4000,")
@@ -207,7 +207,7 @@ def test_a_csv_changes_recipes_by_their_names_and_refuses_bad_rows(book: RecipeB
 def test_what_is_exported_is_imported_as_it_was(book: RecipeBook) -> None:
     made(book, "'+quoted", {**CARTON, "note": '-5,"x"'})
     made(book, "@formula", {**TRAY, "speed": 33.25})
-    text = csv_text(book.load.fields, book.recipes, {})
+    text = recipes_csv(book.load.fields, book.recipes, {})
     change = book.take_rows(ANN, read_rows(text, book.load.fields))
     assert [render(row.reason) for row in change.bad] == []
     assert (change.same, change.changed, change.created) == (2, 0, 0)
@@ -215,7 +215,7 @@ def test_what_is_exported_is_imported_as_it_was(book: RecipeBook) -> None:
 
 def test_a_spreadsheet_may_separate_by_semicolons(book: RecipeBook) -> None:
     made(book)
-    text = csv_text(book.load.fields, book.recipes, {}).replace(",", ";").replace("400;80", "450;80")
+    text = recipes_csv(book.load.fields, book.recipes, {}).replace(",", ";").replace("400;80", "450;80")
     change = book.take_rows(ANN, read_rows(text, book.load.fields))
     assert (change.bad, change.changed) == ((), 1)
     comma = text.replace("450;80", '450;"80,5"')  # its header says that it has decimal points
@@ -365,7 +365,7 @@ def test_the_second_of_two_who_give_one_name_is_told(book: RecipeBook) -> None:
     assert isinstance(first, BookChange)
     writing = book.begin(ANN, first)
     assert refused(book.create(BOB, "carton", TRAY)) == "recipe_name_taken"
-    rows = read_rows(csv_text(book.load.fields, first.puts, {}), book.load.fields)
+    rows = read_rows(recipes_csv(book.load.fields, first.puts, {}), book.load.fields)
     imported = book.take_rows(BOB, rows)
     assert [row.reason.code for row in imported.bad if isinstance(row.reason, Text)] == [
         "recipe_being_written"
@@ -408,7 +408,7 @@ def test_a_row_changes_no_recipe_where_several_have_its_name(book: RecipeBook) -
     book.folder.write(replace(twin, id="twin"))
     both = again(book)
     rows = read_rows(
-        csv_text(book.load.fields, [twin], {}).replace("Carton", "carton"), book.load.fields
+        recipes_csv(book.load.fields, [twin], {}).replace("Carton", "carton"), book.load.fields
     )
     change = both.take_rows(ANN, rows)
     assert change.puts == ()
@@ -419,7 +419,7 @@ def test_a_row_changes_no_recipe_where_several_have_its_name(book: RecipeBook) -
 
 def test_every_row_beyond_the_limit_is_counted(book: RecipeBook) -> None:
     recipe = made(book)
-    head, row = csv_text(book.load.fields, [recipe], {}).splitlines()
+    head, row = recipes_csv(book.load.fields, [recipe], {}).splitlines()
     rows = [row.replace(recipe.name, f"Carton {number}") for number in range(800)]
     change = book.take_rows(ANN, read_rows("\n".join([head, *rows]), book.load.fields))
     assert (change.created, len(change.bad)) == (MAX_RECIPES - 1, 800 - MAX_RECIPES + 1)

@@ -1,27 +1,29 @@
 """The server's own processes under the unit's filter of system calls: resources are not changed."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from app.records import Filter
-from app.records.reader import COMMAND as READER
-from app.records.reader import ReadRequest
 from app.records.store import Store
 from tests.records.test_store import fill
 from tests.support.parts import ROOT
 from tests.support.system_calls import forbid_resources
 
+SEARCH = """
+import pathlib, sys
+from app.records import Filter
+from app.system.worker import Worker
+search = Worker("app.records.reader:search", pathlib.Path(sys.argv[1]), Filter(every=True), None, 10)
+print(len(next(search.results())))
+"""
 CHECK = [sys.executable, "-m", "app.cli", "check"]
 
 
-def run(command: list[str], text: bytes = b"") -> bytes:
+def run(command: list[str]) -> bytes:
     done = subprocess.run(
         command,
-        input=text,
         capture_output=True,
         cwd=ROOT,
         env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
@@ -40,8 +42,7 @@ def test_the_filter_forbids() -> None:
 def test_the_operators_log_can_be_read(tmp_path: Path) -> None:
     store = Store(tmp_path, "boot1")
     fill(store, 3)
-    request = ReadRequest(tmp_path, Filter(every=True), None, count=10)
-    assert len(json.loads(run(list(READER), request.as_json()))) >= 3
+    assert int(run([sys.executable, "-c", SEARCH, str(tmp_path)])) >= 3
     store.close()
 
 
