@@ -44,7 +44,6 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/session/here": ANYBODY,
     "/session/oidc": ANYBODY,
     "/session/oidc/back": ANYBODY,
-    "/session/pad": ANYBODY,
     "/signin": ANYBODY,
     # Judged where they are made. A cancel stops, and needs nothing.
     "/widgets/{widget}": ANYBODY,

@@ -2,6 +2,7 @@
 // with the confirmation of this one press; what was entered is kept nowhere.
 import { fillValues } from "./ask.js";
 import { openAsking } from "./beside.js";
+import { typeDigit } from "./pad.js";
 import { APART_MS, SHORTEST } from "./touches.js";
 import { post } from "./press.js";
 import { closest, find, setText } from "./show.js";
@@ -10,7 +11,6 @@ const NOT_NOW_MS = 60_000; // without a touch the sheet goes
 const TIMEOUT_MS = 10_000;
 const CHECK_TIMEOUT_MS = 60_000; // a hash takes its time on a busy machine
 const SLOW_MS = 1500; // a check that takes longer says so
-const MOST_DIGITS = 12;
 
 /** @typedef {{ confirmation: string, valid_s: number, reason: string }} Proof */
 
@@ -38,12 +38,13 @@ export async function confirmByPerson(root, inputs, onYes, pressed) {
   busy(true);
   const asking = openAsking(root, dialog, NOT_NOW_MS, () => busy(false));
   for (const name of /** @type {const} */ (["pointerdown", "keydown"])) asking.on(name, asking.stay);
-  asking.on("click", ({ target }) => closest(target, "button.no") && asking.close());
+  asking.on("click", ({ target }) => {
+    if (closest(target, "button.no")) asking.close();
+    else if (typeDigit(target, "input[name=_pin]")) delete form.dataset.scanned;
+  });
   dialog.addEventListener("beforetoggle", () => form.replaceChildren(), { once: true });
   asking.on("submit", async (event) => {
     event.preventDefault();
-    const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "enter";
-    if (digit !== "enter") return typed(form, digit);
     if (!yes || yes.disabled) return;
     busy(true);
     const said = form.querySelector(".said");
@@ -104,14 +105,6 @@ function entered(form) {
   delete form.dataset.scanned;
   if (badge || (isScanned && pin)) return { badge: badge || pin };
   return password ? { user, password } : { user, pin };
-}
-
-/** @param {HTMLFormElement} form @param {string} digit */
-function typed(form, digit) {
-  const input = find(form, "input[name=_pin]");
-  const edited = { clear: "", delete: input.value.slice(0, -1) };
-  input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, MOST_DIGITS);
-  delete form.dataset.scanned;
 }
 
 // A badge reader types into the field that has the focus. Its keys are those of `touches.js`; here is what comes without

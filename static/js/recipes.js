@@ -6,6 +6,9 @@ import { addHooks, closest, find } from "./show.js";
 const PAUSE_MS = 500; // between two fetches
 const LONGEST_MS = 10_000; // for an answer
 
+// Locked until now: no recipe is changed without scripts.
+for (const button of document.querySelectorAll("button[data-scripts]")) button.disabled = false;
+
 const main = find(document, "main[data-recipes]");
 const load = main.querySelector("[data-kind=recipe]");
 let isTouched = false; // under a finger nothing changes

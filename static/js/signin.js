@@ -1,10 +1,10 @@
 // The pads of the pages of sign-in and of the confirmation of an act on an alarm: they type into the field of the PIN, and
 // the sign-in is sent, without a new page.
+import { typeDigit } from "./pad.js";
 import { closest, find } from "./show.js";
 
 const SLOW_MS = 1500; // a check that takes longer says so
 let checks = false;
-const MOST_DIGITS = 12;
 const main = document.querySelector("main.sign-in");
 const confirmation = document.querySelector("form[data-confirm-act]");
 
@@ -13,9 +13,6 @@ async function submitted(event) {
   const form = event.target;
   if (!(form instanceof HTMLFormElement) || form.action.endsWith("/end")) return;
   event.preventDefault();
-  const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "";
-  if (form.dataset.way === "pin" && digit !== "enter" && digit !== "")
-    return typed(find(form, "input[name=pin]"), digit);
   if (checks) return;
   const inputs = [...form.elements].filter((input) => input instanceof HTMLInputElement);
   const fields = inputs.map((input) => [input.name, input.value]);
@@ -46,12 +43,6 @@ async function signIn(body) {
   }
 }
 
-/** @param {HTMLInputElement} input @param {string} digit */
-function typed(input, digit) {
-  const edited = { clear: "", delete: input.value.slice(0, -1) };
-  input.value = digit === "clear" || digit === "delete" ? edited[digit] : (input.value + digit).slice(0, MOST_DIGITS);
-}
-
 // The name that is typed goes with its user to the other way to sign in.
 main?.addEventListener("click", ({ target }) => {
   const link = closest(target, ".secret > a");
@@ -63,9 +54,7 @@ main?.addEventListener("click", ({ target }) => {
 });
 main?.addEventListener("submit", (event) => void submitted(event));
 
-confirmation?.addEventListener("submit", (event) => {
-  const digit = event.submitter instanceof HTMLButtonElement ? event.submitter.value : "enter";
-  if (digit === "enter") return;
-  event.preventDefault();
-  typed(find(confirmation, "input[name=_pin]"), digit);
-});
+main?.addEventListener("click", ({ target }) => typeDigit(target, "input[name=pin]"));
+confirmation?.addEventListener("click", ({ target }) => typeDigit(target, "input[name=_pin]"));
+const yes = confirmation?.querySelector("button.yes");
+if (yes) yes.disabled = false;

@@ -12,7 +12,7 @@ from tests.browser.test_accessibility import violations
 from tests.cell.recipes.panels import CARTON, TRAY
 from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import DRAWN, settled
-from tests.support.parts import Server, until
+from tests.support.parts import Server
 from tests.web.test_recipes import act, exported, load, make, server_with
 
 pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("recipes")]
@@ -123,25 +123,14 @@ def test_recipes_are_made_named_and_deleted(cell: Server, page: Page) -> None:
     assert {*exported(cell)} == {"Carton 400 × 300", "Tray", "Bag 25 kg"}
 
 
-def test_a_page_without_scripts_loads_and_edits(cell: Server, without_scripts: Page) -> None:
+def test_a_page_without_scripts_is_locked_and_says_why(cell: Server, without_scripts: Page) -> None:
     page = without_scripts
     page.goto(f"{cell.url}/recipes/boxes?recipe=tray")
-
-    def is_loaded() -> bool:
-        page.locator(LOAD).click()
-        return "is loaded" in page.locator(".foot").inner_text()
-
-    until(is_loaded, "it is loaded", every_s=0.8)
-    expect(page.locator(".recipe h2")).to_have_text("Tray")
+    expect(page.locator(LOAD)).to_be_disabled()
+    expect(page.locator(".recipe noscript")).to_have_text("Locked: recipes need JavaScript.")
     page.get_by_role("link", name="Edit").click()
-    page.locator("#input-length").fill("333")
-
-    def is_saved() -> bool:
-        page.get_by_role("button", name="Save").click()
-        return exported(cell)["Tray"]["length"] == "333"
-
-    page.wait_for_timeout(SECOND_TAP_MS)
-    assert is_saved()
+    expect(page.get_by_role("button", name="Save")).to_be_disabled()
+    expect(page.locator(".recipe noscript")).to_have_text("Locked: recipes need JavaScript.")
 
 
 def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page: Page) -> None:

@@ -86,22 +86,20 @@ def test_the_form_asks_and_a_wrong_pin_does_nothing(browsers: Browsers, kiosk: S
     assert page.status_code == 200
     assert "Oven hot" in page.text
     assert 'role="stop"' in page.text or 'data-widget="halt"' in page.text  # Stop stays in view
-    asking = sent(client, "hot", "acknowledge", _digit="enter", _pin="9999")
+    asking = sent(client, "hot", "acknowledge", _enter="yes", _pin="9999")
     assert refused(asking) == "confirm_wrong_pin"
     assert not says(asking, "9999")
     shown = client.get(asking, headers={"accept": "text/html"}).text
     assert "Tries left:" in shown
     assert rows(client)["hot"]["acknowledged"] is False
-    assert refused(sent(client, "hot", "acknowledge", _digit="enter")) == "confirm_empty"
+    assert refused(sent(client, "hot", "acknowledge", _enter="yes")) == "confirm_empty"
 
 
 def test_with_the_pin_it_is_done_once_and_the_log_says_by_whom(
     browsers: Browsers, kiosk: Server
 ) -> None:
     client = browsers.signed_in(kiosk.url, "K. Novak", pin="1470")
-    for digit in "1470":  # by the pad, without scripts
-        assert refused(sent(client, "hot", "shelve", **SHELF, _digit=digit)) == ""
-    back = sent(client, "hot", "shelve", **SHELF, _digit="enter")
+    back = sent(client, "hot", "shelve", **SHELF, _enter="yes", _pin="1470")
     assert back.startswith("/alarms?act="), back
     assert rows(client)["hot"]["shelf"]["who"].startswith("K. Novak")
     row = entry(client, "alarm_shelve")
@@ -125,7 +123,7 @@ def test_the_second_person_is_another_one_with_the_role(
     browsers: Browsers, kiosk: Server, entered: dict[str, str], code: str
 ) -> None:
     client = browsers.signed_in(kiosk.url, "K. Novak", pin="1470")
-    asking = sent(client, "guard", "out_of_service", reason="Repair", _digit="enter", **entered)
+    asking = sent(client, "guard", "out_of_service", reason="Repair", _enter="yes", **entered)
     assert refused(asking) == code
     assert client.get(asking, headers={"accept": "text/html"}).status_code == 200
     assert rows(client)["guard"]["out_of_service"] is None
@@ -133,7 +131,7 @@ def test_the_second_person_is_another_one_with_the_role(
 
 def test_two_persons_do_it_and_the_log_names_both(browsers: Browsers, kiosk: Server) -> None:
     client = browsers.signed_in(kiosk.url, "K. Novak", pin="1470")
-    entered = {"_digit": "enter", "_user": "J. Brandt", "_pin": "3691"}
+    entered = {"_enter": "yes", "_user": "J. Brandt", "_pin": "3691"}
     assert sent(client, "guard", "acknowledge", **entered).startswith("/alarms?act=")
     assert rows(client)["guard"]["acknowledged"] is True
     reason = entry(client, "alarm_acknowledge")["reason"]

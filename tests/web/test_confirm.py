@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.system.texts import render, say
 from tests.support.confirmed import PANEL, add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
@@ -233,37 +234,26 @@ def test_a_confirmation_ends_with_the_rights_of_who_gave_it(browsers: Browsers, 
         assert press(client, "bypass", token).json()["code"] == "confirm_needed_two"
 
 
-def test_without_scripts_a_page_asks_for_the_pin(browsers: Browsers, kiosk: Server) -> None:
-    client = browsers.signed_in(kiosk.url, "M. Sato", pin="2580")
-    fields = {"heat": "300", "_page": "main", "_id": secrets.token_hex(8)}
-    page = client.post("/widgets/start", data=fields)
-    assert page.status_code == 200
-    assert "Your PIN again, M. Sato" in page.text
-    typed = form_fields(page.text)
-    for digit in "258":
-        page = client.post("/widgets/start", data={**typed, "_digit": digit})
-        typed = form_fields(page.text)
-    assert page.text.count("●") == 3
-    assert not says(typed, "258")
-    late = {**typed, "_since": "1.0"}
-    page = client.post("/widgets/start", data={**late, "_digit": "enter"})
-    assert "The PIN is wrong. Tries left:" in page.text
-    late = {**form_fields(page.text), "_since": "1.0"}
-    answer = client.post("/widgets/start", data={**late, "_digit": "enter", "_pin": "2580"})
-    assert answer.status_code == 303
-    assert not says(answer.headers["location"], "2580")
-    shown = client.get(answer.headers["location"])
-    assert "Confirmed by M. Sato with the PIN." in shown.text
-
-
-def test_without_scripts_a_second_person_is_chosen(browsers: Browsers, kiosk: Server) -> None:
+@pytest.mark.parametrize(
+    ("language", "widget", "code"),
+    [
+        ("en", "start", "confirm_needed_pin"),
+        ("ja", "start", "confirm_needed_pin"),
+        ("de", "bypass", "confirm_needed_two"),
+    ],
+)
+def test_without_scripts_it_is_locked_and_a_form_is_refused(
+    browsers: Browsers, kiosk: Server, language: str, widget: str, code: str
+) -> None:
     client = browsers.signed_in(kiosk.url, "K. Novak", pin="1470")
-    page = client.post("/widgets/bypass", data={"_page": "main", "_id": secrets.token_hex(8)})
-    assert "<option>J. Brandt</option>" in page.text
-    assert "M. Sato" not in page.text
-    late = {**form_fields(page.text), "_since": "1.0", "_digit": "enter"}
-    assert "Choose the second person." in client.post("/widgets/bypass", data=late | {"_pin": "1"}).text
-    answer = client.post("/widgets/bypass", data=late | {"_user": "J. Brandt", "_pin": "3691"})
+    shown = client.get("/pages/main", headers={"accept-language": language}).text
+    (button,) = re.findall(rf'<button[^>]*formaction="/widgets/{widget}"[^>]*>', shown)
+    assert button.endswith(" disabled>")
+    assert render(say("confirm_needs_javascript"), language) in shown
+    press_id = secrets.token_hex(8)
+    fields = {"heat": "300", "_page": "main", "_id": press_id, "_enter": "yes", "_pin": "1470"}
+    answer = client.post(f"/widgets/{widget}", data=fields)
     assert answer.status_code == 303
-    reasons = [row["reason"] for row in log_rows(client) if row["press"] == f"{late['_id']}.bypass"]
-    assert reasons[-1].endswith("Confirmed by K. Novak and J. Brandt (PIN).")
+    rows = [row for row in log_rows(client) if row["press"] == f"{press_id}.{widget}"]
+    assert {row["outcome"] for row in rows} == {"refused"}
+    assert code in {row["verdict"] for row in rows}

@@ -115,8 +115,6 @@ def test_invalid_request_gets_a_regular_error(kiosk: Server) -> None:
         ("/alarms/drive/shelve", {"for_s": "", "occurrence": "", "_since": ""}, 303),
         ("/alarms/acknowledge", {"id": "", "page": "", "_since": ""}, 303),
         ("/alarms/acknowledge", {"other": ""}, 422),
-        ("/session/pad", {}, 303),
-        ("/session/pad", {"other": ""}, 422),
         ("/users/remove", {"name": "nobody", "version": "", "_since": ""}, 303),
         ("/users/remove", {"name": "nobody", "_since": "nan"}, 422),
         ("/control/take", {"id": "", "to": "", "page": ""}, 303),

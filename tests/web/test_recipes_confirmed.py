@@ -14,7 +14,6 @@ from tests.support.confirmed import add_users
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers, log_rows
-from tests.web.test_confirm import form_fields
 
 OTHER: Final = """
 [[recipe]]
@@ -132,34 +131,24 @@ def test_a_second_person_confirms_and_the_log_names_both(browsers: Browsers, cel
     assert "Confirmed by K. Novak and J. Brandt (PIN)." in done["reason"]
 
 
-def test_without_scripts_a_page_asks_for_the_pin_with_what_changes(
-    browsers: Browsers, cell: Server
-) -> None:
+def test_a_load_that_asks_lists_what_changes(browsers: Browsers, cell: Server) -> None:
     client = browsers.signed_in(cell.url, "M. Sato", pin="2580")
-    asked = client.post("/widgets/boxes", data={"boxes": "carton@1"})
-    assert asked.status_code == 200
-    assert "Load Carton?" in plain(asked.text)
-    assert " → 80 %" in plain(asked.text)
-    fields = form_fields(asked.text) | {"_since": "0", "_digit": "enter"}
-    wrong = client.post("/widgets/boxes", data=fields | {"_pin": "2581"})
-    assert "The PIN is wrong" in plain(wrong.text)
-    done = client.post("/widgets/boxes", data=fields | {"_pin": "2580"})
-    assert done.status_code == 303, plain(done.text)
-    assert done.headers["location"].startswith("/recipes/boxes?recipe=carton&receipt=")
-    assert "Confirmed by M. Sato with the PIN." in loads(client, "boxes")[-1]["reason"]
-
-
-def test_a_load_that_asks_lists_what_changes_with_scripts_and_without(
-    browsers: Browsers, cell: Server
-) -> None:
-    client = browsers.signed_in(cell.url, "M. Sato", pin="2580")
+    token = confirm(client, "boxes", "carton@1", pin="2580").json()["confirmation"]
+    assert load(client, "boxes", "carton@1", confirmation=token).json()["outcome"] == "confirmed"
     dialog = page(client, "asked", "ask").partition('<dialog class="ask"')[2].partition("</dialog>")[0]
     assert "Load Ask?" in plain(dialog)
     assert " → 90 %" in plain(dialog)
-    asked = client.post("/widgets/asked", data={"asked": "ask@1"})
-    assert asked.status_code == 200
-    assert "Load Ask?" in plain(asked.text)
-    assert " → 90 %" in plain(asked.text)
-    fields = form_fields(asked.text) | {"_since": "0"}
-    assert client.post("/widgets/asked", data=fields).status_code == 303
-    assert loads(client, "asked")[-1]["outcome"] == "confirmed"
+
+
+@pytest.mark.parametrize("set_id", ["boxes", "asked"])
+def test_no_recipe_is_loaded_without_scripts(browsers: Browsers, cell: Server, set_id: str) -> None:
+    client = browsers.signed_in(cell.url, "M. Sato", pin="2580")
+    shown = client.get(f"/recipes/{set_id}").text
+    button = re.search(rf'<button[^>]*formaction="/widgets/{set_id}"[^>]*>', shown)
+    assert button is not None
+    assert button[0].endswith(" disabled>")
+    assert "<noscript>Locked: recipes need JavaScript.</noscript>" in shown
+    before = loads(client, set_id)
+    refused = client.post(f"/widgets/{set_id}", data={set_id: "tray@1"})
+    assert refused.status_code == 422
+    assert loads(client, set_id) == before

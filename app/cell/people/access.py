@@ -261,42 +261,6 @@ def _leak_of(key: Key) -> Leak:
     return USER_ANYWHERE if address == ANYWHERE else USER
 
 
-# The digits of a PIN that browsers without scripts have typed so far, one request for each.
-
-DIGITS: Final = frozenset("0123456789")
-MOST_DIGITS: Final = 12
-TYPED_FOR_S: Final = 60.0
-MAX_TYPING: Final = 100  # browsers
-
-
-class TypedDigits:
-    """Those of each browser, for one user or one question at a time, in memory only."""
-
-    def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._monotonic = monotonic
-        self._typed: dict[str, tuple[str, str, float]] = {}  # client → (name, digits, time)
-
-    def read(self, client: str, name: str) -> str:
-        """The digits that a browser has typed for this user or question; "" after a minute."""
-        typed_for, digits, at = self._typed.get(client, ("", "", 0.0))
-        return digits if typed_for == name and self._monotonic() - at < TYPED_FOR_S else ""
-
-    def press(self, client: str, name: str, digit: str) -> None:
-        """A digit, "delete" or "clear"."""
-        digits = self.read(client, name)
-        self._typed.pop(client, None)
-        if digit == "delete":
-            digits = digits[:-1]
-        elif digit in DIGITS:
-            digits = (digits + digit)[:MOST_DIGITS]
-        else:
-            digits = ""
-        if client and digits:
-            self._typed[client] = (name, digits, self._monotonic())
-        while len(self._typed) > MAX_TYPING:
-            self._typed.pop(next(iter(self._typed)))
-
-
 log = logging.getLogger("kiosk.access")
 
 TOKEN_QUOTA: Final = Quota(100, 50)
@@ -357,7 +321,6 @@ class Access:
         self._reader = ThreadPoolExecutor(1, "users")
         self._stamp: Stamp | None = NEVER_READ
         self._monotonic = monotonic
-        self.typed_digits = TypedDigits(monotonic)
         self._end_reasons = BoundedDict[str, EndReason](MAX_END_REASONS)  # by client
         self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []

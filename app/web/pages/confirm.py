@@ -70,6 +70,7 @@ WORDS: Final = {
     "name": "signin_name",
     "checking": "signin_checking",
     "second": "confirm_second",
+    "scripts": "confirm_needs_javascript",
 }
 
 
@@ -89,7 +90,7 @@ class Subject:
 class ConfirmSheet(TypedDict):
     """`lock`: why it can't be confirmed at this browser, "" if it can. `people` are those who can
     be chosen as the second person; without names (`typed`) they are typed. `by_pin`, `by_password` and
-    `by_badge` are what can be entered, `typed_digits` how many digits the server has already."""
+    `by_badge` are what can be entered."""
 
     title: TextLike
     question: Ask
@@ -102,7 +103,6 @@ class ConfirmSheet(TypedDict):
     by_badge: bool
     yes: TextLike
     chosen: str
-    typed_digits: int
     words_of: dict[str, Text]
 
 
@@ -146,7 +146,6 @@ def confirm_sheet(state: AppState, subject: Subject, who: Principal, chosen: str
         by_badge="badge" in ways,
         yes=subject.yes,
         chosen=chosen,
-        typed_digits=len(state.access.typed_digits.read(who.client.id, digits_key(subject.id))),
         words_of={name: say(code) for name, code in WORDS.items()},
     )
 
@@ -156,11 +155,6 @@ def _lock(state: AppState, two: bool, who: Principal) -> TextLike:
     if not who.user or who.program:
         return say(SIGN_IN)
     return "" if two or state.access.book.user(who.user) else say(WITHOUT_PIN)
-
-
-def digits_key(subject: str) -> str:
-    """Under which the server keeps the digits that a browser without scripts types."""
-    return f"\0{subject}"
 
 
 def _title(ways: set[Any]) -> str:

@@ -87,6 +87,22 @@ def confirmed_commands(panel: Panel, page: Page) -> list[Command]:
     return [w for w in shown if isinstance(w, Command) and confirmation_of(w)]
 
 
+def locked_without_scripts(view: View, panel: Panel, page: Page) -> View:
+    """The view as a page shows it until its scripts have started: what a person confirms with a PIN,
+    and the loads of recipes, are locked."""
+    confirmed = {
+        command.id: say("confirm_needs_javascript") for command in confirmed_commands(panel, page)
+    }
+    reasons = confirmed | {load.id: say("recipes_need_javascript") for load in panel.recipe_loads}
+    widgets = view["widgets"]
+    locked = {
+        name: {**widgets[name], "enabled": False, "reason": reason}
+        for name, reason in reasons.items()
+        if widgets.get(name, {}).get("enabled")
+    }
+    return {**view, "widgets": {**widgets, **locked}} if locked else view
+
+
 def page_json(data: Mapping[str, Any], language: str) -> Markup:
     """`data` and the sentences as JSON for a `script` element that is not executed."""
     text = json.dumps(
@@ -182,7 +198,7 @@ def page_context(
             who, publisher.view["control"], rules, language, others, panel.needs.named
         )
     with publisher.watching(publisher.shown_page(page.id)):
-        view = publisher.for_audience(of_client)
+        view = locked_without_scripts(publisher.for_audience(of_client), panel, page)
     display = display_of(request, panel)
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None

@@ -38,6 +38,7 @@ WORDS: Final = {
     "back": "signin_back",
     "more": "signin_more",
     "checking": "signin_checking",
+    "scripts": "signin_pad_needs_javascript",
 }
 
 

@@ -45,7 +45,7 @@ from app.web.client import caller, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
 from app.web.large_answers import rows_answer
 from app.web.pages.alarms import alarms_context, chosen_rows, segment_counts, word
-from app.web.pages.confirm import Subject, confirm_sheet, digits_key
+from app.web.pages.confirm import Subject, confirm_sheet
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.words import Ask
 from app.web.requests import (
@@ -60,7 +60,8 @@ from app.web.requests import (
     errors,
     refusals,
 )
-from app.web.routes.presses import FIELDS, ConfirmForm, checked_entry, entered_fields, is_second_tap
+from app.web.routes.confirm import FIELDS, checked_entry, entered_fields
+from app.web.routes.presses import is_second_tap
 
 # Acts on alarms that a person confirms with a PIN, password or badge: the page that asks for it.
 
@@ -123,7 +124,6 @@ async def confirm_page(
         "no": say("back"),
         "fields": fields,
         "failed": _failure(state, subject, who, query),
-        "scripted": False,
     }
     framed = FramedPage("alarm-confirm.html", word(act), own_path=f"/alarms/{alarm}/{act}/confirm")
     return framed_page(request, state, framed, context)
@@ -140,16 +140,13 @@ async def confirmed_act(
     entered = entered_fields(content) if any(name in content for name in FIELDS) else None
     if subject is None or not who.user or role_verdict(subject.needs, who):
         return None, None
-    too_soon, digits = is_second_tap(content), digits_key(subject.id)
+    too_soon = is_second_tap(content)
     if entered is None:
         return None, None if too_soon else _asking(state, alarm_id, act, content)
     typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
-    if entered["_digit"] != "enter" or (too_soon and not typed):
-        if entered["_digit"] != "enter":
-            state.access.typed_digits.press(who.client.id, digits, entered["_digit"])
+    if too_soon and not typed:
         return None, _asking(state, alarm_id, act, content, entered["_user"])
-    form = ConfirmForm(who, content, client.session)
-    by, checked = await checked_entry(state, subject, act, form, entered)
+    by, checked = await checked_entry(state, subject, act, client, entered)
     if by is not None:
         content.pop("_since", None)
         return by, None

@@ -1,27 +1,34 @@
 """A person confirms one press with a PIN, password or badge: the sheet for it, and its check."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.cell.people.access import SecretCheck
-from app.cell.people.confirmer import VALID_S
-from app.cell.people.secrets_hash import LONGEST
+from app.cell.people.access import Attempt, SecretCheck
+from app.cell.people.confirmer import VALID_S, Question
+from app.cell.people.secrets_hash import LONGEST, Way
 from app.cell.people.users import LONGEST_NAME
-from app.cell.permission.roles import SIGN_IN
+from app.cell.permission.roles import SIGN_IN, ConfirmedBy
 from app.panel.widgets.hold import HoldCommand
+from app.system.errors import InputError, TooMany
 from app.system.texts import localized, say
-from app.web.app_state import CurrentSession, CurrentState
-from app.web.client import caller, confirmed_command, question_of
+from app.web.app_state import AppState, CurrentSession, CurrentState
+from app.web.client import Caller, caller, confirmed_command, question_of
 from app.web.language import language_of
-from app.web.pages.confirm import confirm_sheet, press_subject
+from app.web.pages.confirm import Subject, confirm_sheet, press_subject
 from app.web.requests import PAGE, as_model, body_of, described_body, errors, json_of
 from app.web.routes.presses import INPUTS
 from app.web.routes.sign_in import REFUSED, SignIn, attempt_of, refused_answer
 
 router = APIRouter()
+
+# The fields of the sheet in a form of a page. None of them is shown again, logged or taken for an
+# input. `_enter` is that of its button.
+FIELDS: Final = ("_enter", "_user", "_pin", "_password", "_badge")
+WAYS: Final[Mapping[str, Way]] = {"_badge": "badge", "_password": "password", "_pin": "pin"}
 
 UNCACHED: Final = {"cache-control": "no-store"}
 Secret = Annotated[str, Field(max_length=LONGEST)]
@@ -69,7 +76,7 @@ async def sheet(
     command = confirmed_command(session, widget)
     who = caller(request).principal(state)
     context = confirm_sheet(state, press_subject(state, session, command, value), who)
-    html = state.templates.render("_confirm.html", language_of(request), scripted=True, **context)
+    html = state.templates.render("_confirm.html", language_of(request), **context)
     return HTMLResponse(html, headers=UNCACHED)
 
 
@@ -103,3 +110,34 @@ async def confirm(
         "reason": say("confirm_hold_now", seconds=f"{VALID_S:.0f}") if hold else "",
     }
     return JSONResponse(localized(content, language_of(request)), headers=UNCACHED)
+
+
+def entered_fields(fields: dict[str, str]) -> dict[str, str]:
+    """What is entered in the sheet, which the fields lose with it."""
+    return {name: fields.pop(name, "")[:LONGEST] for name in FIELDS}
+
+
+async def checked_entry(
+    state: AppState, subject: Subject, act: str, client: Caller, entered: Mapping[str, str]
+) -> tuple[ConfirmedBy | None, SecretCheck]:
+    """Who confirmed an act with what was entered; else what was wrong."""
+    who = client.principal(state)
+    ways = [way for way in WAYS if entered[way]]
+    if not ways:
+        return None, _missing("confirm_empty")
+    (way, *_) = ways
+    name = entered["_user"][:LONGEST_NAME] if way != "_badge" else ""
+    if subject.confirmation == "two_persons" and way != "_badge" and not name:
+        return None, _missing("confirm_who")
+    question = Question(subject.id, act, subject.confirmation, subject.needs)
+    attempt = Attempt(name, WAYS[way], entered[way])
+    user_session = state.access.sessions.get(client.session, who.client.id)
+    try:
+        checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
+    except (InputError, TooMany) as error:
+        return None, SecretCheck(None, error.text, "confirm_busy")
+    return state.confirmer.take(token, client.session, subject.id, act), checked
+
+
+def _missing(code: str) -> SecretCheck:
+    return SecretCheck(None, say(code), code)

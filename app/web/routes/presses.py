@@ -7,7 +7,7 @@ import re
 import secrets
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, NamedTuple
 from urllib.parse import quote
 
@@ -19,11 +19,6 @@ from starlette.types import Message
 from app.cell.commands.judge import RETRY_AFTER_S
 from app.cell.commands.press import EVENT_ID, MAX_ID_LENGTH, PRESS_ID, Press
 from app.cell.commands.receipts import Receipt
-from app.cell.people.access import Attempt, SecretCheck
-from app.cell.people.confirmer import Question
-from app.cell.people.secrets_hash import LONGEST
-from app.cell.people.users import LONGEST_NAME
-from app.cell.permission.roles import ConfirmedBy
 from app.cell.session.session import RobotSession
 from app.panel.layout import Page
 from app.panel.model import Panel
@@ -33,15 +28,15 @@ from app.panel.widgets.switch import Switch
 from app.panel.widgets.templated import is_stop
 from app.records.principal import Principal
 from app.system import clock
-from app.system.errors import InputError, KioskError, TooMany
+from app.system.errors import InputError, KioskError
 from app.system.printable import printable_texts
 from app.system.texts import TextLike, localized, say
 from app.web.answers import STATUS, ReceiptAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession
-from app.web.client import LONGEST_TOKEN, caller, confirmed, inputs_of, principal_of
+from app.web.client import LONGEST_TOKEN, caller, confirmed, principal_of
 from app.web.language import language_of
-from app.web.pages.confirm import Subject, confirm_sheet, digits_key, press_subject, question_before
 from app.web.pages.display_choice import DisplaySettings, display_of
+from app.web.pages.words import ask_of
 from app.web.requests import (
     FORM,
     JSON,
@@ -63,10 +58,9 @@ from app.web.requests import (
     refusals,
 )
 
-# A press that a person confirms, by forms for a browser without scripts: a page asks for the PIN.
-
-# The fields of the sheet. None of them is shown again, logged or taken for an input.
-FIELDS: Final = ("_digit", "_user", "_pin", "_password", "_badge")
+# A press as a form, for a browser without scripts: the answer is the page again, with the receipt.
+#
+# What a person confirms with a PIN needs scripts, as recipes do: such a form is refused.
 
 
 class Reader(NamedTuple):
@@ -77,85 +71,17 @@ class Reader(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ConfirmForm:
-    """A form that a person may confirm. `fields` are its texts: of inputs, and of the page, whose names
-    begin with "_"; the latter are removed as they are read. `session` is the id of the session of a
-    signed-in user."""
+class PressForm:
+    """A form that presses a widget. `fields` are its texts: of inputs, and of the page, whose names
+    begin with "_"; the latter are removed as they are read. `stopped` are the robots of a press that
+    stops several."""
 
     principal: Principal
     fields: dict[str, str] = field(repr=False)
-    session: str = field(repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class PressForm(ConfirmForm):
-    """A form that presses a widget. `stopped` are the robots of a press that stops several."""
-
     widget: PressCommand
     reader: Reader
     stopped: Sequence[RobotSession] = ()
 
-
-def entered_fields(fields: dict[str, str]) -> dict[str, str]:
-    """What is entered in the sheet, which the fields lose with it."""
-    return {name: fields.pop(name, "")[:LONGEST] for name in FIELDS}
-
-
-async def confirmed_by_form(
-    state: AppState, session: RobotSession, form: PressForm, too_soon: bool
-) -> tuple[ConfirmedBy | None, dict[str, Any]]:
-    """Who has confirmed the press of a form; else the sheet to be shown, with what is missing. A tap
-    that comes `too_soon` confirms nothing."""
-    entered, who = entered_fields(form.fields), form.principal
-    value = form.fields.get(form.widget.id, "")
-    subject = press_subject(state, session, form.widget, value)
-    failed: TextLike = ""
-    if entered["_digit"] not in ("", "enter"):
-        state.access.typed_digits.press(who.client.id, digits_key(subject.id), entered["_digit"])
-    elif entered["_digit"] == "enter" and not too_soon:
-        inputs = inputs_of(form.widget, dict(form.fields))
-        confirmed, checked = await checked_entry(state, subject, inputs, form, entered)
-        if confirmed is not None:
-            return confirmed, {}
-        failed = checked.reason
-        if checked.tries_left:
-            failed = say("signin_tries_left", why=failed, count=str(checked.tries_left))
-    sheet = confirm_sheet(state, subject, who, entered["_user"])
-    return None, {**sheet, "failed": failed, "scripted": False}
-
-
-async def checked_entry(
-    state: AppState, subject: Subject, inputs: str, form: ConfirmForm, entered: dict[str, str]
-) -> tuple[ConfirmedBy | None, SecretCheck]:
-    """Who confirmed it with what was entered; else what was wrong. `inputs` is their fingerprint."""
-    who, digits = form.principal, digits_key(subject.id)
-    entered["_pin"] = entered["_pin"] or state.access.typed_digits.read(who.client.id, digits)
-    state.access.typed_digits.press(who.client.id, digits, "clear")
-    ways = [way for way in ("_badge", "_password", "_pin") if entered[way]]
-    if not ways:
-        return None, _missing("confirm_empty")
-    (way, *_) = ways
-    name = entered["_user"][:LONGEST_NAME] if way != "_badge" else ""
-    if subject.confirmation == "two_persons" and way != "_badge" and not name:
-        return None, _missing("confirm_who")
-    question = Question(subject.id, inputs, subject.confirmation, subject.needs)
-    attempt = Attempt(name, _WAYS[way], entered[way])
-    user_session = state.access.sessions.get(form.session, who.client.id)
-    try:
-        checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
-    except (InputError, TooMany) as error:
-        return None, SecretCheck(None, error.text, "confirm_busy")
-    return state.confirmer.take(token, form.session, subject.id, inputs), checked
-
-
-def _missing(code: str) -> SecretCheck:
-    return SecretCheck(None, say(code), code)
-
-
-_WAYS: Final[dict[str, Any]] = {"_badge": "badge", "_password": "password", "_pin": "pin"}
-
-
-# A press as a form, for a browser without scripts: the answer is the page again, with the receipt.
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
@@ -172,14 +98,10 @@ async def pressed_by_form(
     if is_stop(form.widget) and not form.widget.asks:
         too_soon = False  # to stop twice does no harm
     shown_on = fields.pop("_page", "")
-    by, answered = None, fields.pop(CONFIRMED, "") == "yes" and not too_soon
-    if form.widget.confirmation and form.principal.user:
-        by, sheet = await confirmed_by_form(state, session, form, too_soon)
-        if by is None:
-            return _ask(state, page, session, form, shown_on, sheet)
-    elif form.widget.asks and not answered:
-        return _ask(state, page, session, form, shown_on, {})
-    press = replace(_press_of(state, session, form), confirmed=by)
+    answered = fields.pop(CONFIRMED, "") == "yes" and not too_soon
+    if form.widget.asks and not form.widget.confirmation and not answered:
+        return _ask(state, page, session, form, shown_on)
+    press = _press_of(state, session, form)
     if not state.limits.admit(press.principal):
         receipt = presses.limited(press, shown=True)
     elif form.stopped and not too_soon:
@@ -206,17 +128,10 @@ def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[
 
 
 def _ask(
-    state: AppState,
-    page: RobotSession,
-    session: RobotSession,
-    form: PressForm,
-    shown_on: str,
-    sheet: Mapping[str, Any],
+    state: AppState, page: RobotSession, session: RobotSession, form: PressForm, shown_on: str
 ) -> Response:
-    """The page that asks before a press; its answer is the press. `sheet` is that of a person who
-    confirms it."""
+    """The page that asks before a press; its answer is the press."""
     widget = form.widget
-    question = question_before(state.fleet, session, widget, form.fields.get(widget.id, ""))
     html = state.templates.render(
         "ask.html",
         form.reader.language,
@@ -224,7 +139,7 @@ def _ask(
         display=form.reader.display,
         panel=state.fleet.panel,
         banner=session.publisher.view["notice"]["banner"],
-        **({} if sheet else {"question": question}),
+        question=ask_of(session, widget),
         action=f"{page.base}/widgets/{widget.id}{_robots(form)}",
         back=page_after(state, page, widget.id, "", shown_on),
         fields={
@@ -239,7 +154,6 @@ def _ask(
         no=say("back"),
         empty=say("empty"),
         label=_label(form),
-        **sheet,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -255,8 +169,6 @@ def _label(form: PressForm) -> TextLike:
     widget = form.widget
     if isinstance(widget, Switch):
         return widget.on if form.fields.get(widget.id) == "true" else widget.off
-    if isinstance(widget, RecipeLoad):
-        return say("recipes_load")
     return widget.label
 
 
@@ -268,7 +180,8 @@ def _page_of(panel: Panel, widget: str, shown_on: str) -> Page:
         return pressed_on or panel.pages[0]
     if pressed_on and any(shown.id == widget for shown in pressed_on.widgets):
         return pressed_on
-    return next(page for page in panel.pages if any(shown.id == widget for shown in page.widgets))
+    pages = (page for page in panel.pages if any(shown.id == widget for shown in page.widgets))
+    return next(pages, panel.pages[0])
 
 
 def _until(fields: dict[str, str]) -> float | None:
@@ -311,23 +224,8 @@ def page_after(
 ) -> str:
     """The path of a widget's page, with a receipt if there is one. `page` is the session of the robot
     whose page it was, `shown_on` the page's id where it was pressed, "" if unknown."""
-    panel = state.fleet.panel
-    loads = {load.id: load for load in panel.recipe_loads}
-    if widget in loads:
-        path = f"{page.base}/recipes/{widget}"
-        recipe = recipe_of(page, loads[widget], receipt_id)
-        path += f"?recipe={quote(recipe)}" if recipe else ""
-    else:
-        path = f"{page.base}/pages/{_page_of(panel, widget, shown_on).id}"
-    receipt = f"{'&' if '?' in path else '?'}receipt={quote(receipt_id)}" if receipt_id else ""
-    return path + receipt
-
-
-def recipe_of(session: RobotSession, load: RecipeLoad, receipt_id: str) -> str:
-    """The id of the recipe of a press; "" if it is not known."""
-    receipt = session.presses.receipt(receipt_id)
-    value = receipt.inputs.get(load.id, "") if receipt else ""
-    return str(value).rpartition("@")[0]
+    receipt = f"?receipt={quote(receipt_id)}" if receipt_id else ""
+    return f"{page.base}/pages/{_page_of(state.fleet.panel, widget, shown_on).id}{receipt}"
 
 
 def is_second_tap(form: Mapping[str, str]) -> bool:
@@ -428,7 +326,9 @@ async def press(
         return _answer(request, await receipt_of_press(state, session, pressed, stopped))
     if kind == FORM:
         reader = Reader(language_of(request), display_of(request, state.fleet.panel))
-        form = PressForm(who, form_of(body), caller(request).session, command, reader, stopped)
+        if isinstance(command, RecipeLoad):
+            raise InputError(say("recipes_need_javascript"))
+        form = PressForm(who, form_of(body), command, reader, stopped)
         return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 

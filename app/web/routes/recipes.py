@@ -37,7 +37,7 @@ from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client import caller, principal_with_new_token, set_client_cookie
 from app.web.language import language_of
-from app.web.pages.confirm import Subject, confirm_sheet, digits_key, recipe_ask
+from app.web.pages.confirm import Subject, confirm_sheet, recipe_ask
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.recipe_comparison import comparison, seen_of
 from app.web.pages.recipes_page import Mode, entries_of, recipes_context, word
@@ -59,7 +59,8 @@ from app.web.requests import (
     kind_of,
     refusals,
 )
-from app.web.routes.presses import ConfirmForm, checked_entry, entered_fields, is_second_tap
+from app.web.routes.confirm import checked_entry, entered_fields
+from app.web.routes.presses import is_second_tap
 
 # Changes of recipes that a person confirms with a PIN, password or badge: the page that asks for it.
 #
@@ -116,22 +117,19 @@ async def confirmed_edit(
     who = client.principal(state)
     if subject is None or not who.user or role_verdict(subject.needs, who):
         return None, None
-    entered, digit = edit.entered, edit.entered["_digit"]
+    entered = edit.entered
     failed: TextLike = ""
     too_soon = is_second_tap(edit.form)
     typed = any(entered[name] for name in ("_pin", "_password", "_badge"))  # no second tap types
-    if digit and digit != "enter":
-        state.access.typed_digits.press(who.client.id, digits_key(subject.id), digit)
-    elif digit and (typed or not too_soon):
-        form = ConfirmForm(who, edit.form, client.session)
-        by, checked = await checked_entry(state, subject, edit.act, form, entered)
+    if entered["_enter"] and (typed or not too_soon):
+        by, checked = await checked_entry(state, subject, edit.act, client, entered)
         if by is not None:
             edit.form.pop("_since", None)
             return by, None
         failed = checked.reason
         if checked.tries_left:
             failed = say("signin_tries_left", why=failed, count=str(checked.tries_left))
-    elif not digit and too_soon:
+    elif not entered["_enter"] and too_soon:
         return None, None
     set_id, base = edit.book.load.id, session.base
     context: dict[str, Any] = {
@@ -141,7 +139,6 @@ async def confirmed_edit(
         "no": say("back"),
         "fields": {name: text for name, text in edit.form.items() if name != "_since"},
         "failed": failed,
-        "scripted": False,
     }
     robot = session.entry.id if session.entry else ""
     path = f"recipes/{set_id}"

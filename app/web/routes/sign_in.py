@@ -40,10 +40,8 @@ from app.web.requests import (
     FormFields,
     act_body_of,
     as_model,
-    body_of,
     described_body,
     errors,
-    form_of,
 )
 
 # A page that leads on: where a redirect would be one of another site's, or lead to another site.
@@ -294,7 +292,7 @@ def refused_answer(request: Request, checked: SecretCheck) -> JSONResponse:
     return JSONResponse(content, status, headers)
 
 
-# The page of sign-in, and its pad for browsers without scripts.
+# The page of sign-in.
 
 WRONG: Final = ("sign_in_wrong_pin", "sign_in_wrong_password")
 PLAIN: Final = (PIN_HERE, "sign_in_wrong_badge")  # without a number of tries
@@ -310,19 +308,6 @@ class SignInQuery(BaseModel):
     password: bool | None = None
     refused: Annotated[str, Field(max_length=40)] = ""
     page: Annotated[int, Field(ge=0, le=MOST_USERS)] = 0
-
-
-class PadForm(BaseModel):
-    """What the pad posts without scripts: a digit, "clear" or "enter"."""
-
-    user: str = ""
-    pin: str = ""
-    digit: str = ""
-
-
-PAD_FORM: Final = FormFields(
-    {"user": {"maxLength": LONGEST_NAME}, "pin": {"maxLength": LONGEST}, "digit": {"maxLength": 8}}
-)
 
 
 @router.get(
@@ -357,35 +342,11 @@ async def page(
         "can_password": "password" in ways,
         "oidc": oidc,
         "has_badges": any(known.badge for known in book.users),
-        "typed": len(state.access.typed_digits.read(who.client.id, name)) if name else 0,
         "failed": _failure(state, query.refused, name, who.client),
         "words_of": sign_in_words() | {"secret_of": _title(chosen, by_password)},
     }
     framed = FramedPage("signin.html", say("signin_sign_in"), own_path="/signin")
     return framed_page(request, state, framed, context)
-
-
-@router.post(
-    "/session/pad",
-    status_code=303,
-    response_class=RedirectResponse,
-    summary="A digit of a PIN, by a form without scripts",
-    responses=errors(403, 408, 413, 422, 503) | {401: {"description": "never of a form"}},
-    openapi_extra=described_body(None, PAD_FORM.schema, required=False),
-)
-async def pad(request: Request, state: CurrentState, other: bool = False) -> Response:
-    """The server keeps the digits until the PIN is complete: no page has them. `other`: the user's name
-    is typed."""
-    form = as_model(PadForm, PAD_FORM.filled(form_of(await body_of(request), 8)))
-    user, client = form.user, caller(request).client(state)
-    if form.digit == "enter":
-        pin = form.pin or state.access.typed_digits.read(client.id, user)
-        state.access.typed_digits.press(client.id, user, "clear")
-        if pin:
-            return await signed_in(request, state, Attempt(user, "pin", pin), True, other)
-    else:
-        state.access.typed_digits.press(client.id, user, form.digit)
-    return RedirectResponse(f"{state.root}/signin?{sign_in_query(user, other)}", 303)
 
 
 def _title(chosen: User | None, by_password: bool) -> TextLike:
