@@ -13,10 +13,10 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
+from importlib import import_module
 from typing import Final
 
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 from uvicorn import Config as ServerConfig
 
@@ -36,7 +36,7 @@ from app.system.log import RepeatedRecords
 from app.system.process import listen_sockets
 from app.system.process.service import ServiceManager, Watchdog
 from app.system.process.shutdown import graceful_shutdown
-from app.system.settings import Settings, shipped_path
+from app.system.settings import PACKAGE, Settings, shipped_path
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
 from app.web.asgi import Application, ReadableStartupErrors
@@ -98,13 +98,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 def _add_gallery(app: FastAPI) -> None:
     """The gallery is a part of the checkout only, not of the installed package."""
-    if find_spec("app.tools.gallery") is None:
+    if not (PACKAGE.parent / "tests/gallery").is_dir():
         log.info("/gallery is not in the installed package: `make dev` in a checkout has it")
         return
-    from app.tools.gallery import page as gallery
-
-    app.include_router(gallery.router)
-    app.state.path_methods.add(gallery.router.routes)
+    router: APIRouter = import_module("tests.gallery.page").router
+    app.include_router(router)
+    app.state.path_methods.add(router.routes)
 
 
 def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None:

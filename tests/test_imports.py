@@ -34,7 +34,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("session",),
     ),
     "tools": (
-        ("cell_config", "doctor", "install", "kiosk", "simulator", "gallery"),
+        ("cell_config", "doctor", "install", "kiosk", "simulator"),
         ("scaffold",),
         ("cli",),
     ),

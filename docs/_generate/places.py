@@ -24,17 +24,17 @@ SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
 METHODS: Final = ("get", "post", "head", "put", "delete", "websocket")
 CATALOGUE: Final = Path(inspect.getfile(i18n)).parent
-GALLERY: Final = PROJECT / "app/tools/gallery"
+GALLERY: Final = PROJECT / "tests/gallery/page.py"
 
 
 @cache
 def modules() -> dict[Path, ast.Module]:
-    """Every module of `app/` but the catalogue of sentences and the examples of the gallery."""
-    paths = sorted((PROJECT / "app").rglob("*.py"))
+    """Every module of `app/` but the catalogue of sentences, and the page of the gallery."""
+    paths = [*sorted((PROJECT / "app").rglob("*.py")), GALLERY]
     return {
         path: ast.parse(path.read_text(encoding="utf-8"))
         for path in paths
-        if CATALOGUE not in path.parents and (GALLERY not in path.parents or path.name == "page.py")
+        if CATALOGUE not in path.parents
     }
 
 

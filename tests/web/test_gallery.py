@@ -11,7 +11,7 @@ from app.panel.widgets.displays import Indicator
 from app.panel.widgets.key_parts import KeyRole
 from app.panel.widgets.kinds import KINDS
 from app.system.texts import render, say, time_of_day
-from app.tools.gallery import PARTS
+from tests.gallery import PARTS
 from tests.support.parts import ROOT, Server
 
 EXAMPLES = [example for part in PARTS for example in part.examples]

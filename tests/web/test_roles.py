@@ -213,7 +213,7 @@ def test_acts_need_their_role(browsers: dict[str, httpx.Client]) -> None:
 def routes() -> Iterator[APIRoute | APIWebSocketRoute]:
     """The routes of all modules."""
     modules = pkgutil.iter_modules(app.web.routes.__path__)
-    for name in (*(f"app.web.routes.{module.name}" for module in modules), "app.tools.gallery.page"):
+    for name in (*(f"app.web.routes.{module.name}" for module in modules), "tests.gallery.page"):
         router = getattr(importlib.import_module(name), "router", None)
         for route in router.routes if router else ():
             assert isinstance(route, APIRoute | APIWebSocketRoute)

@@ -69,9 +69,7 @@ def test_every_sentence_gets_all_its_parameters() -> None:
 
 
 def test_every_sentence_is_said_somewhere() -> None:
-    examples = PACKAGE / "tools/gallery"
-    sources = [path for path in PACKAGE.rglob("*.py") if examples not in path.parents]
-    sources.append(examples / "page.py")
+    sources = [*PACKAGE.rglob("*.py"), PACKAGE.parent / "tests/gallery/page.py"]
     shown = (path for name in ("templates", "static") for path in shipped_path(name).rglob("*.*"))
     sources += [path for path in shown if path.parent.name not in ("fonts", "__pycache__")]
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))

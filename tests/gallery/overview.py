@@ -8,7 +8,7 @@ from app.cell.view.overview import RobotTile, TileFigure, sums
 from app.cell.view.times import span_text
 from app.panel.keys import SUMS, RobotEntry
 from app.system.texts import number, say
-from app.tools.gallery import texts
+from tests.gallery import texts
 
 UNIT: Final = "boxes/h"
 ALARM_AFTER_S: Final = 41.0

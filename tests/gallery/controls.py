@@ -5,8 +5,8 @@ from typing import Any, Final
 from app.cell.alarms.shown import PRIORITY_WORDS
 from app.records.entry import OutcomeCode
 from app.system.texts import TextLike, number, say, time_of_day
-from app.tools.gallery import texts
-from app.tools.gallery.examples import (
+from tests.gallery import texts
+from tests.gallery.examples import (
     ACTION,
     AT,
     BEFORE,

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from app.tools.gallery.controls import (
+from tests.gallery.controls import (
     ACTIONS,
     ALARMS,
     INPUTS,
@@ -14,7 +14,7 @@ from app.tools.gallery.controls import (
     STEPS,
     SWITCHES,
 )
-from app.tools.gallery.displays import (
+from tests.gallery.displays import (
     CAMERAS,
     CHECKS,
     FIGURES,
@@ -28,7 +28,7 @@ from app.tools.gallery.displays import (
     TABLES,
     TRENDS,
 )
-from app.tools.gallery.examples import Part
+from tests.gallery.examples import Part
 
 PARTS: Final = (
     Part("Keys by role", 6, ROLES),

@@ -8,7 +8,7 @@ from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 from app.records.entry import OutcomeCode
 from app.system.texts import TextLike, joined, say, time_of_day
-from app.tools.gallery import texts
+from tests.gallery import texts
 
 Table = dict[str, Any]
 Texts = dict[str, str]

@@ -14,9 +14,9 @@ from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.trend import Trend
 from app.system.texts import Text, TextLike, number, say
 from app.system.texts.text import filled_in
-from app.tools.gallery import texts
-from app.tools.gallery.examples import AT, NOT_LIVE, OLD, TOPIC, Example, Table
 from app.web.pages.log_lines import LEVEL_WORDS
+from tests.gallery import texts
+from tests.gallery.examples import AT, NOT_LIVE, OLD, TOPIC, Example, Table
 
 # Readouts, lamps, cameras and logs in each of their states.
 

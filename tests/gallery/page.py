@@ -11,15 +11,15 @@ from markupsafe import Markup
 
 from app.cell.view.link_status import PRESENCE_WORDS
 from app.system.texts import number, say
-from app.tools.gallery import PARTS, PICTURE
-from app.tools.gallery.displays import LINES, sample_plot
-from app.tools.gallery.examples import Example
-from app.tools.gallery.overview import overview
 from app.web.app_state import CurrentState
 from app.web.language import language_of
 from app.web.pages.alarms import WORDS as SHEET_WORDS
 from app.web.pages.display_choice import CHOICES, Choice, DisplaySettings, choices, display_of
 from app.web.pages.words import ALARM_WORDS, TREND_WORDS, UNREADABLE, WORDS
+from tests.gallery import PARTS, PICTURE
+from tests.gallery.displays import LINES, sample_plot
+from tests.gallery.examples import Example
+from tests.gallery.overview import overview
 
 router = APIRouter(include_in_schema=False)
 
