@@ -41,8 +41,8 @@ from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import load_assets, require_files
+from app.web.caller import LanguageHeaders
 from app.web.error_pages import HANDLERS, on_error_in_development
-from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
 from app.web.pages.page_templates import PageTemplates
 from app.web.path_methods import method_guard

@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, BaseModel, Field, JsonValue
 from app.cell.commands.acts import ActReceipt
 from app.cell.commands.judge import RETRY_AFTER_S
 from app.system.texts import localized
-from app.web.language import language_of
+from app.web.caller import caller_of
 
 # The receipt of a press as JSON, and the HTTP status by the cause of its refusal.
 
@@ -57,6 +57,7 @@ class ActAnswer(BaseModel):
 
 def act_answer(request: Request, receipt: ActReceipt, **more: Any) -> Response:
     """The receipt in the language of the request, with `more` beside it."""
-    content = localized({**receipt.as_json(), "done": receipt.done, **more}, language_of(request))
+    said = {**receipt.as_json(), "done": receipt.done, **more}
+    content = localized(said, caller_of(request).language)
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)

@@ -15,7 +15,7 @@ from app.system.errors import KioskError, RoleNeeded, TooMany, TooSlow
 from app.system.printable import printable
 from app.system.texts import TextLike, render, say
 from app.web.app_state import site_of
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.path_methods import methods_of
 from app.web.security import SECURITY_HEADERS
@@ -28,8 +28,8 @@ TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 def error_answer(request: Request, status: int, message: TextLike, sign_in: bool = False) -> Response:
     """An error for whom it is: a page for who reads pages, in the frame with Stop, JSON for programs.
     `sign_in`: the page leads to the sign-in."""
-    site, language = site_of(request), language_of(request)
-    if "text/html" not in request.headers.get("accept", ""):
+    site, language = site_of(request), caller_of(request).language
+    if not caller_of(request).accepts_html:
         return JSONResponse({"error": render(message, language)}, status_code=status)
     context = {"message": message, "status": status}
     context["sign_in"] = say("signin_sign_in") if sign_in else ""

@@ -9,14 +9,7 @@ from functools import lru_cache
 from typing import Final
 
 from babel.core import negotiate_locale
-from starlette.datastructures import MutableHeaders
-from starlette.requests import HTTPConnection
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.web.app_state import site_of
-
-SCOPE: Final = "panel.language"  # of the answer, in its scope
-STARTS: Final = frozenset({"http.response.start"})
 COOKIE: Final = "kiosk_language"
 MOST_ACCEPTED: Final = 500  # characters of the header
 _accepted: Final = re.compile(
@@ -24,41 +17,11 @@ _accepted: Final = re.compile(
 )
 
 
-def language_of(connection: HTTPConnection) -> str:
-    """The language of the response to a request, one of the panel's."""
-    panel = site_of(connection).fleet.panel
-    available = panel.readers_languages
-    language = panel.language
-    if len(available) > 1:
-        accepted = connection.headers.get("accept-language", "")[:MOST_ACCEPTED]
-        language = negotiated(connection.cookies.get(COOKIE, ""), accepted, available) or language
-    connection.scope[SCOPE] = language
-    return language
-
-
-class LanguageHeaders:
-    """Sets Content-Language and Vary on each response whose language was negotiated (RFC 9110, 8.5 and
-    12.5.5)."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def said(message: Message) -> None:
-            if message["type"] in STARTS and SCOPE in scope:
-                headers = MutableHeaders(scope=message)
-                headers["content-language"] = scope[SCOPE]
-                headers.add_vary_header("Accept-Language, Cookie")
-            await send(message)
-
-        await self._app(scope, receive, said if scope["type"] == "http" else send)
-
-
 @lru_cache(maxsize=256)
 def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
     """The available language that fits best; "" if none does."""
     by_name = {tag.lower(): tag for tag in available}
-    preferred = [*([chosen] if chosen else []), *_preferred(accepted)]
+    preferred = [*([chosen] if chosen else []), *_preferred(accepted[:MOST_ACCEPTED])]
     language = negotiate_locale(preferred, available, sep="-")
     return by_name.get((language or "").lower(), "")
 

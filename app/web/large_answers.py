@@ -11,7 +11,7 @@ from fastapi import Request
 from fastapi.responses import Response
 
 from app.system.texts import localized
-from app.web.language import language_of
+from app.web.caller import caller_of
 
 JSON: Final = "application/json"
 PACKED_BYTES: Final = 4_000  # a shorter answer is not packed here
@@ -25,7 +25,7 @@ _turn: Final = asyncio.Semaphore(1)
 async def rows_answer(request: Request, content: Callable[[], dict[str, Any]], count: int) -> Response:
     """The JSON of a content with so many rows, with its texts in the reader's language. `content` may
     be called on a thread: its rows must not change."""
-    language = language_of(request)
+    language = caller_of(request).language
     if count <= SMALL:
         return await packed_answer(request, _encoded(content, language))
     async with _turn:
@@ -35,7 +35,7 @@ async def rows_answer(request: Request, content: Callable[[], dict[str, Any]], c
 async def packed_answer(request: Request, body: bytes) -> Response:
     """The JSON, packed if it is long and the client takes that."""
     headers = {"cache-control": "no-store", "vary": "accept-encoding"}
-    if "gzip" in request.headers.get("accept-encoding", "") and len(body) > PACKED_BYTES:
+    if caller_of(request).accepts_gzip and len(body) > PACKED_BYTES:
         body = await asyncio.to_thread(gzip.compress, body, LEVEL)
         headers["content-encoding"] = "gzip"
     return Response(body, media_type=JSON, headers=headers)

@@ -16,7 +16,7 @@ from app.records.principal import Principal
 from app.system.errors import RoleNeeded
 from app.system.texts import say
 from app.web.app_state import AppState, site_of
-from app.web.client import caller
+from app.web.caller import caller_of
 
 LOCAL_ONLY: Final = "local"  # an operator, or anybody on the server's own machine
 ROBOT: Final = "/robots/{robot}"  # stands before the paths of one of several robots
@@ -95,7 +95,7 @@ async def route_guard(connection: HTTPConnection) -> None:
     widget = connection.path_params.get("widget", "")
     if not need and not widget:
         return
-    who = caller(connection).principal(state)
+    who = caller_of(connection).principal
     if need == LOCAL_ONLY:
         need = ANYBODY if who.client.local else OPERATOR
     if not who.meets(need):

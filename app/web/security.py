@@ -11,17 +11,14 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import HTTPConnection
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.panel.rules import EmbedRules
 from app.system.printable import printable
 from app.system.texts import render, say
-from app.web.app_state import AppState
 from app.web.assets import PAGE_GUARD_HASH
-from app.web.client import bearer_of, from_frame, only_shows
-from app.web.language import language_of
+from app.web.caller import caller_in, only_shows
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
@@ -107,7 +104,7 @@ class RequestGuard:
             if (parts := _parts_of(origin)) != (scheme, host):
                 hint = PROXY if parts == ("https", host) else ""
                 return f'a page of "{origin}" asked for this{hint}'
-        if moves(scope) and only_shows(self._embed, from_frame(scope)):
+        if moves(scope) and only_shows(self._embed, caller_in(scope).from_frame):
             return "a page in a frame asked for this: open the panel itself"
         return None
 
@@ -175,14 +172,12 @@ class BearerGuard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] in ("http", "websocket"):
-            connection = HTTPConnection(scope)
-            bearer = bearer_of(connection.headers.get("authorization", ""))
-            state: AppState | None = getattr(scope["app"].state, "app_state", None)
-            if bearer and state is not None and state.access.configured:
-                known = state.access.knows(bearer)
-                if not known or not state.access.admit_token(bearer):
+            caller = caller_in(scope)
+            if caller.bearer and (access := caller.state.access).configured:
+                known = access.knows(caller.bearer)
+                if not known or not access.admit_token(caller.bearer):
                     sentence = say("token_too_often" if known else "token_unknown")
-                    content = {"error": render(sentence, language_of(connection))}
+                    content = {"error": render(sentence, caller.language)}
                     status, headers = (429, AGAIN) if known else (401, CHALLENGE)
                     await refuse(JSONResponse(content, status, headers), scope, receive, send)
                     return

@@ -13,15 +13,13 @@ from collections import OrderedDict, deque
 from enum import IntEnum
 from typing import Final, Generic, TypeVar
 
-from starlette.requests import HTTPConnection
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.cell.permission.client_places import KIOSK
 from app.system.limits import Quota, TokenBuckets
 from app.system.texts import render, say
-from app.web.client import client_of
-from app.web.language import language_of
+from app.web.caller import Caller, caller_in
 from app.web.security import moves, refuse
 
 # Whose request is next: those that may move something first, then what the kiosk's own machine reads,
@@ -120,11 +118,11 @@ class Turns:
             where = scope["client"][0] if scope.get("client") else "a local socket"
             log.warning("too many requests from %s: answered 429", where)
             await asyncio.sleep(REFUSED_AFTER_S)
-            await refuse(_too_many(HTTPConnection(scope)), scope, receive, send)
+            await refuse(_too_many(caller_in(scope)), scope, receive, send)
 
     async def _turn(self, scope: Scope) -> bool:
         """Waits for the turn of a request; False if its client has too many."""
-        client = client_of(HTTPConnection(scope))
+        client = caller_in(scope).key
         lane = lane_of(client, moves(scope))
         if not self._admit(client, lane):
             return False
@@ -183,10 +181,10 @@ class Turns:
             pass
 
 
-def _too_many(connection: HTTPConnection) -> Response:
+def _too_many(caller: Caller) -> Response:
     """A sentence: to render a page would take the time that is saved here."""
-    sentence = render(say("too_many_requests"), language_of(connection))
+    sentence = render(say("too_many_requests"), caller.language)
     headers = {"retry-after": str(RETRY_AFTER_S), "cache-control": "no-store"}
-    if "text/html" in connection.headers.get("accept", ""):
+    if caller.accepts_html:
         return PlainTextResponse(sentence, 429, headers | {"refresh": str(2 * RETRY_AFTER_S)})
     return JSONResponse({"error": sentence}, 429, headers)

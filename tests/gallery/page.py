@@ -12,9 +12,9 @@ from markupsafe import Markup
 from app.cell.view.link_status import PRESENCE_WORDS
 from app.system.texts import number, say
 from app.web.app_state import CurrentState
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.pages.alarms import WORDS as SHEET_WORDS
-from app.web.pages.display_choice import CHOICES, Choice, DisplaySettings, choices, display_of
+from app.web.pages.display_choice import CHOICES, Choice, DisplaySettings, choices
 from app.web.pages.words import ALARM_WORDS, TREND_WORDS, UNREADABLE, WORDS
 from tests.gallery import PARTS, PICTURE
 from tests.gallery.displays import LINES, sample_plot
@@ -32,8 +32,8 @@ async def gallery(request: Request, state: CurrentState) -> Response:
     chosen = {
         name: value for name, value in request.query_params.items() if value in CHOICES.get(name, ())
     }
-    display = display_of(request, state.fleet.panel)._replace(**chosen)
-    language = language_of(request)
+    display = caller_of(request).display._replace(**chosen)
+    language = caller_of(request).language
     cell = state.templates.environment(language).get_template("_cell.html")
     numbers, words, robots = count(), _words(), overview()
     words |= {

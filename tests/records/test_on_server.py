@@ -20,7 +20,7 @@ from playwright.sync_api import Browser, Page, expect
 from app.records.database import NAME
 from app.records.principal import new_token, public_id
 from app.records.verify import verify
-from app.web.client import COOKIE
+from app.web.caller import COOKIE
 from tests.support.browser.pages import follow
 from tests.support.holds import PANEL as HOLDING
 from tests.support.parts import REFERENCE, ROOT, Process, Server, free_port, sends, until

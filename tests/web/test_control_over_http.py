@@ -15,7 +15,7 @@ from typing import Final
 import httpx
 import pytest
 
-from app.web.client import COOKIE
+from app.web.caller import COOKIE
 from tests.cell.session.test_several_robots import entry, panel_file
 from tests.support.parts import REFERENCE, ROOT, Server, http_client, until
 from tests.support.servers import ready

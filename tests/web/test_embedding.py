@@ -4,10 +4,9 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 from pydantic import ValidationError
-from starlette.requests import HTTPConnection
 
 from app.panel.rules import EmbedRules
-from app.web.client import frame_ancestors, from_frame, is_embedded, only_shows
+from app.web.caller import Caller, frame_ancestors, only_shows
 from tests.support.holds import PANEL
 from tests.support.parts import Server
 from tests.support.servers import demo_server
@@ -16,9 +15,9 @@ ORIGIN = "https://dashboard.example"
 FRAMED = "http://127.0.0.1/pages/one?embed=1"
 
 
-def connection(query: str, headers: Mapping[str, str]) -> HTTPConnection:
+def caller(query: str, headers: Mapping[str, str]) -> Caller:
     raw = [(name.encode(), value.encode()) for name, value in headers.items()]
-    return HTTPConnection(
+    return Caller(
         {
             "type": "http",
             "path": "/pages/one",
@@ -50,8 +49,8 @@ def connection(query: str, headers: Mapping[str, str]) -> HTTPConnection:
 def test_a_request_of_a_frame_is_known(
     query: str, headers: dict[str, str], page: bool, request_: bool
 ) -> None:
-    asked = connection(query, headers)
-    assert (is_embedded(asked), from_frame(asked.scope)) == (page, request_)
+    asked = caller(query, headers)
+    assert (asked.embedded, asked.from_frame) == (page, request_)
 
 
 def test_controls_are_never_embedded_unless_said() -> None:

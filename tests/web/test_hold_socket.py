@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.records.database import NAME
-from app.web.client import COOKIE
+from app.web.caller import COOKIE
 from tests.support.holds import PANEL, PATIENT, TRIES, jogging, permit
 from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, events_in, http_client, until
 from tests.support.servers import demo_server

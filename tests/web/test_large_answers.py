@@ -13,7 +13,7 @@ from fastapi import Request
 
 from app.system.concurrency import BuiltOnce
 from app.system.texts import say
-from app.web import large_answers
+from app.web.caller import caller_of
 from app.web.large_answers import PACKED_BYTES, SMALL, rows_answer
 from tests.support.servers import demo_server
 from tests.web.test_alarms import HEALTHY, PANEL
@@ -62,10 +62,7 @@ def test_a_building_that_failed_is_tried_again() -> None:
 
 @pytest.mark.parametrize("count", [1, SMALL, SMALL + 1, 2_000])
 @pytest.mark.parametrize("packed", [True, False])
-def test_many_rows_are_made_on_a_thread(
-    count: int, packed: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(large_answers, "language_of", lambda _: "en")
+def test_many_rows_are_made_on_a_thread(count: int, packed: bool) -> None:
     made_on: list[int] = []
 
     def content() -> dict[str, Any]:
@@ -75,6 +72,7 @@ def test_many_rows_are_made_on_a_thread(
     async def work() -> tuple[bytes, str | None]:
         encoding = b"gzip" if packed else b"identity"
         request = Request({"type": "http", "headers": [(b"accept-encoding", encoding)]})
+        caller_of(request).language = "en"
         answer = await rows_answer(request, content, count)
         return bytes(answer.body), answer.headers.get("content-encoding")
 

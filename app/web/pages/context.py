@@ -35,15 +35,13 @@ from app.system.texts import Text, TextLike, localized, say
 from app.web.alarm_runs import command_text
 from app.web.app_state import AppState
 from app.web.assets import PICTURES
-from app.web.client import QUERY as EMBED
-from app.web.client import only_shows, opened_by_person, principal_with_new_token, set_client_cookie
-from app.web.language import language_of
+from app.web.caller import QUERY as EMBED
+from app.web.caller import caller_of, only_shows
 from app.web.pages.alarms import sheet_words
 from app.web.pages.display_choice import (
     Choice,
     DisplaySettings,
     choices,
-    display_of,
     language_choice,
 )
 from app.web.pages.sign_in import SignedIn, signed_in
@@ -187,7 +185,7 @@ def page_context(
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     again |= {EMBED: 1} if embedded else {}
     now, wall = clock.server_now(), time.time()
-    panel, language = state.fleet.panel, language_of(request)
+    panel, language = state.fleet.panel, caller_of(request).language
     lacks = unmet(panel.needs.named, who)
     no_role = OPERATOR in lacks
     if only_shows(session.panel.embed, embedded):
@@ -199,7 +197,7 @@ def page_context(
         )
     with publisher.watching(publisher.shown_page(page.id)):
         view = locked_without_scripts(publisher.for_audience(of_client), panel, page)
-    display = display_of(request, panel)
+    display = caller_of(request).display
     embed = f"?{EMBED}=1" if embedded else ""
     is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
     is_recipes = recipes_page is not None
@@ -341,9 +339,10 @@ def framed_page(
 ) -> Response:
     """The page with the variables `context`, in the language of the request."""
     session = state.fleet.of_robot(page.robot)
-    who, token = principal_with_new_token(request, state, embedded=False)
+    caller = caller_of(request)
+    who, token = caller.identified()
     if session.control.rules.required:
-        session.control.loaded(who, REFRESH_S, opened_by_person(request))
+        session.control.loaded(who, REFRESH_S, caller.opened_by_person)
         session.show()
     own, page_id = tuple(page.entries), FRAME_ONLY if page.robot else FRAME_OF_ALL
     frame = page_context(
@@ -359,6 +358,6 @@ def framed_page(
         recipes_page=page.recipes_page,
         own_path=page.own_path,
     )
-    html = state.templates.render(page.template, language_of(request), **frame, **context)
+    html = state.templates.render(page.template, caller.language, **frame, **context)
     headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})
-    return set_client_cookie(HTMLResponse(html, page.status, headers), request, token)
+    return caller.with_client_cookie(HTMLResponse(html, page.status, headers), token)

@@ -1,8 +1,7 @@
 """The look of a browser's pages: chosen in that browser, else the panel file's."""
 
+from collections.abc import Mapping
 from typing import Final, NamedTuple, TypedDict, get_args
-
-from starlette.requests import HTTPConnection
 
 from app.panel.layout import Hand, TextSize, Theme
 from app.panel.model import Panel
@@ -66,15 +65,15 @@ class Choice(TypedDict):
     options: list[Option]
 
 
-def display_of(connection: HTTPConnection, panel: Panel) -> DisplaySettings:
-    """The look of this browser's pages."""
+def display_of(cookies: Mapping[str, str], panel: Panel) -> DisplaySettings:
+    """The look of the pages of a browser with these cookies."""
     cookie, kept = FONTS
-    fonts = kept if connection.cookies.get(cookie) == kept else ""
-    return DisplaySettings(**{name: _chosen(connection, panel, name) for name in CHOICES}, fonts=fonts)
+    fonts = kept if cookies.get(cookie) == kept else ""
+    return DisplaySettings(**{name: _chosen(cookies, panel, name) for name in CHOICES}, fonts=fonts)
 
 
-def _chosen(connection: HTTPConnection, panel: Panel, name: str) -> str:
-    choice = connection.cookies.get(COOKIE.format(name), "")
+def _chosen(cookies: Mapping[str, str], panel: Panel, name: str) -> str:
+    choice = cookies.get(COOKIE.format(name), "")
     return choice if choice in CHOICES[name] else _usual(panel, name)
 
 

@@ -24,8 +24,8 @@ from app.system.clock import format_time, iso_time
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, joined, localized, number, say
 from app.web.app_state import AppState, CurrentState
+from app.web.caller import caller_of
 from app.web.downloads import exported
-from app.web.language import language_of
 from app.web.pages.alarm_figures import FiguresAnswer, FiguresContext, figures_context, figures_json
 from app.web.pages.alarms import word
 from app.web.pages.context import FramedPage, framed_page
@@ -311,7 +311,7 @@ async def figures(
     request: Request, state: CurrentState, form: Annotated[TimesQuery, Query()]
 ) -> Response:
     of_time = await read_figures_of(state, *form.times(now()))
-    content = localized(figures_json(of_time), language_of(request))
+    content = localized(figures_json(of_time), caller_of(request).language)
     return JSONResponse(content, headers={"cache-control": "no-store"})
 
 
@@ -325,5 +325,5 @@ async def as_csv(
     request: Request, state: CurrentState, form: Annotated[HistoryQuery, Query()]
 ) -> Response:
     history = state.fleet.alarms.history
-    wanted, language = form.filter(now()), language_of(request)
+    wanted, language = form.filter(now()), caller_of(request).language
     return await exported(request, lambda gzip: history.export(wanted, gzip, language), "alarms")

@@ -31,7 +31,7 @@ from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, date_and_time, number, say, time_of_day
 from app.web.answers import ActAnswer, act_answer
 from app.web.app_state import AppState, CurrentState
-from app.web.client import principal_with_new_token, set_client_cookie
+from app.web.caller import caller_of
 from app.web.pages.alarm_figures import (
     FiguresContext,
     clock_text,
@@ -420,7 +420,7 @@ async def report(
 async def leave_message(request: Request, state: CurrentState) -> Response:
     is_form, content = await act_body_of(request, MESSAGE_FORM, FORM_FIELDS_MOST)
     body = as_model(MessageBody, content)
-    who, token = principal_with_new_token(request, state)
+    who, token = caller_of(request).identified()
     runner = state.fleet.first.shift_acts
     act_id = body.id or secrets.token_hex(8)
     at = body.at.timestamp() if body.at and not is_form else None
@@ -430,7 +430,7 @@ async def leave_message(request: Request, state: CurrentState) -> Response:
     else:
         with state.in_flight.track():
             receipt = await runner.act(act, act_id)
-    return set_client_cookie(_answer(request, state, receipt, is_form), request, token)
+    return caller_of(request).with_client_cookie(_answer(request, state, receipt, is_form), token)
 
 
 def _answer(request: Request, state: AppState, receipt: ActReceipt, is_form: bool) -> Response:

@@ -41,8 +41,7 @@ from app.web.alarm_answers import (
 from app.web.alarm_runs import AlarmRun, AlarmRuns
 from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentState
-from app.web.client import caller, principal_with_new_token, set_client_cookie
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.large_answers import rows_answer
 from app.web.pages.alarms import alarms_context, chosen_rows, segment_counts, word
 from app.web.pages.confirm import Subject, confirm_sheet
@@ -113,7 +112,7 @@ async def confirm_page(
     subject = _subject(standing, act) if standing else None
     if subject is None:
         raise NotFound(f'there is no act "{act:.40}" on an alarm "{alarm:.64}" that a person confirms')
-    who = caller(request).principal(state)
+    who = caller_of(request).principal
     fields = {name: str(value) for name in CARRIED if (value := getattr(query, name))}
     address = f"{state.root}/alarms/{quote(alarm, safe='')}"
     page = query.page.removeprefix(state.root)
@@ -134,9 +133,9 @@ async def confirmed_act(
 ) -> tuple[ConfirmedBy | None, Response | None]:
     """Who has confirmed the act of a form, whose fields for it are removed; else the redirect to the
     page that asks. (None, None) for an act that needs none, or that is refused without a PIN."""
-    alarm, client = state.fleet.alarms.engine.alarms.get(alarm_id), caller(request)
+    alarm, client = state.fleet.alarms.engine.alarms.get(alarm_id), caller_of(request)
     subject = _subject(alarm, act) if alarm else None
-    who = client.principal(state)
+    who = client.principal
     entered = entered_fields(content) if any(name in content for name in FIELDS) else None
     if subject is None or not who.user or role_verdict(subject.needs, who):
         return None, None
@@ -255,7 +254,7 @@ async def alarms(
     request: Request, state: CurrentState, query: Annotated[AlarmQuery, Query()]
 ) -> Response:
     content: dict[str, Any]
-    if not query.history and "text/html" in request.headers.get("accept", ""):
+    if not query.history and caller_of(request).accepts_html:
         return _page(request, state, query)
     if query.history:
         read = partial(read_history, wanted=query.filter(), limit=query.limit)
@@ -263,7 +262,7 @@ async def alarms(
         older = rows[-1].seq if len(rows) == query.limit else None
         content = {"history": [transition(row) for row in rows], "older": older}
         return await rows_answer(request, lambda: content, len(rows))
-    content = _listed_alarms(state, query, language_of(request))
+    content = _listed_alarms(state, query, caller_of(request).language)
     return await rows_answer(request, partial(_with_finite, content), len(content["alarms"]))
 
 
@@ -293,7 +292,7 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     page = FramedPage(
         "alarms.html", word("title"), alarms_page=f"alarms?{choice.address()}", vary="accept"
     )
-    context = alarms_context(state, choice, language_of(request), with_sheet=query.sheet)
+    context = alarms_context(state, choice, caller_of(request).language, with_sheet=query.sheet)
     return framed_page(request, state, page, {**context, "word": word})
 
 
@@ -353,7 +352,7 @@ async def _answer(
 ) -> Response:
     """Runs an act on alarms and answers with the receipts."""
     # Without a cookie the client is anonymous; its next request has this one.
-    who, token = principal_with_new_token(request, state)
+    who, token = caller_of(request).identified()
     refusal = TOO_SOON if form is not None and is_second_tap(form) else None
     if not state.limits.admit(who):
         refusal = TOO_OFTEN
@@ -365,7 +364,7 @@ async def _answer(
         response: Response = _back(request, state, form, [answer.receipt for answer in answers])
     else:
         response = _json(request, pairs, several)
-    return set_client_cookie(response, request, token)
+    return caller_of(request).with_client_cookie(response, token)
 
 
 def _json(request: Request, pairs: list[tuple[str, AlarmRun]], several: bool) -> Response:
@@ -374,7 +373,7 @@ def _json(request: Request, pairs: list[tuple[str, AlarmRun]], several: bool) ->
     headers = {"retry-after": str(RETRY_AFTER_S)} if cause == "limit" else None
     content = {"receipts": receipts} if several else receipts[0]
     return JSONResponse(
-        localized(content, language_of(request)), status_code=STATUS[cause], headers=headers
+        localized(content, caller_of(request).language), status_code=STATUS[cause], headers=headers
     )
 
 

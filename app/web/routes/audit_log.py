@@ -20,8 +20,8 @@ from app.system.errors import NotFound
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, number, say
 from app.web.app_state import CurrentState
+from app.web.caller import caller_of
 from app.web.downloads import exported
-from app.web.language import language_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import (
     ACTION_WORDS,
@@ -139,7 +139,7 @@ class LogContext(TypedDict):
 )
 async def page(request: Request, state: CurrentState, form: Annotated[LogQuery, Query()]) -> Response:
     rows: list[LogRow] = []
-    language = language_of(request)
+    language = caller_of(request).language
     if isinstance(state.log, OperatorLog):
         rows = await state.log.rows(form.filter(), form.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
@@ -184,7 +184,7 @@ async def as_csv(request: Request, state: CurrentState, form: Annotated[LogQuery
     if not isinstance(log := state.log, OperatorLog):
         raise NotFound(say("log_off"))
     arguments = (form.filter(), form.before)
-    language = language_of(request)
+    language = caller_of(request).language
     return await exported(
         request, lambda gzip: log.export(*arguments, gzip, language), "operator's log"
     )

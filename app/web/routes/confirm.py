@@ -16,8 +16,7 @@ from app.panel.widgets.hold import HoldCommand
 from app.system.errors import InputError, TooMany
 from app.system.texts import localized, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client import Caller, caller, confirmed_command, question_of
-from app.web.language import language_of
+from app.web.caller import Caller, caller_of, confirmed_command, question_of
 from app.web.pages.confirm import Subject, confirm_sheet, press_subject
 from app.web.requests import PAGE, as_model, body_of, described_body, errors, json_of
 from app.web.routes.presses import INPUTS
@@ -74,9 +73,9 @@ async def sheet(
     value: Annotated[str, Query(max_length=200, description="of its button, such as a recipe")] = "",
 ) -> Response:
     command = confirmed_command(session, widget)
-    who = caller(request).principal(state)
+    who = caller_of(request).principal
     context = confirm_sheet(state, press_subject(state, session, command, value), who)
-    html = state.templates.render("_confirm.html", language_of(request), **context)
+    html = state.templates.render("_confirm.html", caller_of(request).language, **context)
     return HTMLResponse(html, headers=UNCACHED)
 
 
@@ -92,15 +91,14 @@ async def confirm(
 ) -> Response:
     command = confirmed_command(session, widget)
     body = as_model(ConfirmBody, json_of(await body_of(request)))
-    client = caller(request)
-    who = client.principal(state)
+    client = caller_of(request)
+    who = client.principal
     if not who.user:
         return refused_answer(request, SecretCheck(None, say(SIGN_IN), SIGN_IN))
     question = question_of(state, command, body.inputs)
     own = who.user if question.confirmation == "pin" else ""
     attempt = attempt_of(body.sign_in(own))
-    user_session = state.access.sessions.get(client.session, who.client.id)
-    checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
+    checked, token = await state.confirmer.confirm(who, client.session, question, attempt)
     if not token:
         return refused_answer(request, checked)
     hold = isinstance(command, HoldCommand)
@@ -109,7 +107,7 @@ async def confirm(
         "valid_s": VALID_S,
         "reason": say("confirm_hold_now", seconds=f"{VALID_S:.0f}") if hold else "",
     }
-    return JSONResponse(localized(content, language_of(request)), headers=UNCACHED)
+    return JSONResponse(localized(content, caller_of(request).language), headers=UNCACHED)
 
 
 def entered_fields(fields: dict[str, str]) -> dict[str, str]:
@@ -121,7 +119,7 @@ async def checked_entry(
     state: AppState, subject: Subject, act: str, client: Caller, entered: Mapping[str, str]
 ) -> tuple[ConfirmedBy | None, SecretCheck]:
     """Who confirmed an act with what was entered; else what was wrong."""
-    who = client.principal(state)
+    who = client.principal
     ways = [way for way in WAYS if entered[way]]
     if not ways:
         return None, _missing("confirm_empty")
@@ -131,12 +129,11 @@ async def checked_entry(
         return None, _missing("confirm_who")
     question = Question(subject.id, act, subject.confirmation, subject.needs)
     attempt = Attempt(name, WAYS[way], entered[way])
-    user_session = state.access.sessions.get(client.session, who.client.id)
     try:
-        checked, token = await state.confirmer.confirm(who, user_session, question, attempt)
+        checked, token = await state.confirmer.confirm(who, client.session, question, attempt)
     except (InputError, TooMany) as error:
         return None, SecretCheck(None, error.text, "confirm_busy")
-    return state.confirmer.take(token, client.session, subject.id, act), checked
+    return state.confirmer.take(token, client.session_id, subject.id, act), checked
 
 
 def _missing(code: str) -> SecretCheck:

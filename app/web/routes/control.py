@@ -17,7 +17,7 @@ from app.records.principal import Principal
 from app.system.errors import NotFound
 from app.web.answers import ActAnswer, act_answer
 from app.web.app_state import CurrentSession, CurrentState
-from app.web.client import principal_of, principal_with_new_token, set_client_cookie
+from app.web.caller import caller_of
 from app.web.requests import FormFields, Moment, act_body_of, as_model, described_body, errors, refusals
 
 router = APIRouter()
@@ -69,7 +69,7 @@ class ControlAnswer(ActAnswer):
 async def keep_alive(request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
     _, content = await act_body_of(request)
-    who, touched = principal_of(request, state), as_model(KeepAlive, content).touched
+    who, touched = caller_of(request).principal, as_model(KeepAlive, content).touched
     for shown in (session, *state.fleet.sharing(session)):
         shown.control.keepalive(who, touched)
     return Response(status_code=204)
@@ -89,9 +89,9 @@ async def keep_alive(request: Request, state: CurrentState, session: CurrentSess
 )
 async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    who = principal_of(request, state)
+    who = caller_of(request).principal
     # Without a cookie the act is refused; with this one the next succeeds.
-    _, token = principal_with_new_token(request, state)
+    _, token = caller_of(request).identified()
     form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
     body = as_model(Acting, content)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
@@ -104,7 +104,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
         with state.in_flight.track():
             receipt = await session.control_acts.act(requested, act_id)
     answer = _page(session, body.page, receipt) if form else _json(request, session, who, receipt)
-    return set_client_cookie(answer, request, token)
+    return caller_of(request).with_client_cookie(answer, token)
 
 
 def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Response:

@@ -38,9 +38,8 @@ from app.system.errors import KioskError, NotFound
 from app.system.texts import TextLike, localized, say
 from app.web.answers import act_answer
 from app.web.app_state import AppState, CurrentState
-from app.web.client import client_of, principal_of, principal_with_new_token, set_client_cookie
+from app.web.caller import caller_of
 from app.web.downloads import SharedLinks, links_of
-from app.web.language import language_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.diagnostics import (
     TEXTS,
@@ -212,7 +211,7 @@ async def diagnostics(
         survey = await _survey(session)
         content = diagnostics_json(session, survey, state.doctor, versions())
         content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
-        answer = await asyncio.to_thread(localized, content, language_of(request))
+        answer = await asyncio.to_thread(localized, content, caller_of(request).language)
         return JSONResponse(answer, headers=HEADERS)
     return await _page(request, state, session, query)
 
@@ -225,7 +224,7 @@ async def diagnostics(
 )
 async def look(request: Request, state: CurrentState, query: Annotated[LookQuery, Query()]) -> Response:
     """Goes on for six seconds after each request."""
-    session, language = _session(state, query.robot), language_of(request)
+    session, language = _session(state, query.robot), caller_of(request).language
     looked = await _look(session, query.topic)
     if not _for_browser(request):
         return JSONResponse(localized(look_json(looked), language), headers=HEADERS)
@@ -255,7 +254,7 @@ async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Resp
     session = _session(state, "")
     is_form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
     body = as_model(DiagnosticActBody, {k: v for k, v in content.items() if k != "page" or not is_form})
-    who, token = principal_with_new_token(request, state)
+    who, token = caller_of(request).identified()
     act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
     at = body.at.timestamp() if body.at and not is_form else None
     requested = ActRequest(act, who, at=at, scripted=not is_form)
@@ -274,7 +273,7 @@ async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Resp
         if receipt.done and act == "foxglove" and recorder is not None:
             address = await _share(request, state, recorder, body.robot, act_id)
         answer = _back(state, content, receipt) if is_form else _receipt(request, receipt, address)
-    return set_client_cookie(answer, request, token)
+    return caller_of(request).with_client_cookie(answer, token)
 
 
 def _session(state: AppState, robot: str) -> RobotSession:
@@ -285,14 +284,14 @@ def _session(state: AppState, robot: str) -> RobotSession:
 
 
 def _for_browser(request: Request) -> bool:
-    return "text/html" in request.headers.get("accept", "")
+    return caller_of(request).accepts_html
 
 
 async def _page(
     request: Request, state: AppState, session: RobotSession, query: DiagnosticsQuery
 ) -> Response:
     """The whole page, or its content alone."""
-    language = language_of(request)
+    language = caller_of(request).language
     looked, refused = await _preview(session, "" if query.paused else query.look)
     survey = await _survey(session)
     trips = _page_trips(request, state, query.rtt)
@@ -326,8 +325,8 @@ async def _survey(session: RobotSession) -> Survey:
 
 def _page_trips(request: Request, state: AppState, rtt_ms: float | None) -> RoundTripSummary | None:
     """The round trips of this browser, with the one that it sends."""
-    client, now = principal_of(request, state).client, time.monotonic()
-    browser = client.id or client_of(request)
+    caller, now = caller_of(request), time.monotonic()
+    browser = caller.principal.client.id or caller.key
     if rtt_ms is not None:
         state.page_trips.record(browser, rtt_ms / 1000, now)
     return state.page_trips.summary(browser, now)

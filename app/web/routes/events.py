@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -16,15 +15,7 @@ from app.cell.view.view import EVERYONE, NOTHING, Audience, audience, audience_o
 from app.panel.rules import ControlRules
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.asgi import server_send
-from app.web.client import (
-    Caller,
-    caller,
-    from_frame,
-    only_shows,
-    principal_with_new_token,
-    set_client_cookie,
-)
-from app.web.language import language_of
+from app.web.caller import Caller, caller_of, only_shows
 from app.web.metrics import Open
 from app.web.requests import TEXT, errors
 
@@ -54,13 +45,13 @@ async def events(
     frame; without one, or with one that the panel does not have, of all. `embed`: for a page in a
     frame."""
     publisher, rules = session.publisher, session.control.rules
-    embedded, language = embed or from_frame(request.scope), language_of(request)
-    first, token, asks = b"", "", caller(request)
+    first, token, asks = b"", "", caller_of(request)
+    embedded, language = embed or asks.from_frame, asks.language
     only = only_shows(state.fleet.panel.embed, embedded)
     if rules.required and not only:
-        who, token = principal_with_new_token(request, state, embedded)
+        who, token = asks.identified(embedded)
         first = client_id_event(who.client.id)
-        asks = replace(asks, token=token or asks.token)
+        asks.token = token or asks.token
     current = partial(_audience_now, state, publisher, asks, rules, language, only)
     shown = publisher.shown_page(page)
     answer: Response
@@ -69,9 +60,9 @@ async def events(
             everything = publisher.snapshot(current(), shown) + first + beat(language)
         answer = Response(everything, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        renewed = partial(asks.signed_in_since, state)
+        renewed = partial(getattr, asks, "signed_in_since")
         answer = EventStream(publisher, first, state.metrics.streams, shown, current, renewed)
-    return set_client_cookie(answer, request, token)
+    return asks.with_client_cookie(answer, token)
 
 
 def _audience_now(
@@ -87,7 +78,7 @@ def _audience_now(
     has_roles = state.access.has_roles
     if not has_roles and (embedded or not rules.required):
         return audience("embedded" if embedded else "", language)
-    who, needs = asks.principal(state), publisher.needs.named if has_roles else NOTHING
+    who, needs = asks.principal, publisher.needs.named if has_roles else NOTHING
     if embedded:
         return audience("embedded", language, lacks=unmet(needs, who))
     control, others = publisher.view["control"], publisher.shared.controls

@@ -28,8 +28,7 @@ from app.system.concurrency import spawn_logged
 from app.system.errors import NotFound, TooMany
 from app.system.texts import render, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client import caller, client_of
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.requests import Described, errors, received
 
 log = logging.getLogger("kiosk.web")
@@ -64,7 +63,7 @@ async def frame(
 ) -> Response:
     camera = session.panel.widget(widget, Camera)
     feed = session.frames.feed(camera)
-    with feed.subscribed(client_of(request)):
+    with feed.subscribed(caller_of(request).key):
         try:
             async with asyncio.timeout(AFTER_WITHIN_S if after else FIRST_WITHIN_S):
                 shown, picture = await _next(feed, camera, after)
@@ -108,21 +107,21 @@ class _FrameSocket:
     def __init__(self, socket: WebSocket, feed: Feed, camera: Camera, state: AppState) -> None:
         self._socket = socket
         self._state = state
-        self._who = caller(socket)
-        self._then = self._who.principal(state)
+        self._who = caller_of(socket)
+        self._then = self._who.principal
         self._ended = False
         self._feed = feed
         self._camera = camera
         self._requested = asyncio.Event()
         self._waits = False  # for the picture that it asked for
-        self._language = language_of(socket)
+        self._language = self._who.language
 
     def check_user(self) -> None:
         """Closes the socket of a user who has signed out, is disabled, or may do something else now; a
         page that may see the camera opens another one."""
-        now, then = self._who.principal(self._state), self._then
+        now, then = self._who.principal, self._then
         same = (now.user, now.role, now.groups) == (then.user, then.role, then.groups)
-        if self._ended or (same and not self._who.signed_in_since(self._state)):
+        if self._ended or (same and not self._who.signed_in_since):
             return
         self._ended = True
         spawn_logged(self._close(), log, "closing a camera's socket failed")
@@ -133,7 +132,7 @@ class _FrameSocket:
 
     async def run(self) -> None:
         """Sends frames until the browser closes the WebSocket."""
-        with self._feed.subscribed(client_of(self._socket)):
+        with self._feed.subscribed(self._who.key):
             writing = spawn_logged(self._send_pictures(), log, "sending pictures failed")
             try:
                 while await self._read():

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from app.system.texts import render
 from app.web.app_state import CurrentState
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.metrics import Metrics
 from app.web.requests import errors
 
@@ -45,7 +45,7 @@ async def readyz(request: Request, state: CurrentState) -> Response:
     way = next((way for way in ways if not way.permitted), None)
     if way is None:
         return JSONResponse({"status": "ready"})
-    reason = render(way.reason or "", language_of(request))
+    reason = render(way.reason or "", caller_of(request).language)
     body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": reason}
     robots = {k.entry.id: w.code for k, w in zip(sessions, ways, strict=True) if k.entry}
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)

@@ -44,8 +44,7 @@ from app.records.press_record import PendingEntry
 from app.system.errors import Cause, InputError, LogError
 from app.system.texts import TextLike, localized, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client import LONGEST_TOKEN, Caller, caller, confirmed
-from app.web.language import language_of
+from app.web.caller import LONGEST_TOKEN, Caller, caller_of, confirmed
 from app.web.requests import json_of, received
 
 # What a browser may say of why it ends a hold → the code of the sentence.
@@ -135,11 +134,10 @@ CLOSE: Final[Mapping[str, int]] = {
 async def hold(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
     command = session.holds.widget(widget)
     await socket.accept()
-    who = caller(socket)
-    user_session = state.access.sessions.get(who.session, who.client(state).id)
-    press = Press(secrets.token_hex(8), command, {}, who.principal(state))
+    who = caller_of(socket)
+    press = Press(secrets.token_hex(8), command, {}, who.principal)
     served = _HoldSocket(socket, state, session, press, who)
-    holding = state.access.sessions.holding(user_session)
+    holding = state.access.sessions.holding(who.session)
     with suppress(WebSocketDisconnect), state.in_flight.track(), holding:
         receipt = await served.run()
         if receipt.cause != "limit":
@@ -165,7 +163,7 @@ class _HoldSocket:
         self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._language = language_of(socket)
+        self._language = who.language
         self._press = press
         session.press_guard.receive(press)
         self._room = session.press_log.has_room(press.origin)
@@ -198,7 +196,7 @@ class _HoldSocket:
 
     def _check_user(self, holding: ActiveHold) -> None:
         """Ends the hold of a user who has signed out, is disabled, or may do something else now."""
-        now, then = self._who.principal(self._state), self._press.principal
+        now, then = self._who.principal, self._press.principal
         if (now.user, now.role, now.groups) != (then.user, then.role, then.groups):
             self._session.holds.end(holding, "hold_by_sign_out")
 

@@ -11,8 +11,7 @@ from app.system.errors import NotFound
 from app.system.texts import render, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.assets import PICTURES
-from app.web.client import is_embedded, only_shows, principal_of
-from app.web.language import language_of
+from app.web.caller import caller_of, only_shows
 from app.web.requests import PAGE, errors
 
 router = APIRouter()
@@ -33,7 +32,7 @@ async def lock(widget: str, request: Request, state: CurrentState, session: Curr
     headers = {"cache-control": "no-store"}
     if help_text is None:
         return Response(status_code=204, headers=headers)
-    language = language_of(request)
+    language = caller_of(request).language
     html = state.templates.render(
         "lock_help.html",
         language,
@@ -48,9 +47,9 @@ async def lock(widget: str, request: Request, state: CurrentState, session: Curr
 def _help(
     command: Command, request: Request, state: AppState, session: CurrentSession
 ) -> LockHelp | None:
-    embedded = is_embedded(request)
+    embedded = caller_of(request).embedded
     if only_shows(session.panel.embed, embedded):
         return without_page(command, say("page_embedded"))
-    who = principal_of(request, state)
+    who = caller_of(request).principal
     conditions = session.press_guard.conditions(who)
     return lock_help(session.panel, command, session.robot, time.monotonic(), conditions)

@@ -12,18 +12,7 @@ from app.panel.widgets.families import EntryWidget
 from app.system.errors import NotFound
 from app.system.texts import say
 from app.web.app_state import AppState, CurrentState
-from app.web.client import (
-    QUERY,
-    frame_ancestors,
-    is_embedded,
-    only_shows,
-    opened_by_person,
-    principal_of,
-    principal_with_new_token,
-    says_embedded,
-    set_client_cookie,
-)
-from app.web.language import language_of
+from app.web.caller import QUERY, caller_of, frame_ancestors, only_shows, says_embedded
 from app.web.pages.context import page_context
 from app.web.requests import PAGE, Described, errors
 from app.web.route_needs import check_page
@@ -74,7 +63,7 @@ OTHER_PAGES = (
 async def first_page(request: Request, state: CurrentState) -> Response:
     if away := _to_a_robot(request, state, "/"):
         return away
-    panel, who = state.fleet.panel, principal_of(request, state)
+    panel, who = state.fleet.panel, caller_of(request).principal
     seen = next((page for page in panel.pages if who.meets(page.needs or "")), panel.pages[0])
     return _render(request, state, page_for(panel, request.path_params.get("robot"), seen))
 
@@ -121,18 +110,19 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
         path = f"{state.fleet.session(page.robot).base}/pages/{page.id}"
         return RedirectResponse(f"{path}?{request.url.query}".rstrip("?"), status_code=303)
     rules = session.panel.embed
-    embedded = bool(rules.origins) and is_embedded(request)
+    caller = caller_of(request)
+    embedded = bool(rules.origins) and caller.embedded
     if embedded and not says_embedded(request.url.query):
         again = request.url.include_query_params(**{QUERY: 1})
         return RedirectResponse(f"{again.path}?{again.query}", status_code=303)
     typed = any(isinstance(widget, EntryWidget) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    who, token = principal_with_new_token(request, state, embedded)
+    who, token = caller.identified(embedded)
     check_page(page, who)
     if session.control.rules.required and not embedded:
-        session.control.loaded(who, refresh_s + GRACE_S, opened_by_person(request))
+        session.control.loaded(who, refresh_s + GRACE_S, caller.opened_by_person)
         session.show()
-    language = language_of(request)
+    language = caller.language
     context = page_context(request, state, session, page, who, refresh_s, embedded)
     widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
     context["inside"] = state.templates.inside(page, language, **widgets)
@@ -140,4 +130,4 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     forms = "'none'" if only_shows(rules, embedded) else "'self'"
     policy = content_security_policy(frame_ancestors(rules, embedded), forms)
     headers = {"cache-control": "no-store", POLICY: policy}
-    return set_client_cookie(HTMLResponse(html, headers=headers), request, token)
+    return caller.with_client_cookie(HTMLResponse(html, headers=headers), token)

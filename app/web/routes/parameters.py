@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from app.system.texts import render
 from app.web.app_state import CurrentSession, CurrentState, PageSession
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.requests import FORM, body_of, errors, kind_of
 from app.web.routes.presses import page_after
 
@@ -39,5 +39,5 @@ async def read(
     why = session.read_again(widget)
     if kind_of(request) == FORM:
         return RedirectResponse(page_after(state, page, widget, ""), status_code=303)
-    answer = ReadAnswer(asked=not why, reason=render(why, language_of(request)))
+    answer = ReadAnswer(asked=not why, reason=render(why, caller_of(request).language))
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

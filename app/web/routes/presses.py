@@ -33,9 +33,8 @@ from app.system.printable import printable_texts
 from app.system.texts import TextLike, localized, say
 from app.web.answers import STATUS, ReceiptAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession
-from app.web.client import LONGEST_TOKEN, caller, confirmed, principal_of
-from app.web.language import language_of
-from app.web.pages.display_choice import DisplaySettings, display_of
+from app.web.caller import LONGEST_TOKEN, caller_of, confirmed
+from app.web.pages.display_choice import DisplaySettings
 from app.web.pages.words import ask_of
 from app.web.requests import (
     FORM,
@@ -317,15 +316,16 @@ async def press(
 ) -> Response:
     command = session.presses.widget(widget)
     stopped = state.fleet.stopped(widget, robots) if robots else ()
-    who = principal_of(request, state)
+    caller = caller_of(request)
+    who = caller.principal
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
         posted = as_model(PressBody, json_of(body))
-        pressed = confirmed(state, caller(request), posted.press(command, who), posted.confirmation)
+        pressed = confirmed(state, caller, posted.press(command, who), posted.confirmation)
         return _answer(request, await receipt_of_press(state, session, pressed, stopped))
     if kind == FORM:
-        reader = Reader(language_of(request), display_of(request, state.fleet.panel))
+        reader = Reader(caller.language, caller.display)
         if isinstance(command, RecipeLoad):
             raise InputError(say("recipes_need_javascript"))
         form = PressForm(who, form_of(body), command, reader, stopped)
@@ -344,7 +344,7 @@ async def cancel(
     widget: str, request: Request, state: CurrentState, session: CurrentSession, page: PageSession
 ) -> Response:
     command = session.presses.widget(widget)
-    who = principal_of(request, state)
+    who = caller_of(request).principal
     body, kind = await body_of(request), kind_of(request)
     form = kind == FORM
     press_id = ""
@@ -379,7 +379,7 @@ async def receipt_of_press(
 
 
 def _answer(request: Request, receipt: Receipt) -> Response:
-    content = localized(receipt.as_json(), language_of(request))
+    content = localized(receipt.as_json(), caller_of(request).language)
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
 
@@ -430,8 +430,8 @@ class _PressSocket:
     def __init__(self, socket: WebSocket, state: AppState) -> None:
         self._socket = socket
         self._state = state
-        self._caller = caller(socket)
-        self._language = language_of(socket)
+        self._caller = caller_of(socket)
+        self._language = self._caller.language
         self._in_flight: set[asyncio.Task[None]] = set()
         self._refused = 0  # one after the other
 
@@ -470,7 +470,7 @@ class _PressSocket:
         try:
             shown = state.fleet.session(socket.path_params.get("robot"))
             session = state.fleet.session_for(shown, body.widget)
-            who = self._caller.principal(state)
+            who = self._caller.principal
             press = body.press(session.presses.widget(body.widget), who)
             press = confirmed(state, self._caller, press, body.confirmation)
             stopped = state.fleet.stopped(body.widget, body.robots) if body.robots else ()

@@ -35,8 +35,7 @@ from app.system.errors import InputError, NotFound
 from app.system.texts import Text, TextLike, localized, number, say
 from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentSession, CurrentState
-from app.web.client import caller, principal_with_new_token, set_client_cookie
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.pages.confirm import Subject, confirm_sheet, recipe_ask
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.recipe_comparison import comparison, seen_of
@@ -113,8 +112,8 @@ async def confirmed_edit(
 ) -> tuple[ConfirmedBy | None, Response | None]:
     """Who has confirmed an act; else the page that asks. (None, None) for one that needs none, or
     that is refused without a PIN."""
-    client, subject = caller(request), _subject(edit)
-    who = client.principal(state)
+    client, subject = caller_of(request), _subject(edit)
+    who = client.principal
     if subject is None or not who.user or role_verdict(subject.needs, who):
         return None, None
     entered = edit.entered
@@ -349,17 +348,16 @@ async def act(
     session = _session_of(state, session, set)
     form = await asyncio.to_thread(_form, content) if kind == FORM else None
     entered = entered_fields(form) if form is not None else {}
-    body = (
-        _form_body(book, act, form, language_of(request)) if form is not None else _body(kind, content)
-    )
-    who, token = principal_with_new_token(request, state)
+    caller = caller_of(request)
+    body = _form_body(book, act, form, caller.language) if form is not None else _body(kind, content)
+    who, token = caller.identified()
     act_id = f"{body.id}.{act}.{body.recipe}"[:400] if body.id else secrets.token_hex(8)
     at = body.at.timestamp() if body.at else None
     confirmed, asking = None, None
     read = await _read(book, act, body)
     if form is not None and read and body.seen != seen_of(book, body.csv, body.decimal):
         compared = _compared(request, state, session, Import(book, body, read["rows"]))
-        return set_client_cookie(compared, request, token)
+        return caller.with_client_cookie(compared, token)
     if form is not None:
         edit = Edit(book, act, body.recipe, body.inputs, form, entered)
         confirmed, asking = await confirmed_edit(request, state, session, edit)
@@ -381,7 +379,7 @@ async def act(
         answer: Response = _receipt(request, receipt)
     else:
         answer = _back(session, set, act, body, receipt, book)
-    return set_client_cookie(answer, request, token)
+    return caller.with_client_cookie(answer, token)
 
 
 def _book(state: AppState, set_id: str) -> RecipeBook:
@@ -462,7 +460,7 @@ async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str,
 
 
 def _receipt(request: Request, receipt: ActReceipt) -> Response:
-    content = localized({**receipt.as_json(), "done": receipt.done}, language_of(request))
+    content = localized({**receipt.as_json(), "done": receipt.done}, caller_of(request).language)
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
 

@@ -21,15 +21,7 @@ from app.records.principal import Client
 from app.system.errors import InputError, NotFound
 from app.system.texts import TextLike, render, say
 from app.web.app_state import AppState, CurrentState, site_of
-from app.web.client import (
-    OTHER_SITES,
-    Caller,
-    caller,
-    principal_of,
-    set_client_cookie,
-    set_session_cookie,
-)
-from app.web.language import language_of
+from app.web.caller import OTHER_SITES, Caller, caller_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.sign_in import sign_in_words, tile_page
 from app.web.requests import (
@@ -55,7 +47,7 @@ PAGE_ON: Final = Markup(
 
 def page_on(request: Request, url: str) -> HTMLResponse:
     """The page that leads to this address."""
-    language = language_of(request)
+    language = caller_of(request).language
     html = PAGE_ON.format(language=language, url=url, text=render(say("oidc_go_on"), language))
     return HTMLResponse(html, headers={"cache-control": "no-store", "referrer-policy": "no-referrer"})
 
@@ -145,7 +137,7 @@ SIGN_IN_FORM: Final = FormFields({"user": NAME, "pin": SECRET, "password": SECRE
 
 @router.get("/session", response_model=SessionAnswer, summary="Who is signed in", responses=errors(403))
 async def who_is_signed_in(request: Request, state: CurrentState) -> Response:
-    return _about(state, caller(request))
+    return _about(state, caller_of(request))
 
 
 @router.post(
@@ -170,27 +162,24 @@ async def signed_in(
     request: Request, state: AppState, attempt: Attempt, form: bool, other: bool
 ) -> Response:
     """The response to a sign-in; a new browser gets its cookies with it."""
-    who = caller(request)
+    who = caller_of(request)
     token = "" if who.token else secrets.token_hex(16)
-    asking = Caller(who.token or token, who.address)
-    checked, session = await state.access.sign_in(asking.client(state), attempt)
+    who.token = who.token or token
+    checked, session = await state.access.sign_in(who.client, attempt)
     if session is None:
         if form:
             query = sign_in_query(attempt.name, other, checked.code, attempt.way)
             return RedirectResponse(f"{state.root}/signin?{query}", status_code=303)
         return refused_answer(request, checked)
-    answer = (
-        RedirectResponse(f"{state.root}/", status_code=303)
-        if form
-        else _about(state, Caller(asking.token, asking.address, session.id))
-    )
-    return set_client_cookie(set_session_cookie(answer, request, session.id), request, token)
+    who.session_id, who.bearer = session.id, ""
+    answer = RedirectResponse(f"{state.root}/", status_code=303) if form else _about(state, who)
+    return who.with_client_cookie(who.with_session_cookie(answer, session.id), token)
 
 
 @router.delete("/session", status_code=204, summary="Sign out", responses=errors(403))
 async def sign_out(request: Request, state: CurrentState) -> Response:
     _end(request, state)
-    return set_session_cookie(Response(status_code=204), request, "")
+    return caller_of(request).with_session_cookie(Response(status_code=204), "")
 
 
 @router.post(
@@ -209,7 +198,7 @@ async def sign_out_by_form(request: Request, state: CurrentState) -> Response:
         back = f"{request.url.scheme}://{request.url.netloc}{page}"
         if url := await state.access.oidc.end_url(session.id_token, back):
             answer = page_on(request, url)
-    return set_session_cookie(answer, request, "")
+    return caller_of(request).with_session_cookie(answer, "")
 
 
 @router.post(
@@ -222,10 +211,9 @@ async def sign_out_by_form(request: Request, state: CurrentState) -> Response:
 async def still_here(request: Request, state: CurrentState) -> Response:
     """A touch puts the sign-out off."""
     _, content = await act_body_of(request)
-    touched, who = as_model(Touch, content).touched, caller(request)
-    session = state.access.sessions.get(who.session, who.client(state).id)
-    if session is not None and touched:
-        state.access.sessions.touch(session)
+    touched, who = as_model(Touch, content).touched, caller_of(request)
+    if who.session is not None and touched:
+        state.access.sessions.touch(who.session)
     return _about(state, who)
 
 
@@ -242,17 +230,15 @@ def attempt_of(body: SignIn) -> Attempt:
 
 def _end(request: Request, state: AppState) -> Session | None:
     """Signs out who is signed in at the browser; returns the session."""
-    who = caller(request)
-    session = state.access.sessions.get(who.session, who.client(state).id)
+    session = caller_of(request).session
     if session is not None:
         state.access.sign_out(session)
     return session
 
 
 def _about(state: AppState, who: Caller) -> JSONResponse:
-    principal, sessions = who.principal(state), state.access.sessions
-    session = sessions.get(who.session, who.client(state).id)
-    left_s = sessions.left_s(session) if session else None
+    principal, session = who.principal, who.session
+    left_s = state.access.sessions.left_s(session) if session else None
     content = {
         "user": principal.user,
         "role": principal.role,
@@ -278,7 +264,7 @@ def refused_answer(request: Request, checked: SecretCheck) -> JSONResponse:
     if left:
         reason = say("signin_tries_left", why=reason, count=str(left))
     content = {
-        "error": render(reason, language_of(request)),
+        "error": render(reason, caller_of(request).language),
         "code": checked.code,
         "tries_left": checked.tries_left,
     }
@@ -320,7 +306,7 @@ async def page(
     request: Request, state: CurrentState, query: Annotated[SignInQuery, Query()]
 ) -> Response:
     """Names of users are shown at the kiosk's own machine only: elsewhere they are typed."""
-    who, book = principal_of(request, state), state.access.book
+    who, book = caller_of(request).principal, state.access.book
     here = who.client.local
     users = [known for known in book.users if here and not known.disabled]
     typed = not here or query.other
@@ -392,12 +378,12 @@ Text = Annotated[str, Query(max_length=4000, pattern=VISIBLE)]
 )
 async def begin(request: Request, state: CurrentState) -> Response:
     """To the provider; back to the page of sign-in if it is away."""
-    sign_ins, who = _sign_ins(state), caller(request)
+    sign_ins, who = _sign_ins(state), caller_of(request)
     if not who.token or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return RedirectResponse(f"{state.root}/signin", 303)
     back = f"{request.url.scheme}://{request.url.netloc}{state.root}{BACK}"
     try:
-        url, begun = await sign_ins.begin(who.client(state), back)
+        url, begun = await sign_ins.begin(who.client, back)
     except OidcError as error:
         return RedirectResponse(_sign_in_page(state, error), 303)
     answer = RedirectResponse(url, 303, {"cache-control": "no-store"})
@@ -436,7 +422,7 @@ async def back(
         url = _sign_in_page(state, refused)
     answer = page_on(request, url)
     if session_id:
-        set_session_cookie(answer, request, session_id)
+        caller_of(request).with_session_cookie(answer, session_id)
     return _with_cookie(answer, request, "")
 
 

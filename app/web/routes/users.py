@@ -20,8 +20,7 @@ from app.panel.roles import ROLES
 from app.system.texts import Text, TextLike, localized, say
 from app.web.answers import STATUS
 from app.web.app_state import AppState, CurrentState
-from app.web.client import principal_of, principal_with_new_token, set_client_cookie
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.users_page import Mode, users_context, word
 from app.web.requests import (
@@ -146,7 +145,7 @@ class UsersAnswer(BaseModel):
 async def users(
     request: Request, state: CurrentState, query: Annotated[UsersQuery, Query()]
 ) -> Response:
-    if "text/html" not in request.headers.get("accept", ""):
+    if not caller_of(request).accepts_html:
         book, last = state.access.book, state.access.log.last
         content = {"users": users_json(book, last), "tokens": tokens_json(book, last)}
         return JSONResponse(content, headers=HEADERS)
@@ -169,7 +168,7 @@ async def users(
 async def act(act: UserAct, request: Request, state: CurrentState) -> Response:
     is_form, content = await act_body_of(request, ACT_FORM, FIELDS_MOST)
     body = as_model(UserActBody, _form_body(act, content) if is_form else content)
-    who, cookie = principal_with_new_token(request, state)
+    who, cookie = caller_of(request).identified()
     act_id = f"{body.id}.{act}.{body.name}"[:400] if body.id else secrets.token_hex(8)
     runner, is_first = state.user_acts, state.user_acts.receipt(act_id) is None
     at = body.at.timestamp() if body.at else None
@@ -193,7 +192,7 @@ async def act(act: UserAct, request: Request, state: CurrentState) -> Response:
         answer = _after_form(request, state, act, body, receipt, token)
     else:
         answer = _receipt(request, receipt, token)
-    return set_client_cookie(answer, request, cookie)
+    return caller_of(request).with_client_cookie(answer, cookie)
 
 
 def _form_body(act: str, form: Mapping[str, str]) -> dict[str, Any]:
@@ -213,7 +212,7 @@ def _form_body(act: str, form: Mapping[str, str]) -> dict[str, Any]:
 
 def _receipt(request: Request, receipt: ActReceipt, token: str) -> Response:
     said = {**receipt.as_json(), "done": receipt.done}
-    content = localized(said, language_of(request)) | {"token": token}
+    content = localized(said, caller_of(request).language) | {"token": token}
     headers = {"cache-control": "no-store"}
     if receipt.cause == "limit":
         headers["retry-after"] = str(RETRY_AFTER_S)
@@ -253,7 +252,7 @@ def _page(
     if receipt and receipt.done and receipt.act == TOKEN and not token:
         said = word("token_gone")
     refused = runner.request(query.act) if receipt and not receipt.done else None
-    rules, who = state.fleet.panel.access, principal_of(request, state)
+    rules, who = state.fleet.panel.access, caller_of(request).principal
     about = (rules.groups, who, query.name, query.tokens, query.mode, said, refused, token)
     context = {**users_context(state.access, *about), "word": word}
     answer = framed_page(

@@ -17,7 +17,7 @@ from app.panel.widgets.trend import Trend
 from app.system.errors import InputError
 from app.system.texts import render, say
 from app.web.app_state import CurrentSession
-from app.web.language import language_of
+from app.web.caller import caller_of
 from app.web.large_answers import packed_answer
 from app.web.pages.log_lines import line_values, wanted_lines
 from app.web.requests import errors
@@ -150,7 +150,7 @@ async def lines(
     after: Annotated[int, Query(ge=0)] = 0,
 ) -> Lines:
     view = session.panel.widget(widget, LogView)
-    language = language_of(request)
+    language = caller_of(request).language
     wanted = wanted_lines(session.panel, view, language, level, node, search)
     kept = session.robot.log_lines[session.robot.key(view.topic)]
     result = await kept.find(wanted, after, view.lines)
