@@ -3,30 +3,38 @@
 import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from app.panel.base import (
     Description,
-    FieldPath,
     File,
+    FiniteNumber,
     Id,
     MessageField,
     NodeName,
     Seconds,
-    TopicName,
-    TopicQos,
-    Type,
+    SecretFile,
+    SecretVariable,
+    distinct,
+    each_once,
     panel_text,
 )
 from app.panel.condition import Condition
-from app.panel.numbers import FORMAT, Factor
-from app.panel.widgets.displays import StateValue
+from app.panel.shared_keys import (
+    AgeKey,
+    FieldKey,
+    NeedsKey,
+    NumberKeys,
+    OptionalTopicKeys,
+    Priorities,
+    Priority,
+    RobotKey,
+)
+from app.panel.widgets.displays import PictureName, StateValue
 from app.panel.widgets.families import TopicSource
-from app.panel.widgets.numbers import Unit
-from app.panel.widgets.table import MAX_ENTRIES, READ_BY_DEFAULT, ListPath
+from app.panel.widgets.table import READ_BY_DEFAULT, EntriesRead, ListPath
 from app.ros.messages.validation import format_value
 from app.system.texts import PanelText
 
@@ -42,15 +50,6 @@ def _check_prefix(prefix: str) -> str:
     return prefix
 
 
-def _check_path(path: str) -> str:
-    if not PurePosixPath(path).is_absolute():
-        raise ValueError(f"{format_value(path)} is not the whole path of a file, from / on")
-    return path
-
-
-Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
-
-
 class MqttRules(Description):
     """The broker at `host`, and what the topics begin with. The password of `username` is in an
     environment variable of the server, or else in a file there, never in the panel file."""
@@ -61,8 +60,8 @@ class MqttRules(Description):
     tls: bool = False
     ca: File | None = None
     username: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    password_env: Variable | None = None
-    password_file: Annotated[str, AfterValidator(_check_path)] | None = None
+    password_env: SecretVariable | None = None
+    password_file: SecretFile | None = None
     client_id: Annotated[str, Field(min_length=1, max_length=23)] | None = None
 
     @model_validator(mode="after")
@@ -98,15 +97,8 @@ def _check_name(name: str) -> str:
     return name
 
 
-def _check_unique(names: tuple[str, ...]) -> tuple[str, ...]:
-    for i, name in enumerate(names):
-        if name in names[:i]:
-            raise ValueError(f"names {format_value(name)} twice")
-    return names
-
-
 Name = Annotated[str, AfterValidator(_check_name)]
-InhibitedNames = Annotated[tuple[Name, ...], Field(strict=False), AfterValidator(_check_unique)]
+InhibitedNames = Annotated[tuple[Name, ...], Field(strict=False), AfterValidator(each_once)]
 
 
 def inhibited_name(name: str) -> InhibitedName:
@@ -129,9 +121,7 @@ def inhibited_controls(
             yield own or named or robot, control
 
 
-Priority = Annotated[int, Field(ge=1, le=4)]
 Delay = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
-Limit = Annotated[float, Field(allow_inf_nan=False)]
 SourceKind = Literal["limits", "condition", "stale", "node", "lost", "diagnostics", "list"]
 
 LIMIT_KEYS: Final = ("low_low", "low", "high", "high_high")
@@ -193,7 +183,7 @@ class AlarmList(Description):
         default_factory=dict
     )
     catalogue: File | None = None
-    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = READ_BY_DEFAULT
+    entries_read: EntriesRead = READ_BY_DEFAULT
 
     @property
     def own_fields(self) -> tuple[str, ...]:
@@ -210,7 +200,7 @@ class SuppressingCondition(Condition):
     """`[alarm.while]`: suppresses an alarm by design while it is met."""
 
 
-class Alarm(Description):
+class Alarm(NumberKeys, AgeKey, FieldKey, OptionalTopicKeys, NeedsKey, RobotKey):
     """An alarm after ISA-18.2, or with `diagnostics` or `list` one for each status that a robot
     publishes. `critical_priority` is that of `low_low` and `high_high`, and of an ERROR. Limits are for
     `value * scale + offset`, and `format` writes it. `state` is the machine's state while it is active.
@@ -219,20 +209,18 @@ class Alarm(Description):
     a PIN."""
 
     id: Id
-    robot: Id | None = None
     priority: Priority = 3
     critical_priority: Priority | None = None
     text: AlarmText | None = None
     cause: AlarmText | None = None
     consequence: AlarmText | None = None
     action: AlarmText | None = None
-    picture: str | None = None
+    picture: PictureName | None = None
     group: AlarmText | None = None
     latched: bool = False
     ack: Literal["required", "none"] = "required"
     inhibits: InhibitedNames = ()
     state: StateValue | None = None
-    needs: Id | None = None
     confirm_act: Literal["pin", "two_persons"] | None = None
     ack_command: Id | None = None
     ack_input: Id | None = None
@@ -240,19 +228,10 @@ class Alarm(Description):
     off_delay_s: Delay = 0.0
     on_unknown: Literal["keep", "raise"] = "keep"
     max_shelf_s: Annotated[float, Field(gt=0, le=SHIFT_S, allow_inf_nan=False)] = SHIFT_S
-    topic: TopicName | None = None
-    type: Type | None = None
-    field: FieldPath = "data"
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    max_age_s: Seconds | None = None
-    qos: TopicQos = TopicQos()
-    low_low: Limit | None = None
-    low: Limit | None = None
-    high: Limit | None = None
-    high_high: Limit | None = None
+    low_low: FiniteNumber | None = None
+    low: FiniteNumber | None = None
+    high: FiniteNumber | None = None
+    high_high: FiniteNumber | None = None
     deadband: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     when: RaisingCondition | None = None
     suppressed_while: SuppressingCondition | None = Field(None, alias="while")
@@ -359,19 +338,9 @@ ShiftStart = Annotated[str, AfterValidator(_check_start)]
 Shifts = Annotated[tuple[ShiftStart, ...], Field(strict=False, max_length=12), AfterValidator(_sorted)]
 
 
-def _check_each_once(values: tuple[int, ...]) -> tuple[int, ...]:
-    if not values:
-        raise ValueError("is empty: leave the key out")
-    for i, value in enumerate(values):
-        if value in values[:i]:
-            raise ValueError(f"has {format_value(value)} twice")
-    return values
-
-
-Priorities = Annotated[tuple[Priority, ...], Field(strict=False), AfterValidator(_check_each_once)]
 Minutes = Annotated[int, Field(ge=1, le=480)]
 SilenceTimes = Annotated[
-    tuple[Minutes, ...], Field(strict=False, max_length=4), AfterValidator(_check_each_once)
+    tuple[Minutes, ...], Field(strict=False, max_length=4), AfterValidator(distinct)
 ]
 
 

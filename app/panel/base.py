@@ -130,6 +130,12 @@ def _check_endpoint(endpoint: str) -> str:
     return endpoint
 
 
+def _check_whole_path(path: str) -> str:
+    if not path.startswith("/"):
+        raise ValueError(f"{format_value(path)} is not the whole path of a file, from / on")
+    return path
+
+
 def _resolve_folder(value: Any, info: ValidationInfo) -> Path:
     """The folder's path, relative to the panel file's folder: of interfaces, or `pictures`."""
     if not isinstance(value, str) or not value:
@@ -186,19 +192,30 @@ def _parse_interlocks(value: Any) -> tuple[str, ...]:
             "must be an id, or a list of ids: write the table by itself, such as [[interlock]] with an "
             'id, and name the id here, such as "door_closed"'
         )
-    for i, name in enumerate(named):
+    for name in named:
         if not isinstance(name, str) or not re.fullmatch(ID, name):
             raise ValueError(f'{format_value(name)} is not an id: a-z, 0-9 and "_", a letter first')
-        if name in named[:i]:
-            raise ValueError(f"names {format_value(name)} twice")
-    return tuple(named)
+    return each_once(tuple(named))
 
 
-def non_empty(tables: tuple[Any, ...]) -> tuple[Any, ...]:
-    """ValueError for an empty list of tables."""
-    if not tables:
-        raise ValueError("is empty: it must have one table at least")
-    return tables
+def non_empty(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """ValueError for an empty list."""
+    if not values:
+        raise ValueError("is empty: it must have one at least")
+    return values
+
+
+def each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """ValueError for a list that names a value twice."""
+    for i, value in enumerate(values):
+        if value in values[:i]:
+            raise ValueError(f"names {format_value(value)} twice")
+    return values
+
+
+def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The same for a list that may not be empty."""
+    return each_once(non_empty(values))
 
 
 @cache
@@ -251,6 +268,7 @@ else:
     Note = panel_text(40)
     AnyText = panel_text(least=0)
 Span = Annotated[int, Field(ge=1, le=12)]
+Rows = Annotated[int, Field(ge=1, le=8)]
 TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_check_message_type)]
 ServiceType = Annotated[str, AfterValidator(_check_service_type)]
@@ -262,6 +280,10 @@ Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
 PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]
 File = Annotated[Path, BeforeValidator(_resolve_file)]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
+# Where a secret is: never in the panel file itself.
+SecretVariable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
+SecretFile = Annotated[str, AfterValidator(_check_whole_path)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 
 

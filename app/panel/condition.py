@@ -9,17 +9,14 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from app.panel.base import (
     Description,
-    FieldPath,
     Id,
     Label,
-    Seconds,
-    TopicName,
-    TopicQos,
     Type,
+    non_empty,
     panel_text,
 )
-from app.panel.numbers import FORMAT, Factor, is_scaled, sent_number
-from app.panel.widgets.numbers import Unit
+from app.panel.numbers import sent_number
+from app.panel.shared_keys import AgeKey, FieldKeys, NumberKeys, RobotKey
 from app.ros.messages.validation import format_value
 from app.system.texts import PanelText, TextLike
 
@@ -40,17 +37,14 @@ def _check_value(value: Any) -> Any:
     return value
 
 
-def _non_empty(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not values:
-        raise ValueError("is empty: it must have one value at least")
-    return values
-
-
 # A value of the field's type, or the name of a constant of the message around it.
 ComparedValue = Annotated[bool | int | float | str, BeforeValidator(_check_value)]
 
 
-class Condition(Description):
+ComparedValues = Annotated[tuple[ComparedValue, ...], Field(strict=False), AfterValidator(non_empty)]
+
+
+class Condition(NumberKeys, AgeKey, FieldKeys):
     """A field of a topic: a bool that must be true or, with comparisons, a value that must meet all of
     them. A value that was never received, is stale or cut off does not meet it."""
 
@@ -58,22 +52,12 @@ class Condition(Description):
 
     label: Label | None = None
     action: Label | None = None
-    topic: TopicName
     type: Type = "std_msgs/msg/Bool"
-    field: FieldPath = "data"
     equals: ComparedValue | None = None
     not_equals: ComparedValue | None = None
     min: ComparedValue | None = None
     max: ComparedValue | None = None
-    one_of: (
-        Annotated[tuple[ComparedValue, ...], Field(strict=False), AfterValidator(_non_empty)] | None
-    ) = None
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    max_age_s: Seconds | None = None
-    qos: TopicQos = TopicQos()
+    one_of: ComparedValues | None = None
     _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
     _written: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
@@ -97,11 +81,6 @@ class Condition(Description):
         """Key → value of the comparisons; empty if the value must be true."""
         values = {key: getattr(self, key) for key in COMPARISONS}
         return {key: value for key, value in values.items() if value is not None}
-
-    @property
-    def is_scaled(self) -> bool:
-        """Whether what is shown is another number than that of the field."""
-        return is_scaled(self)
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -136,12 +115,11 @@ class Condition(Description):
         return made
 
 
-class NamedCondition(Condition):
+class NamedCondition(RobotKey, Condition):
     """A condition that widgets name by its id: it locks nothing. `robot` is the one that publishes it,
     by default that of the widget that names it."""
 
     id: Id
-    robot: Id | None = None
 
 
 # The description of an interlock: a condition that permits commands.

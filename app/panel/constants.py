@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from app.panel.condition import Condition
 from app.panel.numbers import to_float32
@@ -11,8 +11,6 @@ from app.ros.messages import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, fie
 from app.ros.messages.validation import fitting_constants, format_value, unknown_constant
 
 Resolved = TypeVar("Resolved", bound=Condition)
-
-NUMBERS: Final = frozenset({*INTEGER_RANGES, "float32", "float64"})
 
 
 class HasField(Protocol):

@@ -11,7 +11,6 @@ from app.panel.alarm import Alarm, AlarmRules
 from app.panel.base import (
     Description,
     Endpoint,
-    FieldPath,
     File,
     Folder,
     Id,
@@ -19,17 +18,14 @@ from app.panel.base import (
     PictureFolder,
     SaidLabel,
     Seconds,
-    TopicName,
-    TopicQos,
-    Type,
     catalogue_default,
+    each_once,
     parse_namespace,
 )
 from app.panel.condition import Interlock, NamedCondition
 from app.panel.demo import DemoEntry, StoryName
 from app.panel.file.wording import one_of
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
-from app.panel.numbers import Factor
 from app.panel.recipe import RecipeSet
 from app.panel.robot_texts import RobotText
 from app.panel.rules import (
@@ -44,11 +40,11 @@ from app.panel.rules import (
     ScreenRules,
     StateRules,
 )
+from app.panel.shared_keys import NumberKeys, NumberOrTimeFormat
 from app.panel.source import Source
-from app.panel.widgets.displays import FORMAT_OR_TIME, Readout
-from app.panel.widgets.numbers import Unit
+from app.panel.widgets.displays import Readout
+from app.panel.widgets.families import TopicField
 from app.ros.dialects.dialect import DEFAULT_DIALECT, DOMAIN_MOST, DialectName
-from app.ros.messages.validation import format_value
 from app.system.texts import ENGLISH
 from app.system.texts.catalogue import files
 
@@ -64,10 +60,7 @@ def _check_language(tag: str) -> str:
 def _check_languages(tags: tuple[str, ...]) -> tuple[str, ...]:
     if not tags:
         raise ValueError("is empty: name one language at least, or leave the key out")
-    for i, tag in enumerate(tags):
-        if tag in tags[:i]:
-            raise ValueError(f"names {format_value(tag)} twice")
-    return tags
+    return each_once(tags)
 
 
 Language = Annotated[
@@ -83,19 +76,11 @@ TILE: Final = "-tile-"  # no widget has an id that begins like this
 SUMS: Final = "-sums"  # the line of sums of an overview
 
 
-class RobotOverview(Description):
+class RobotOverview(NumberKeys, TopicField):
     """The figure of a robot on its tile of an overview."""
 
     label: Label | None = None
-    topic: TopicName
-    type: Type
-    field: FieldPath = "data"
-    max_age_s: Seconds | None = None
-    qos: TopicQos = TopicQos()
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
-    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
+    format: NumberOrTimeFormat | None = None
 
 
 class RobotEntry(Description):

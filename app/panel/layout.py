@@ -6,12 +6,12 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, File, Icon, Id, Label, Span
+from app.panel.base import Description, File, Icon, Id, Label, Span, each_once
+from app.panel.shared_keys import NeedsKey, RobotKey
 from app.panel.widgets.families import BaseWidget, EntryWidget
 from app.panel.widgets.kinds import KINDS, Widget
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.tiles import BUTTONS
-from app.ros.messages.validation import format_value
 
 COLUMNS: Final = 12  # of a page, and of a group that does not say
 SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
@@ -27,25 +27,16 @@ Hand = Literal["right", "left"]
 Screen = Annotated[str, Field(pattern=SCREEN)]
 
 
-def _check_screens(sizes: tuple[str, ...]) -> tuple[str, ...]:
-    for i, size in enumerate(sizes):
-        if size in sizes[:i]:
-            raise ValueError(f"names {format_value(size)} twice")
-    return sizes
+Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(each_once)]
 
 
-Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(_check_screens)]
-
-
-class Group(Description):
+class Group(NeedsKey, RobotKey):
     """A part of a page with a heading and a grid of `columns`; `span` is its width in twelfths of the
     page. Without `columns` its widgets' spans are twelfths of the group. `needs`: the role or group of
     users that its commands need."""
 
     title: Label | None = None
     note: Label | None = None
-    robot: Id | None = None
-    needs: Id | None = None
     columns: Annotated[int, Field(ge=1, le=COLUMNS)] | None = None
     span: Span = COLUMNS
     widgets: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
@@ -113,7 +104,7 @@ def _places(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]
     return {(r, c) for r in range(row, row + rows) for c in range(column, column + span)}
 
 
-class Page(Description):
+class Page(NeedsKey, RobotKey):
     """A page of the panel; with `fit` it never scrolls. An `overview` has a tile for each robot,
     and the sum of their figures after the text `total`. With a `template` (Jinja) that one places the
     widgets; `styles` is appended to the panel's stylesheet. Clients without the role or group `needs`
@@ -122,8 +113,6 @@ class Page(Description):
     id: Id
     title: Label
     icon: Icon | None = None
-    robot: Id | None = None
-    needs: Id | None = None
     overview: bool = False
     total: Label | None = None
     fit: bool = False

@@ -5,14 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from struct import pack, unpack
-from typing import Annotated, Final, NamedTuple, Protocol
-
-from pydantic import Field
+from typing import Final, NamedTuple, Protocol
 
 from app.panel.values import number_text
-from app.ros.messages import to_plain
+from app.ros.messages import INTEGER_RANGES, to_plain
 from app.system.texts import PanelText, TextLike, number, say
 from app.system.texts.text import after_space
+
+NUMBERS: Final = frozenset({*INTEGER_RANGES, "float32", "float64"})  # the types of numbers
 
 # Ranges of numbers with optional limits, of panel files and of ROS 2 parameter descriptors.
 #
@@ -149,8 +149,6 @@ LONGEST_NUMBER: Final = 32  # a larger one has an exponent, whatever its format
 BATTERY: Final = ("sensor_msgs/msg/BatteryState", "percentage")
 PERCENT: Final = 100.0
 
-Factor = Annotated[float, Field(allow_inf_nan=False)]
-
 
 class Scaled(Protocol):
     """What shows or compares `value * scale + offset`."""
@@ -159,6 +157,13 @@ class Scaled(Protocol):
     def scale(self) -> float: ...
     @property
     def offset(self) -> float: ...
+
+
+class WrittenNumber(Scaled, Protocol):
+    """What is written with a format."""
+
+    @property
+    def format(self) -> str | None: ...
 
 
 class Scaling(NamedTuple):

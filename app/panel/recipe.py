@@ -17,9 +17,9 @@ from app.panel.base import (
     Seconds,
     TopicName,
     TopicQos,
-    Type,
     non_empty,
 )
+from app.panel.shared_keys import AgeKey, OptionalTopicKeys
 from app.panel.widgets.key_parts import ConfirmPress
 
 MAX_FIELDS: Final = 60
@@ -30,14 +30,10 @@ Paths = Annotated[dict[Id, FieldPath], Field(max_length=MAX_FIELDS)]
 Kinds = Annotated[dict[Id, ParameterKind], Field(max_length=MAX_FIELDS)]
 
 
-class RecipeReadback(Description):
+class RecipeReadback(AgeKey, OptionalTopicKeys):
     """By what the robot reports the values that it has: a topic, or parameters of a node."""
 
-    topic: TopicName | None = None
     node: NodeName | None = None
-    type: Type | None = None
-    qos: TopicQos = TopicQos()
-    max_age_s: Seconds | None = None
     fields: Paths = Field(default_factory=dict)
     parameters: Names = Field(default_factory=dict)
     parameter_types: Kinds = Field(default_factory=dict)

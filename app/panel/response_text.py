@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from app.panel.constants import NUMBERS
-from app.panel.numbers import FORMAT, formatted
+from app.panel.numbers import FORMAT, NUMBERS, formatted
 from app.system.errors import FieldError
 from app.system.texts import TextLike
 from app.system.texts.text import each_language

@@ -3,20 +3,25 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Id, Label, Note, Seconds, TopicName, non_empty
-from app.panel.checks.types import field_faults
+from app.panel.base import Description, Id, Label, Note, Seconds, SecretFile, SecretVariable, TopicName
+from app.panel.checks.types import value_faults
 from app.panel.constants import parent_type
 from app.panel.roles import ENGINEER, ROLES
-from app.panel.widgets.displays import LampState, resolve_state_value, state_faults
+from app.panel.widgets.displays import (
+    LampState,
+    PictureName,
+    StatesKey,
+    resolve_state_value,
+    state_faults,
+)
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.ros.messages import Interfaces
 from app.system.errors import Fault
-from app.system.pictures import PICTURE
 from app.system.texts import say
 
 # The table `[access.oidc]` of a panel file: sign-in by the plant's own provider (OpenID Connect).
@@ -24,7 +29,6 @@ from app.system.texts import say
 Group = Annotated[str, Field(min_length=1, max_length=200)]
 Groups = Annotated[tuple[Group, ...], Field(strict=False, max_length=50)]
 Claim = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.:/-]{1,100}$")]
-Variable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
 AcrValue = Annotated[str, Field(pattern=r"^[!-~]{1,200}$")]
 LOOPBACK: Final = ("localhost", "127.0.0.1", "::1")
 
@@ -42,12 +46,6 @@ def _check_issuer(issuer: str) -> str:
     return issuer
 
 
-def _check_path(path: str) -> str:
-    if not path.startswith("/"):
-        raise ValueError(f'"{path}" is not a whole path: it begins with "/"')
-    return path
-
-
 class OidcRules(Description):
     """The provider, and which of its groups have which role here. The secret of the client is in an
     environment variable of the server, or else in a file there, never in the panel file."""
@@ -55,8 +53,8 @@ class OidcRules(Description):
     issuer: Annotated[str, Field(max_length=300), AfterValidator(_check_issuer)]
     client_id: Annotated[str, Field(min_length=1, max_length=200)]
     name: Annotated[str, Field(min_length=1, max_length=40)]
-    secret_env: Variable | None = None
-    secret_file: Annotated[str, AfterValidator(_check_path)] | None = None
+    secret_env: SecretVariable | None = None
+    secret_file: SecretFile | None = None
     user_claim: Claim = "preferred_username"
     groups_claim: Claim = "groups"
     acr_values: Annotated[tuple[AcrValue, ...], Field(strict=False, max_length=20)] = ()
@@ -93,7 +91,7 @@ class BrandRules(Description):
     """What stands in the corner above the tabs: a `logo` from the panel's pictures, or a `text`, on a
     `colour`, which is nowhere else."""
 
-    logo: Annotated[str, Field(pattern=PICTURE)] | None = None
+    logo: PictureName | None = None
     text: Note | None = None
     colour: Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")] | None = None
 
@@ -184,11 +182,10 @@ class StateDetail(TopicField):
     words: Mapping[str, Label] = Field(default_factory=dict)
 
 
-class StateRules(TopicField):
+class StateRules(StatesKey, TopicField):
     """The states that the robot reports, with the word and the shape of each; a state that it does not
     report now is shown as not known."""
 
-    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
     details: Annotated[tuple[StateDetail, ...], Field(strict=False, max_length=MAX_DETAILS)] = Field(
         (), alias="detail"
     )
@@ -199,14 +196,6 @@ class StateRules(TopicField):
         keys: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
         fixed: dict[str, Any] = {"id": STATE_ID, "kind": "state", "label": say("machine_state")}
         return MachineState.model_construct(None, **fixed, **keys)
-
-    def with_constants(self, interfaces: Interfaces) -> Self:
-        """The same with values in place of constants' names."""
-        states = [
-            state.model_copy(update={"value": self.value_of(state.value, interfaces)})
-            for state in self.states
-        ]
-        return self.model_copy(update={"states": tuple(states)})
 
     def value_of(self, value: bool | int | str, interfaces: Interfaces) -> Any:
         """The value of a state in the message: that of a constant by its name."""
@@ -230,7 +219,7 @@ class MachineState(Display):
         yield from super().faults(place, checking)
         for number, detail in enumerate(self.details):
             at = f"{place}.detail[{number}]"
-            yield from field_faults(at, detail.type, detail.field, checking.interfaces)
+            yield from value_faults(at, detail.type, detail.field, "a detail", checking.interfaces)
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         yield from state_faults(place, self, field_type, interfaces, "the machine's state")

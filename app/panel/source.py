@@ -1,20 +1,19 @@
 """Topics that several tables of a panel file name by an id: `[[source]]`."""
 
-from typing import Annotated, Final
+from typing import Final
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import BaseModel
 
-from app.panel.base import Description, FieldPath, Id, Seconds, TopicName, TopicQos, Type, non_empty
-from app.panel.numbers import Factor
+from app.panel.base import FieldPath, FiniteNumber, Id, TopicName, TopicQos, Type
 from app.panel.recipe import RecipeSet
-from app.panel.widgets.displays import FORMAT_OR_TIME, LampState
+from app.panel.shared_keys import AgeKey, NumberOrTimeFormat, Unit
+from app.panel.widgets.displays import States
 from app.panel.widgets.families import PublishCommand
-from app.panel.widgets.numbers import Unit
 
 NAME: Final = "source"
 
 
-class Source(Description):
+class Source(AgeKey):
     """A topic with its type, and how one field of it is read and shown."""
 
     id: Id
@@ -22,14 +21,11 @@ class Source(Description):
     type: Type
     qos: TopicQos | None = None
     field: FieldPath | None = None
-    max_age_s: Seconds | None = None
     unit: Unit = ""
-    scale: Factor | None = None
-    offset: Factor | None = None
-    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
-    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)] | None = (
-        None
-    )
+    scale: FiniteNumber | None = None
+    offset: FiniteNumber | None = None
+    format: NumberOrTimeFormat | None = None
+    states: States | None = None
 
 
 def reads_source(model: type[BaseModel]) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from app.panel.constants import NUMBERS
+from app.panel.numbers import NUMBERS
 from app.system.errors import Fault
 
 TIME: Final = "builtin_interfaces/msg/Time"

@@ -1,19 +1,41 @@
 """The tables of keys in docs/reference/panel-file.md, made from the schema of the panel file."""
 
 import tomllib
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from app.panel.base import TEXTS
 from app.system.toml_values import key_text
-from docs._generate.schema import REF, ROOT, SAME, WIDGET, WORDS, Schema, of_kind, panel_schema
+from docs._generate.schema import (
+    ANY,
+    REF,
+    ROOT,
+    SAME,
+    WIDGET,
+    WORDS,
+    Schema,
+    kinds_of,
+    of_kind,
+    panel_schema,
+    said_at,
+)
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
 EXACT: Final = 2**53  # the limit of every number in a browser: it is described once, not at each key
-COMMON: Final = 2  # a key that so many tables describe in the same words is described once
-COMMON_KEYS: Final = "common keys"
+SHARED: Final = "keys that several tables take"
+EVERY_WIDGET: Final = "keys of every widget"
+# The table that says what the keys of a class mean, where several tables are of the class.
+HOMES: Final = {
+    "Condition": "interlock",
+    "Numeric": "number",
+    "HoldCommand": "hold",
+    "PublishCommand": "publish",
+    "Axis": "x_axis",
+    "AlarmView": "alarm_list",
+    "RecoveryStep": "steps",
+    "NumberBeside": "target",
+}
 NOUNS: Final = {"string": "text", "number": "number", "integer": "integer", "object": "table"}
 LEAST: Final = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("minLength", "≥"))
 MOST: Final = (("maximum", "≤"), ("exclusiveMaximum", "<"), ("maxLength", "≤"))
@@ -26,14 +48,37 @@ def key_tables() -> dict[str, str]:
     del tables[WIDGET]
     examples = examples_of(tables)
     rows = {name: _rows(name, table, examples) for name, table in tables.items()}
-    count = Counter(row.said for table in rows.values() for row in table)
-    often = {said[0]: said for said, number in reversed(count.most_common()) if number >= COMMON}
-    common = {*often.values()}  # of each key what most tables say
-    first = {row.said: row for table in reversed(rows.values()) for row in table if row.said in common}
-    return {
-        f"keys {COMMON_KEYS}": _lines(sorted(first.values(), key=lambda row: row.key)),
-        **{f"keys {name}": _with_common(table, common) for name, table in rows.items()},
+    kinds = {name: rows[name] for name in kinds_of(tables)}
+    shared: dict[str, list[Row]] = {}
+    for row in (row for table in rows.values() for row in table if row.section == ANY):
+        shared.setdefault(row.key, []).append(row)
+    of_widgets = {
+        key: _usual(known) if key != "kind" else known[0]._replace(value="kind of widget", example="")
+        for key, known in shared.items()
+        if all(any(row.key == key for row in table) for table in kinds.values())
     }
+    homes = dict.fromkeys(shared, SHARED) | dict.fromkeys(of_widgets, EVERY_WIDGET)
+
+    def lines(name: str) -> str:
+        known = of_widgets if name in kinds else {}
+        own = (
+            row
+            for row in rows[name]
+            if row.key != "kind" and (row.key not in known or row.said != known[row.key].said)
+        )
+        return _lines([row.linked(name, homes) for row in own])
+
+    return {
+        f"keys {SHARED}": _lines([_usual(shared[key]) for key in sorted({*shared} - {*of_widgets})]),
+        f"keys {EVERY_WIDGET}": _lines(list(of_widgets.values())),
+        **{f"keys {name}": lines(name) for name in rows},
+    }
+
+
+def _usual(rows: Sequence["Row"]) -> "Row":
+    """The row that most tables have."""
+    said = [row.said for row in rows]
+    return max(rows, key=lambda row: said.count(row.said))
 
 
 def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
@@ -67,46 +112,55 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
 
 
 class Row(NamedTuple):
-    """A key of a table, as its page has it."""
+    """A key of a table, as its page has it. `section` says what it means."""
 
     key: str
     value: str
-    default: str
     example: str
+    default: str
     meaning: str
+    section: str
 
     @property
     def said(self) -> tuple[str, ...]:
         """What is said of the key, without the example."""
-        return self.key, self.value, self.default, self.meaning
+        return self.value, self.default, self.meaning
 
-
-def _with_common(rows: Sequence[Row], common: Collection[tuple[str, ...]]) -> str:
-    """The table's own keys, then the names of those that are described once for all."""
-    names = [f"`{row.key}`" for row in rows if row.said in common]
-    own = [row for row in rows if row.said not in common]
-    parts = [_lines(own)] if own else []
-    if names:
-        parts.append(f"[Common keys](#common-keys): {', '.join(names)}.")
-    return "\n\n".join(parts)
+    def linked(self, table: str, homes: Mapping[str, str]) -> "Row":
+        """The row in a table: with a link in place of a meaning that stands elsewhere. `homes` are the
+        sections of keys of several tables."""
+        home = homes[self.key].replace(" ", "-") if self.section == ANY else HOMES.get(self.section)
+        if home in (None, table):
+            return self
+        return self._replace(key=f"[`{self.key}`](#{home})", example="", meaning="")
 
 
 def _lines(rows: Sequence[Row]) -> str:
-    cells = [["Key", "Value", "Default", "Example", "What it means"], ["---"] * 5]
-    cells += [[f"`{row.key}`", *row[1:]] for row in rows]
+    """The table of rows: the id first, those with a link last."""
+    cells = [["Key", "Value", "Default", "What it means"], ["---"] * 4]
+    for row in sorted(rows, key=lambda row: (row.key != "id", row.key[0] == "[")):
+        key = row.key if row.key[0] == "[" else f"`{row.key}`"
+        value = f"{row.value}: {row.example}" if row.example else row.value
+        cells.append([key, value, row.default, row.meaning])
     return "\n".join(
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in cells
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in line).rstrip() + " |" for line in cells
     )
 
 
 def _rows(name: str, table: Schema, examples: Mapping[str, Any]) -> list[Row]:
     rows = []
-    for key, prop in sorted(table["properties"].items(), key=lambda row: row[0] != "id"):
+    for key, prop in table["properties"].items():
         needed = key in table.get("required", ())
         default = "**required**" if needed else _code(prop["default"]) if "default" in prop else "–"
-        example = "–" if _is_table(prop) else _code(examples[f"{name}.{key}"])
-        rows.append(Row(key, words(prop), default, example, prop["description"]))
+        example = "" if _is_table(prop) or _is_plain(prop) else _code(examples[f"{name}.{key}"])
+        section = said_at(name, key)
+        rows.append(Row(key, words(prop), example, default, prop["description"], section))
     return rows
+
+
+def _is_plain(prop: Schema) -> bool:
+    """Whether its values need no example."""
+    return "const" in prop or "enum" in prop or prop.get("type") in ("boolean", "integer", "number")
 
 
 def _is_table(prop: Schema) -> bool:

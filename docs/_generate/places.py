@@ -9,16 +9,12 @@ import inspect
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final
 
-from pydantic import BaseModel
-
-from app.panel.file.same_widgets import SameWidget
-from app.panel.keys import PanelKeys
 from app.system import texts as i18n
 from app.system.texts import BETWEEN, ENGLISH, sentences
 from docs._generate.locks import shown
-from docs._generate.schema import ROOT, SAME, of_kind
+from docs._generate.schema import ROOT, models
 
 SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
@@ -78,30 +74,6 @@ def models_table() -> str:
 
 def _slug(name: str) -> str:
     return "top-level" if name == ROOT else name.replace("_widget", "-widget")
-
-
-def models() -> dict[str, type[BaseModel]]:
-    """The classes of the tables, by the names that the file gives them."""
-    known: dict[str, type[BaseModel]] = {ROOT: PanelKeys}
-
-    def walk(model: type[BaseModel]) -> None:
-        for key, field in model.model_fields.items():
-            for inner in () if field.exclude else _models_in(field.annotation):
-                kind = inner.model_fields.get("kind")
-                name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
-                if name not in known:
-                    known[name] = inner
-                    walk(inner)
-
-    walk(PanelKeys)
-    return known | {SAME: SameWidget}
-
-
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inner in get_args(annotation):
-        yield from _models_in(inner)
 
 
 def _file_of(model: type) -> str:

@@ -6,12 +6,16 @@ It is for editors: it finds what is wrong with one key. What other keys or the r
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
+
+from pydantic import BaseModel
 
 from app.panel import Panel
 from app.panel.file.load import NOT_WRITTEN
 from app.panel.file.same_widgets import SameWidget
+from app.panel.keys import PanelKeys
 from app.panel.widgets.families import PublishCommand
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.trend import DURATION
@@ -28,6 +32,7 @@ WIDGET: Final = "widget"
 REF: Final = "#/definitions/"
 SOURCE: Final = "source"
 SAME: Final = "same"
+ANY: Final = "any"  # what a key means in each table
 PUBLISHED: Final = [kind for kind, row in KINDS.items() if issubclass(row.model, PublishCommand)]
 
 # What a text is, by "table.key" or "key" alone, and its pattern where the name alone decides.
@@ -166,11 +171,50 @@ def _finish(name: str, table: Schema) -> None:
 
 
 def about(table: str, key: str) -> str:
-    """What a key means; KeyError if no file describes it."""
-    for place in (table, "any"):
-        if (said := WORDS.get(place, {}).get(key)) is not None:
-            return str(said)
+    """What a key means; KeyError if panel_keys.toml does not say it."""
+    return str(WORDS[said_at(table, key)][key])
+
+
+def said_at(table: str, key: str) -> str:
+    """The section that says it: of the table itself, else of a class that its model is of, else of all
+    tables."""
+    model = models().get(table)
+    classes = (each.__name__ for each in model.__mro__) if model else ()
+    for section in (table, *classes, ANY):
+        if key in WORDS.get(section, {}):
+            return str(section)
     raise KeyError(f'docs/_generate/panel_keys.toml does not say what "{key}" of "{table}" means')
+
+
+@cache
+def models() -> dict[str, type[BaseModel]]:
+    """The classes of the tables, by the names that the file gives them."""
+    known: dict[str, type[BaseModel]] = {ROOT: PanelKeys}
+
+    def walk(model: type[BaseModel]) -> None:
+        for key, field in model.model_fields.items():
+            for inner in () if field.exclude else _models_in(field.annotation):
+                kind = inner.model_fields.get("kind")
+                name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
+                if name not in known:
+                    known[name] = inner
+                    walk(inner)
+
+    walk(PanelKeys)
+    return known | {SAME: SameWidget}
+
+
+def tables_of(section: str) -> list[str]:
+    """The tables that a section of panel_keys.toml is about: itself, or those of its class."""
+    classes = {name: [each.__name__ for each in model.__mro__] for name, model in models().items()}
+    return [section, *(name for name, names in classes.items() if section in names)]
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
 
 
 def _plain(table: str, key: str, prop: Schema) -> Schema:

@@ -87,7 +87,7 @@ def test_diagnostics_have_their_topic_and_type(tmp_path: Path) -> None:
         ('node = "/driver"\n', "alarm[0].text", "is missing"),
         ('text = "Driver"\nnode = "/driver"\ndeadband = 1.0\n', "alarm[0].deadband", "no meaning"),
         (AIR + 'low = 5.0\ninhibits = ["stop"]\n', "alarm[0].inhibits[0]", 'no control "stop"'),
-        (AIR + 'low = 5.0\nrobot = "r1"\n', "alarm[0].robot", 'no robot "r1"'),
+        (AIR + 'low = 5.0\nrobot = "r1"\n', "alarm[0].robot", "this panel has one robot"),
         (AIR + 'low = 5.0\npicture = "valve.svg"\n', "alarm[0].picture", "no picture"),
         ('diagnostics = "*"\ntype = "std_msgs/msg/Bool"\n', "alarm[0].type", "DiagnosticArray"),
         (FAULTS + LIST, "alarm[0].list.text", "is missing"),

@@ -259,7 +259,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[0].widget[0]",
             '"kind" is missing; one of text, number, slider, select, toggle, publish',
         ),
-        (with_widget(1, shade="red"), f"{BUTTON}.shade", "known here: id, label, show_label"),
+        (with_widget(1, shade="red"), f"{BUTTON}.shade", "known here: id, robot, label, show_label"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
         (with_widget(1, max_length=3), f"{BUTTON}.max_length", "unknown key"),
         (with_widget(1, label=""), f"{BUTTON}.label", "must not be empty"),
@@ -403,7 +403,7 @@ LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "sh
         (
             {"id": "s", "kind": "select", "label": "S", "options": []},
             "options",
-            "is empty: it must have one table at least",
+            "is empty: it must have one at least",
         ),
         (
             {"id": "s", "kind": "select", "label": "S", "options": [{"value": 1}]},
@@ -488,7 +488,7 @@ def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> 
     assert faults(load, tables(page=[page])) == {
         "page[0].widget[0].constants": (
             'unknown key, as "order"; known here: '
-            "id, label, show_label, span, rows, grow, robot, kind, max_length, default, scan"
+            "id, robot, label, show_label, span, rows, grow, kind, max_length, default, scan"
         )
     }
 
@@ -700,7 +700,7 @@ def test_a_readout_is_of_one_value(load: Load, field: str) -> None:
     content = with_widget(3, topic="/scan", type="sensor_msgs/msg/LaserScan", field=field)
     reported = faults(load, content)
     assert list(reported) == [f"{READOUT}.field"]
-    assert "a readout shows one value" in reported[f"{READOUT}.field"]
+    assert "a readout takes one value" in reported[f"{READOUT}.field"]
 
 
 def interface(tmp_path: Path, text: str = "bool[2] closed\nfloat32 kelvin\n") -> None:

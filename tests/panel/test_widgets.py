@@ -177,9 +177,9 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
             "unit: is for numbers; constants are shown by their names",
         ),
         ({**HEARD, "type": "sensor_msgs/msg/JointState", "field": "position"},
-         'field: "position" is float64[]: a readout shows one value of it, not all'),
+         'field: "position" is float64[]: a readout takes one value of it, not all'),
         ({**LAMP, "type": "sensor_msgs/msg/JointState", "field": "position"},
-         'field: "position" is float64[]: an indicator shows one value of it, not all'),
+         'field: "position" is float64[]: an indicator takes one value of it, not all'),
         (
             {**LAMP, "type": "std_msgs/msg/Float64"},
             'field: "data" is float64: an indicator is for whole numbers, bools and texts',
@@ -438,4 +438,4 @@ def test_time_has_its_own_formats(kind: str, more: dict[str, Any], key: str) -> 
 def test_a_lamp_of_a_time_is_refused() -> None:
     states = [{"value": 0, "text": "Zero", "shape": "circle"}]
     lamp = {**HEARD, "kind": "indicator", "type": "std_msgs/msg/Header", "field": "stamp"}
-    assert "shows one value of it, not all" in faults({**lamp, "states": states})[0]
+    assert "takes one value of it, not all" in faults({**lamp, "states": states})[0]

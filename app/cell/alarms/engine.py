@@ -34,6 +34,7 @@ from app.cell.alarms.states import (
 )
 from app.cell.robot.state import RobotState
 from app.panel.model import Panel
+from app.panel.shared_keys import stale_at
 from app.system.texts import TextLike, say
 
 # From what an alarm's source says to the levels of its condition. Pure functions.
@@ -51,11 +52,10 @@ def read_alarm(
         return read_source(described, robot, now, began_at)
     if not robot.link_up or not robot.graph.peers or alarm.heard_at == -math.inf:
         return UNKNOWN
-    max_age_s = described.entry_max_age_s
-    stale_at = math.inf if max_age_s is None else alarm.heard_at + max_age_s
-    if now >= stale_at:
+    until = stale_at(alarm.heard_at, described.entry_max_age_s)
+    if now >= until:
         return UNKNOWN
-    return SourceReading(met=entry.level > 0, until=stale_at)
+    return SourceReading(met=entry.level > 0, until=until)
 
 
 def steady_range(alarm: AlarmInstance) -> tuple[float, float]:
@@ -213,8 +213,7 @@ class SourceWatch:
 
 
 def _stale_at(source: AlarmInstance) -> float:
-    max_age_s = source.definition.alarm.entry_max_age_s
-    return math.inf if max_age_s is None else source.heard_at + max_age_s
+    return stale_at(source.heard_at, source.definition.alarm.entry_max_age_s)
 
 
 # First-out: which alarm of a group was raised first, and which ones followed it.

@@ -14,6 +14,7 @@ from app.cell.robot.topics import kept_s
 from app.panel.alarm import Alarm, SourceKind
 from app.panel.condition import Condition
 from app.panel.numbers import shown_number
+from app.panel.shared_keys import stale_at
 from app.panel.widgets.parameter import GET
 from app.system.clock import format_age, format_time
 from app.system.printable import one_line
@@ -61,10 +62,10 @@ def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> Source
     value = reading.value(alarm.field) if reading.status in ("message", "reading") else None
     if not isinstance(value, int | float):
         return UNKNOWN
-    stale_at = math.inf if alarm.max_age_s is None else reading.at + alarm.max_age_s
-    if now >= stale_at:
+    until = stale_at(reading.at, alarm.max_age_s)
+    if now >= until:
         return UNKNOWN
-    return SourceReading(value=shown_number(alarm, value), until=stale_at)
+    return SourceReading(value=shown_number(alarm, value), until=until)
 
 
 def _read_node(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
@@ -90,13 +91,13 @@ def read_condition(condition: Condition, robot: RobotState, now: float) -> Sourc
     value = reading.value(condition.field) if reading.status in ("message", "reading") else None
     if value is None or value != value:
         return UNKNOWN
-    stale_at = math.inf if condition.max_age_s is None else reading.at + condition.max_age_s
+    until = stale_at(reading.at, condition.max_age_s)
     met, key = permits(condition, value), robot.key(condition.topic)
     is_aged = condition.max_age_s is not None and reading.at < fresh_since(robot, key)
     is_doubtful = is_aged or robot.silent_publishers.has_silent(key, robot.peers_of(key))
-    if now >= stale_at or (not met and is_doubtful):
+    if now >= until or (not met and is_doubtful):
         return UNKNOWN
-    return SourceReading(met=met, until=stale_at)
+    return SourceReading(met=met, until=until)
 
 
 def read_suppression(alarm: Alarm, robot: RobotState | None, now: float) -> SourceReading:
@@ -109,8 +110,8 @@ def read_suppression(alarm: Alarm, robot: RobotState | None, now: float) -> Sour
 def _read_age(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
     if alarm.topic is None or alarm.stale_s is None:
         return UNKNOWN
-    stale_at = max(robot.reading(alarm.topic).at, began_at) + alarm.stale_s
-    return SourceReading(met=True) if now >= stale_at else SourceReading(met=False, until=stale_at)
+    until = stale_at(max(robot.reading(alarm.topic).at, began_at), alarm.stale_s)
+    return SourceReading(met=True) if now >= until else SourceReading(met=False, until=until)
 
 
 def _read_loss(alarm: Alarm, robot: RobotState, now: float, began_at: float) -> SourceReading:
@@ -183,9 +184,7 @@ ENOUGH: Final = 1.1  # of the free space below which the alarm is raised, until 
 def own_definitions() -> Iterator[tuple[OwnAlarm, Definition]]:
     """The panel's own alarms, which are of no robot."""
     for name, priority in PRIORITIES.items():
-        alarm = Alarm.model_construct(
-            id=name, priority=priority
-        )  # a panel without alarms has no schema
+        alarm = Alarm.model_validate({"id": name, "priority": priority})
         rules = AlarmRules(PLAIN, (priority,))
         yield name, Definition(name, "", alarm, rules, Delays(), (None,))
 

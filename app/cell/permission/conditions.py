@@ -14,6 +14,7 @@ from app.cell.robot.state import Reading, RobotState
 from app.cell.robot.topics import kept_s
 from app.panel.condition import VALUE, Condition
 from app.panel.numbers import decimal_text, formatted, shortest_float, shown_number
+from app.panel.shared_keys import stale_at
 from app.panel.values import same_value
 from app.ros.messages import Absence, has_key
 from app.system.texts import PanelText, Text, TextLike, joined, number, render, say
@@ -100,10 +101,10 @@ def value_verdict(
         return PERMITTED
     if reading.at < fresh_since(robot, key):
         return locked("interlock_waiting", topic=subject)
-    stale_at = reading.at + condition.max_age_s
-    if now >= stale_at:
+    until = stale_at(reading.at, condition.max_age_s)
+    if now >= until:
         return stale(subject, condition.field, condition.max_age_s)
-    return Verdict(True, until=stale_at)
+    return Verdict(True, until=until)
 
 
 def unread(reading: Reading, subject: TextLike, type_name: str) -> Verdict:

@@ -34,6 +34,7 @@ from app.cell.robot.parameter_state import UNKNOWN
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import kept_s
 from app.panel.condition import Interlock, NamedCondition
+from app.panel.shared_keys import stale_at
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row, require_rows
@@ -213,10 +214,10 @@ def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | N
         )
     if source.max_age_s is None:
         return value, PERMITTED
-    stale_at = reading.at + source.max_age_s
-    if now >= stale_at:
+    until = stale_at(reading.at, source.max_age_s)
+    if now >= until:
         return None, stale(subject, source.field, source.max_age_s)
-    return value, Verdict(True, until=stale_at)
+    return value, Verdict(True, until=until)
 
 
 def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:

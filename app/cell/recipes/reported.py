@@ -13,6 +13,7 @@ from app.cell.robot.state import RobotState
 from app.cell.robot.topics import kept_s
 from app.panel.base import HasTopic, TopicQos
 from app.panel.recipe import RecipeReadback
+from app.panel.shared_keys import stale_at
 from app.panel.values import same_value
 from app.panel.widgets.families import Input
 from app.panel.widgets.recipe_load import RecipeLoad
@@ -64,7 +65,7 @@ def _of_topic(
     reading = robot.reading(topic.topic).of_field(path, kept_s(most))
     if reading.status not in ("message", "reading") or reading.fields is None:
         return Reported(None, say("recipe_not_reported", topic=topic.topic))
-    until = math.inf if most is None else reading.at + most
+    until = stale_at(reading.at, most)
     if now >= until:
         return Reported(None, say("recipe_report_old", topic=topic.topic))
     value = reading.value(path)

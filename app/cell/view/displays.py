@@ -19,8 +19,9 @@ from app.cell.robot.state import Reading, RobotState
 from app.cell.robot.topics import kept_s
 from app.cell.view.times import stamp_seconds, time_style, time_text
 from app.panel.base import HasTopic, TopicQos
-from app.panel.numbers import Scaled, formatted, is_beyond_battery, shown_number
+from app.panel.numbers import Scaled, WrittenNumber, formatted, is_beyond_battery, shown_number
 from app.panel.robot_texts import NO_TEXTS, RobotTexts, robot_text
+from app.panel.shared_keys import stale_at
 from app.panel.values import number_text, same_value
 from app.panel.widgets.alarm_views import AlarmLineView, AlarmListView
 from app.panel.widgets.displays import (
@@ -31,7 +32,6 @@ from app.panel.widgets.displays import (
     LogView,
     Pallet,
     Readout,
-    WrittenNumber,
 )
 from app.panel.widgets.families import Display
 from app.panel.widgets.inputs import SelectInput
@@ -145,7 +145,7 @@ def _dated(reading: Reading, value: Any, max_age_s: float | None, now: float) ->
         return FieldState("old", say(code, time=format_time(reading.wall)), value)
     if reading.status == "foreign":
         return FieldState("old", say("readout_foreign", time=format_time(reading.wall)), value)
-    until = math.inf if max_age_s is None else reading.at + max_age_s
+    until = stale_at(reading.at, max_age_s)
     if now < until:
         return FieldState("live", _received(format_time(reading.wall)), value, until)
     note = say("readout_old", age=format_age(now - reading.at))
@@ -432,9 +432,9 @@ def camera(widget: Camera, robot: RobotState, now: float) -> tuple[dict[str, Any
         return {"state": "waiting", "note": say("readout_waiting")}, math.inf
     if received.problem:
         return {"state": "unreadable", "note": received.problem}, math.inf
-    if now - received.at < widget.max_age_s:
-        shown = {"state": "live", "note": ""}
-        return shown, received.at + widget.max_age_s
+    until = stale_at(received.at, widget.max_age_s)
+    if now < until:
+        return {"state": "live", "note": ""}, until
     note = say("camera_old", age=format_age(now - received.at), time=format_time(received.wall))
     return {"state": "old", "note": note}, age_changes_at(received.at, now)
 

@@ -16,6 +16,7 @@ from app.cell.robot.definitions import DefinitionDifference, is_unhashed, uncall
 from app.cell.robot.graph import LiveGraph, cached_until_change
 from app.cell.robot.state import RobotState
 from app.panel.model import Panel
+from app.panel.shared_keys import stale_at
 from app.ros.dialects.dialect import Role
 from app.ros.dialects.peer_traits import EVERY_SENTENCES, PeerSentences
 from app.ros.messages import has_key
@@ -212,15 +213,15 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
             continue
         if topic_mismatch("MS", interlock, robot):
             continue
-        stale_at = reading.at + interlock.max_age_s
-        if now >= stale_at:
+        old_at = stale_at(reading.at, interlock.max_age_s)
+        if now >= old_at:
             limit = number(f"{interlock.max_age_s:g}")
             if has_key(interlock.field):
                 return say(
                     "link_node_stale_field", field=interlock.field, topic=interlock.subject, limit=limit
                 ), math.inf
             return say("link_node_stale", topic=interlock.subject, limit=limit), math.inf
-        until = min(until, stale_at)
+        until = min(until, old_at)
     return "", until
 
 

@@ -9,6 +9,7 @@ from app.cell.robot.tables import TableEntry, TableRows, states_of
 from app.cell.view.displays import NOTHING, cell_text, lamp_of, shown_time, topic_state
 from app.cell.view.times import time_style
 from app.panel.robot_texts import RobotTexts
+from app.panel.shared_keys import stale_at
 from app.panel.widgets.table import Column, ColumnField, Table
 from app.system.clock import age_changes_at, format_age
 from app.system.texts import TextLike, say
@@ -62,10 +63,11 @@ def _hidden(widget: Table, rows: TableRows) -> TextLike:
 
 def _age(widget: Table, entry: TableEntry, now: float) -> tuple[TextLike, float]:
     """How old an entry with a key is, and when that changes; of others the message has an age."""
-    if widget.key is None or widget.max_age_s is None:
+    if widget.key is None:
         return "", math.inf
-    if now - entry.at < widget.max_age_s:
-        return "", entry.at + widget.max_age_s
+    until = stale_at(entry.at, widget.max_age_s)
+    if now < until:
+        return "", until
     text = say("readout_old", age=format_age(now - entry.at))
     return text, age_changes_at(entry.at, now)
 

@@ -15,15 +15,15 @@ from app.panel.alarm import (
     inhibited_name,
 )
 from app.panel.checks.conditions import condition_faults
-from app.panel.checks.types import field_faults, type_fault
-from app.panel.constants import NUMBERS
+from app.panel.checks.types import entry_faults, field_faults, number_faults, type_fault
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
-from app.panel.file.wording import closest_name, list_names
+from app.panel.file.wording import closest_name, list_names, no_such
 from app.panel.model import Panel
 from app.panel.robot_panels import widget_robots
+from app.panel.shared_keys import number_key_faults
 from app.panel.template import input_ids
 from app.panel.values import number_text, same_value
-from app.panel.widgets.displays import format_fault
+from app.panel.widgets.displays import picture_faults
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
 from app.ros.messages import Interfaces, has_key
@@ -42,10 +42,8 @@ def inhibit_faults(
     for i, written in enumerate(alarm.inhibits):
         at, name = f"{place}.inhibits[{i}]", inhibited_name(written)
         if name.control not in controls:
-            near = closest_name(name.control, controls)
-            hint = f'did you mean "{near}"?' if near else f"there is {list_names(controls)}"
-            cause = f"control {name.control}"
-            yield Fault(at, f'no control "{name.control}"; {hint}', cause=cause)
+            message = no_such("control", name.control, controls)
+            yield Fault(at, message, cause=f"control {name.control}")
         elif name.control in stops:
             yield Fault(at, f'"{name.control}" stops the machine: an alarm may not lock it')
         elif name.robot:
@@ -97,7 +95,6 @@ KEYS: Final = frozenset(key for keys in OWN_KEYS.values() for key in keys)
 def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
     """The faults of all alarms. `faulty` are the ids of widgets whose faults are reported already."""
     commands = [*(widget.id for widget in panel.commands), *faulty]
-    robots = [robot.id for robot in panel.robots]
     for i, alarm in enumerate(panel.alarms):
         place = f"alarm[{i}]"
         if alarm.id.startswith(RESERVED):
@@ -109,8 +106,7 @@ def alarm_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) 
         for key, condition in (("when", alarm.when), ("while", alarm.suppressed_while)):
             if condition is not None:
                 yield from condition_faults(f"{place}.{key}", condition, interfaces)
-        yield from _reference_faults(f"{place}.robot", "robot", alarm.robot, robots)
-        yield from _reference_faults(f"{place}.picture", "picture", alarm.picture, panel.shown_pictures)
+        yield from picture_faults(f"{place}.picture", alarm.picture, panel.shown_pictures)
         yield from _source_faults(place, alarm, interfaces, panel.language)
 
 
@@ -150,15 +146,11 @@ def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[s
 
 
 def _reference_faults(
-    place: str, kind: str, names: tuple[str, ...] | str | None, known: Any
+    place: str, kind: str, name: str | None, known: Collection[str]
 ) -> Iterator[Fault]:
-    """Faults of names of things that the panel does not have."""
-    listed = isinstance(names, tuple)
-    for i, name in enumerate(names if isinstance(names, tuple) else (names,) if names else ()):
-        if name not in known:
-            at = f"{place}[{i}]" if listed else place
-            message = f'no {kind} "{name}"; there is {list_names(known)}'
-            yield Fault(at, message, cause=f"{kind} {name}")
+    """A fault of a name of something that the panel does not have."""
+    if name is not None and name not in known:
+        yield Fault(place, no_such(kind, name, known), cause=f"{kind} {name}")
 
 
 def _source_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: str) -> Iterator[Fault]:
@@ -198,15 +190,12 @@ def _limit_faults(place: str, alarm: Alarm, interfaces: Interfaces, _: str) -> I
     yield from faults
     if faults or alarm.type is None:
         return
-    faults = list(field_faults(place, alarm.type, alarm.field, interfaces))
+    who = "a limit"
+    faults = list(number_faults(place, alarm.type, alarm.field, who, interfaces))
     yield from faults
-    kind = None if faults else interfaces.field_type(alarm.type, alarm.field)
-    if kind is not None and kind not in NUMBERS:
-        yield Fault(f"{place}.field", f'"{alarm.field}" is {kind}: limits are for one number')
-    elif kind is not None:
-        yield from format_fault(place, alarm, kind)
-    if alarm.scale == 0:
-        yield Fault(f"{place}.scale", "is 0: every value would be the same")
+    if not faults:
+        kind = interfaces.field_type(alarm.type, alarm.field)
+        yield from number_key_faults(place, alarm, alarm.field, kind)
     for (below, low), (above, high) in itertools.pairwise(alarm.limits.items()):
         if low >= high:
             message = f"{number_text(high)} is not above {below} ({number_text(low)})"
@@ -255,12 +244,12 @@ def _entry_faults(
     path = getattr(listed, key)
     if path is None:
         return
-    try:
-        kind = interfaces.type_at(type_name, f"{listed.field}[0].{path}")
-    except InterfaceError as error:
-        yield Fault(place, str(error))
+    faults = list(entry_faults(place, type_name, listed.field, path, "an alarm", interfaces))
+    yield from faults
+    if faults:
         return
-    if kind.is_nested or kind.container != "one" or has_key(path):
+    kind = interfaces.type_at(type_name, f"{listed.field}[0].{path}")
+    if has_key(path):
         yield Fault(place, f'"{path}" of an entry is {kind}: it must be one value')
     elif key == "active" and kind.name != "bool":
         yield Fault(place, f'"{path}" of an entry is {kind}: it must be a bool')

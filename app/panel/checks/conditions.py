@@ -5,17 +5,13 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import value_faults
 from app.panel.condition import VALUE, Condition
-from app.panel.constants import (
-    NUMBERS,
-    comparison_value,
-    parent_type,
-    resolve_constant,
-)
+from app.panel.constants import comparison_value, parent_type, resolve_constant
 from app.panel.model import Panel
+from app.panel.numbers import NUMBERS
+from app.panel.shared_keys import number_key_faults
 from app.panel.values import same_value
-from app.panel.widgets.displays import format_fault
 from app.ros.messages import INTEGER_RANGES, Interfaces, Type, field_call
 from app.ros.messages.validation import format_value, scalar_check, unknown_constant
 from app.system.errors import Fault, FieldError
@@ -55,7 +51,8 @@ def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -
     if condition.qos.reliability == "best_effort" and condition.max_age_s is None:
         yield Fault(f"{place}.max_age_s", BEST_EFFORT)
     yield from _sentence_faults(place, condition)
-    faults = list(field_faults(place, condition.type, condition.field, interfaces))
+    who = condition.noun
+    faults = list(value_faults(place, condition.type, condition.field, who, interfaces))
     yield from faults
     if faults:
         return
@@ -63,11 +60,8 @@ def condition_faults(place: str, condition: Condition, interfaces: Interfaces) -
     if call is not None and call.name == "age" and condition.max_age_s is None:
         yield Fault(f"{place}.max_age_s", AGE_STANDS)
     kind = interfaces.type_at(condition.type, condition.field)
-    if re.search(r"[/\]]", str(kind)):
-        reason = f'"{condition.field}" is {kind}: {condition.noun} judges one value of it'
-        yield Fault(f"{place}.field", reason)
-    elif not condition.comparisons and kind.name != "bool":
-        reason = f'"{condition.field}" is {kind}: {condition.noun} {NEEDS}'
+    if not condition.comparisons and kind.name != "bool":
+        reason = f'"{condition.field}" is {kind}: {who} {NEEDS}'
         yield Fault(f"{place}.field", reason)
     else:
         yield from _comparison_faults(place, condition, kind, interfaces)
@@ -89,16 +83,12 @@ def _sentence_faults(place: str, condition: Condition) -> Iterator[Fault]:
 def _comparison_faults(
     place: str, condition: Condition, kind: Type, interfaces: Interfaces
 ) -> Iterator[Fault]:
-    numeric = kind.name in NUMBERS
-    if not numeric and (keys := _number_keys(condition)):
-        yield from (_number_only_fault(place, key, condition, kind) for key in keys)
-        return
+    faults = list(number_key_faults(place, condition, condition.field, kind.name))
     if condition.is_scaled:
-        faults = list(_scaled_faults(place, condition))
-        yield from faults
-        if faults:
-            return
-    yield from format_fault(place, condition, kind.name)
+        faults += _scaled_faults(place, condition)
+    yield from faults
+    if faults:
+        return
     alone = next((key for key in EXCLUSIVE if key in condition.comparisons), None)
     if alone and (others := [key for key in condition.comparisons if key != alone]):
         reason = f"has no meaning beside {alone}, which says all: leave it out"
@@ -107,25 +97,12 @@ def _comparison_faults(
     raw = condition.of_field()
     faults = list(_value_faults(place, raw, kind, interfaces))
     yield from faults
-    if numeric and not faults:
+    if kind.name in NUMBERS and not faults:
         yield from _unsatisfiable_faults(place, condition, raw, kind, interfaces)
 
 
-def _number_keys(condition: Condition) -> list[str]:
-    """The given keys that are for numbers only."""
-    values = {
-        "unit": condition.unit,
-        "scale": condition.scale != 1.0,
-        "offset": condition.offset,
-        "format": condition.format,
-    }
-    return [key for key, value in values.items() if value]
-
-
 def _scaled_faults(place: str, condition: Condition) -> Iterator[Fault]:
-    """Faults of a scale, and of comparisons that it can't be applied to."""
-    if condition.scale == 0:
-        yield Fault(f"{place}.scale", "is 0: every value would be the same")
+    """Faults of comparisons that a scale can't be applied to."""
     for key, compared in condition.comparisons.items():
         for value in compared if key == "one_of" else (compared,):
             if isinstance(value, bool | str):

@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
-from app.panel.constants import NUMBERS, mismatch_at
+from app.panel.constants import mismatch_at
 from app.panel.demo import DemoEntry
 from app.panel.file.keys import place_of
 from app.panel.file.wording import closest_name, list_names
 from app.panel.model import Panel
+from app.panel.numbers import NUMBERS
 from app.panel.used import used_names
 from app.panel.values import join_list, number_text
 from app.panel.widgets.parameter import Parameter, is_valid_value

@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from app.panel.file.wording import list_names
 from app.panel.layout import Page
 from app.panel.model import Panel
-from app.panel.widgets.displays import PageLink, Static
+from app.panel.widgets.displays import PageLink, Static, picture_faults
 from app.panel.widgets.families import BaseWidget, KeyCommand
 from app.system.errors import Fault, Note
 from app.system.texts.text import each_language
@@ -22,8 +21,8 @@ WITH_FACE: Final = ("publish", "call", "action", "hold")  # kinds whose button h
 
 def brand_faults(panel: Panel) -> Iterator[Fault]:
     """A logo that is not there."""
-    if panel.brand and panel.brand.logo:
-        yield from _picture_faults("brand.logo", panel.brand.logo, panel)
+    if panel.brand:
+        yield from picture_faults("brand.logo", panel.brand.logo, panel.shown_pictures)
 
 
 def help_faults(panel: Panel) -> Iterator[Fault]:
@@ -32,14 +31,7 @@ def help_faults(panel: Panel) -> Iterator[Fault]:
         place = f"interlock[{i}].help"
         if interlock.help.picture is not None:
             for name in dict.fromkeys(each_language(interlock.help.picture).values()):
-                yield from _picture_faults(f"{place}.picture", name, panel)
-
-
-def _picture_faults(place: str, name: str, panel: Panel) -> Iterator[Fault]:
-    if name not in panel.shown_pictures:
-        names = list_names(panel.shown_pictures)
-        message = f'no picture "{name}" in the folder `pictures`; there is {names}'
-        yield Fault(place, message, cause=f"picture {name}")
+                yield from picture_faults(f"{place}.picture", name, panel.shown_pictures)
 
 
 def grow_faults(panel: Panel) -> Iterator[Fault]:

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from app.panel.base import Description
 from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS
-from app.panel.file.wording import list_names
+from app.panel.file.wording import list_names, no_such
+from app.panel.numbers import NUMBERS
 from app.panel.recipe import ParameterKind, RecipeReadback, RecipeSet
 from app.panel.widgets.families import CheckContext, Command, Input
 from app.panel.widgets.parameter import is_valid_value
@@ -72,8 +72,7 @@ def _field_faults(table: RecipeSet, place: str, checking: CheckContext) -> Itera
         if name in table.fields[:i]:
             yield Fault(f"{place}.fields[{i}]", f'names "{name}" twice')
         elif name not in checking.all_inputs:
-            there = list_names(sorted(checking.all_inputs))
-            message = f'no input "{name}" on any page; there is {there}'
+            message = no_such("input", name, sorted(checking.all_inputs), " on any page")
             yield Fault(f"{place}.fields[{i}]", message, cause=f"input {name}")
 
 

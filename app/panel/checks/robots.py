@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Final
 
-from app.panel.constants import NUMBERS
-from app.panel.file.wording import closest_name, list_names
+from app.panel.file.wording import no_such
 from app.panel.model import Panel, RobotEntry
+from app.panel.numbers import NUMBERS
 from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.times import TIME_FORMATS
@@ -46,9 +46,7 @@ def robot_name_faults(panel: Panel) -> Iterator[Fault]:
             message = "this panel has one robot: it is of [[robot]] tables, which are missing"
             yield Fault(f"{place}.robot", message, cause=f"robot {robot}")
         elif robot is not None and robot not in known:
-            meant = closest_name(robot, known)
-            hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(known)}"
-            yield Fault(f"{place}.robot", f'no robot "{robot}"; {hint}', cause=f"robot {robot}")
+            yield Fault(f"{place}.robot", no_such("robot", robot, known), cause=f"robot {robot}")
 
 
 def overview_faults(panel: Panel) -> Iterator[Fault]:
@@ -133,6 +131,7 @@ def _named_robots(panel: Panel) -> Iterator[tuple[str, str | None]]:
     """(place, robot) of each table that may name one."""
     yield from ((f"interlock[{i}]", interlock.robot) for i, interlock in enumerate(panel.interlocks))
     yield from ((f"condition[{c}]", each.robot) for c, each in enumerate(panel.own_conditions))
+    yield from ((f"alarm[{a}]", alarm.robot) for a, alarm in enumerate(panel.alarms))
     yield from ((f"frame.widget[{w}]", each.robot) for w, each in enumerate(panel.frame.widgets))
     for p, page in enumerate(panel.pages):
         yield f"page[{p}]", page.robot

@@ -244,8 +244,10 @@ def _types(annotation: Any) -> Iterator[type]:
 
 
 def known_keys(model: Model) -> list[str]:
-    """The keys of a description, and `source` where a source may stand in place of a topic."""
+    """The keys of a description, the id first, and `source` where a source may stand in place of a
+    topic."""
     keys = [about.alias or name for name, about in model.model_fields.items() if not about.exclude]
+    keys.sort(key=lambda key: key != "id")
     return [*keys, SOURCE] if reads_source(model) else keys
 
 

@@ -154,6 +154,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
             group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
         ]
         pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
+    frame = panel.frame.model_copy(update={"widgets": resolved(panel.frame.widgets)})
     interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
     conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
     state = panel.state and panel.state.with_constants(interfaces)
@@ -163,6 +164,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         "own_conditions": conditions,
         "alarms": alarms,
         "state": state,
+        "frame": frame,
     }
     return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
 

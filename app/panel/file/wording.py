@@ -130,6 +130,14 @@ def closest_name(name: str, known: Iterable[str]) -> str:
     return next(iter(get_close_matches(name, list(known), n=1, cutoff=NAME_SIMILARITY)), "")
 
 
+def no_such(kind: str, name: str, known: Iterable[str], where: str = "") -> str:
+    """The message about a name of nothing that the panel has."""
+    names = list(known)
+    meant = closest_name(name, names)
+    hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(names)}"
+    return f'no {kind} "{name}"{where}; {hint}'
+
+
 def one_of(known: list[str], value: Any) -> str:
     """The message about a value that is none of the known ones."""
     *others, last = (f'"{name}"' for name in known)

@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from app.panel.file.wording import list_names
+from app.panel.base import Rows, distinct
+from app.panel.file.wording import no_such
+from app.panel.shared_keys import Priorities
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
@@ -18,25 +20,13 @@ def _parse_groups(value: Any) -> tuple[str, ...]:
     groups = [value] if isinstance(value, str) else value
     if not isinstance(groups, list | tuple) or not all(isinstance(g, str) and g for g in groups):
         raise ValueError(f"must be a group of alarms, or a list of groups, not {format_value(value)}")
-    return _unique(tuple(groups))
-
-
-def _unique(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not values:
-        raise ValueError("is empty: leave the key out for all")
-    for i, value in enumerate(values):
-        if value in values[:i]:
-            raise ValueError(f"has {format_value(value)} twice")
-    return values
+    return distinct(tuple(groups))
 
 
 Groups = Annotated[
     tuple[str, ...],
     BeforeValidator(_parse_groups),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
-Priorities = Annotated[
-    tuple[Annotated[int, Field(ge=1, le=4)], ...], Field(strict=False), AfterValidator(_unique)
 ]
 
 
@@ -57,10 +47,8 @@ class AlarmView(DisplayWidget):
         for i, group in enumerate(self.group):
             if group not in checking.alarm_groups:
                 at = f"{place}.group[{i}]" if len(self.group) > 1 else f"{place}.group"
-                message = f'no alarm is of the group "{group}"; there is'
-                yield Fault(
-                    at, f"{message} {list_names(checking.alarm_groups)}", cause=f"group {group}"
-                )
+                message = no_such("group of alarms", group, checking.alarm_groups)
+                yield Fault(at, message, cause=f"group {group}")
 
 
 class AlarmListView(AlarmView):
@@ -68,7 +56,7 @@ class AlarmListView(AlarmView):
 
     kind: Literal["alarm_list"]
     lines: Annotated[int, Field(ge=1, le=MOST_LINES)] = 10
-    rows: Annotated[int, Field(ge=1, le=8)] = 3
+    rows: Rows = 3
 
 
 class AlarmLineView(AlarmView):

@@ -14,17 +14,18 @@ from app.panel.base import (
     Id,
     Interlocks,
     Label,
+    Rows,
     Seconds,
     Span,
     TopicName,
     TopicQos,
     non_empty,
 )
-from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS, HasField, parent_type, value_mismatch
-from app.panel.file.wording import list_names
-from app.panel.numbers import FORMAT, Factor
-from app.panel.times import DEFAULT_FORMATS, time_faults
+from app.panel.checks.types import value_faults
+from app.panel.constants import HasField, parent_type, value_mismatch
+from app.panel.file.wording import list_names, no_such
+from app.panel.shared_keys import AgeKey, FieldKeys, NumberKeys, NumberOrTimeFormat, number_key_faults
+from app.panel.times import DEFAULT_FORMATS
 from app.panel.widgets.families import (
     BaseWidget,
     CheckContext,
@@ -34,7 +35,7 @@ from app.panel.widgets.families import (
     TopicSource,
     TopicWidget,
 )
-from app.panel.widgets.numbers import MAX_EXACT_NUMBER, Unit
+from app.panel.widgets.numbers import MAX_EXACT_NUMBER
 from app.panel.widgets.templated import TemplateCommand
 from app.ros.messages import INTEGER_RANGES, Interfaces, Type
 from app.ros.messages.validation import fitting_constants, format_value, unknown_constant
@@ -45,27 +46,22 @@ from app.system.texts.text import alike
 
 # The descriptions of displays: readouts and lamps.
 
-CONSTANTS: Final = r"^([A-Z][A-Z0-9_]*)?$"  # what names begin with; "" for all
-# The same, or a time: see `app.panel.times`.
-FORMAT_OR_TIME: Final = rf"{FORMAT}|^(time|age|duration)$"
+# What names of constants begin with; "" for all.
+ConstantPrefix = Annotated[str, Field(pattern=r"^([A-Z][A-Z0-9_]*)?$")]
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
 
-class Readout(Display):
+class Readout(NumberKeys, Display):
     """Shows a field as `value * scale + offset` in a format, as a time, or as a constant's name."""
 
     whole_types: ClassVar[Collection[str]] = DEFAULT_FORMATS.keys()
 
     kind: Literal["readout"]
-    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
-    constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
+    format: NumberOrTimeFormat | None = None
+    constants: ConstantPrefix | None = None
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        times = list(time_faults(place, self.format, field_type, self.unit))
-        yield from times or _number_faults(place, self, field_type)
+        yield from number_key_faults(place, self, self.field, field_type)
         yield from constant_faults(place, self, interfaces)
 
 
@@ -88,24 +84,37 @@ class LampState(Description):
     colour: Literal["grey", "white", "black", "blue", "yellow", "red"] = "grey"
 
 
-class Indicator(Display):
+States = Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
+
+
+class StatesKey(FieldKeys):
+    """A state for each value of a field."""
+
+    states: States
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        """The same with values in place of constants' names."""
+        return self.model_copy(update={"states": resolved_states(self, interfaces)})
+
+
+class Indicator(StatesKey, Display):
     """A lamp with a state for each value. A value without a state is shown as unknown."""
 
     kind: Literal["indicator"]
-    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
     span: Span = 4
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         yield from state_faults(place, self, field_type, interfaces, "an indicator")
 
-    def with_constants(self, interfaces: Interfaces) -> Self:
-        kind = interfaces.field_type(self.type, self.field)
-        constants = interfaces.constants(parent_type(self, interfaces))
-        states = [
-            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
-            for state in self.states
-        ]
-        return self.model_copy(update={"states": tuple(states)})
+
+def resolved_states(table: "HasStates", interfaces: Interfaces) -> tuple[LampState, ...]:
+    """The states of a table with values in place of constants' names."""
+    kind = interfaces.field_type(table.type, table.field)
+    constants = interfaces.constants(parent_type(table, interfaces))
+    return tuple(
+        state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
+        for state in table.states
+    )
 
 
 def resolve_state_value(value: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
@@ -118,43 +127,6 @@ def resolve_state_value(value: bool | int | str, kind: str, constants: Mapping[s
 
 def _same_look(look: tuple[str, TextLike], other: tuple[str, TextLike]) -> bool:
     return look[0] == other[0] and alike(look[1], other[1])
-
-
-def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
-    scaled = (readout.scale, readout.offset) != (1.0, 0.0)
-    style = None if kind in DEFAULT_FORMATS else readout.format
-    for key, setting in (("format", style), ("scale", scaled), ("unit", readout.unit)):
-        if setting and kind not in NUMBERS:
-            message = f'is for numbers; "{readout.field}" is {kind}'
-            yield Fault(f"{place}.{key}", message, cause=f"number {place}")
-        elif setting and readout.constants is not None:
-            message = "is for numbers; constants are shown by their names"
-            yield Fault(f"{place}.{key}", message, cause=f"number {place}")
-    yield from format_fault(place, readout, kind)
-
-
-class WrittenNumber(Protocol):
-    """What is written with a format."""
-
-    @property
-    def format(self) -> str | None: ...
-    @property
-    def scale(self) -> float: ...
-    @property
-    def offset(self) -> float: ...
-
-
-def format_fault(place: str, widget: WrittenNumber, kind: str) -> Iterator[Fault]:
-    """A fault of a format for whole numbers, where the number is none."""
-    scaled = (widget.scale, widget.offset) != (1.0, 0.0)
-    if (
-        widget.format
-        and widget.format.endswith("d")
-        and kind in NUMBERS
-        and (scaled or kind not in INTEGER_RANGES)
-    ):
-        kind_text = "a scaled number" if scaled else kind
-        yield Fault(f"{place}.format", f'"{widget.format}" is for whole numbers; this is {kind_text}')
 
 
 class NamedByConstants(HasField, Protocol):
@@ -246,41 +218,19 @@ def number_or_table(value: Any, validate: Any) -> Any:
     raise ValueError(f"must be {expected}, not {format_value(value)}")
 
 
-def number_field_faults(
-    place: str, source: TopicField, noun: str, interfaces: Interfaces
-) -> Iterator[Fault]:
-    """Faults of a field that must be one number; `noun` names it, with its article."""
-    faults = list(field_faults(place, source.type, source.field, interfaces))
-    yield from faults
-    if not faults and (field_type := interfaces.field_type(source.type, source.field)) not in NUMBERS:
-        yield Fault(f"{place}.field", f'"{source.field}" is {field_type}: {noun} is a number')
-
-
 # A lamp on a button: what the robot itself reports, whatever was pressed.
 
 
-class KeyLamp(TopicField):
+class KeyLamp(StatesKey, TopicField):
     """A state for each value of the field that the robot reports."""
-
-    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
 
     def faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
         """Faults of the table at `place`."""
-        faults = list(field_faults(place, self.type, self.field, interfaces))
+        faults = list(value_faults(place, self.type, self.field, "a lamp", interfaces))
         yield from faults
         if not faults:
             kind = interfaces.field_type(self.type, self.field)
             yield from state_faults(place, self, kind, interfaces, "a lamp")
-
-    def with_constants(self, interfaces: Interfaces) -> Self:
-        """The lamp with values in place of constants' names."""
-        kind = interfaces.field_type(self.type, self.field)
-        constants = interfaces.constants(parent_type(self, interfaces))
-        states = tuple(
-            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
-            for state in self.states
-        )
-        return self.model_copy(update={"states": states})
 
 
 class LampCommand(TemplateCommand):
@@ -309,7 +259,7 @@ class LampCommand(TemplateCommand):
 PictureType = Literal["sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"]
 
 
-class Camera(TopicWidget, DisplayWidget):
+class Camera(AgeKey, TopicWidget, DisplayWidget):
     """Shows the newest picture of a topic, which is subscribed to only while a browser shows it.
 
     One older than `max_age_s` is marked as old; of one with more than `max_bytes`, or more than
@@ -325,7 +275,7 @@ class Camera(TopicWidget, DisplayWidget):
     max_bytes: Annotated[int, Field(ge=1_000, le=64_000_000)] = 8_000_000
     max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 4096
     span: Span = 6
-    rows: Annotated[int, Field(ge=1, le=8)] = 2
+    rows: Rows = 2
 
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, (), on_demand=True)
@@ -358,7 +308,7 @@ class LogView(TopicWidget, DisplayWidget):
     keep: Annotated[int, Field(ge=100, le=10_000)] = 1_000
     own: bool = False
     span: Span = 12
-    rows: Annotated[int, Field(ge=1, le=8)] = 3
+    rows: Rows = 3
 
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, ())
@@ -390,6 +340,9 @@ class Pallet(Display):
 # What only stands on a page: texts, pictures, links to other pages.
 
 
+PictureName = Annotated[str, Field(pattern=PICTURE)]
+
+
 class Static(BaseWidget):
     """A widget that never changes."""
 
@@ -405,13 +358,10 @@ class Picture(Static):
     """A picture from the panel's folder of pictures; its `label` says what it shows."""
 
     kind: Literal["image"]
-    src: Annotated[str, Field(pattern=PICTURE)]
+    src: PictureName
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        if self.src not in checking.pictures:
-            there = list_names(checking.pictures)
-            message = f'"{self.src}" is not among the pictures; there is {there}'
-            yield Fault(f"{place}.src", message, cause=f"picture {self.src}")
+        yield from picture_faults(f"{place}.src", self.src, checking.pictures)
 
 
 class PageLink(Static):
@@ -423,20 +373,25 @@ class PageLink(Static):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.page not in checking.pages:
-            message = f'no page "{self.page}"; there is {list_names(checking.pages)}'
+            message = no_such("page", self.page, checking.pages)
             yield Fault(f"{place}.page", message, cause=f"page {self.page}")
 
 
 # A check list of interlocks and conditions.
 
 
-def name_faults(place: str, widget: DisplayWidget, checking: CheckContext) -> Iterator[Fault]:
-    """Faults of an id in a list at `place` that is of no condition."""
-    known = list_names(checking.conditions)
-    for name in widget.named_conditions:
-        if name not in checking.conditions:
-            message = f'no interlock or condition "{name}"; there is {known}'
-            yield Fault(place, message, cause=f"interlock {name}")
+def name_faults(place: str, name: str, checking: CheckContext) -> Iterator[Fault]:
+    """A fault of an id that is of no condition."""
+    if name not in checking.conditions:
+        message = no_such("interlock or condition", name, checking.conditions)
+        yield Fault(place, message, cause=f"interlock {name}")
+
+
+def picture_faults(place: str, name: str | None, pictures: Collection[str]) -> Iterator[Fault]:
+    """A fault of the name of a picture that is not there."""
+    if name is not None and name not in pictures:
+        message = no_such("picture", name, pictures, " in the folder `pictures`")
+        yield Fault(place, message, cause=f"picture {name}")
 
 
 class Conditions(DisplayWidget):
@@ -459,4 +414,5 @@ class Conditions(DisplayWidget):
         yield from ()  # the panel listens to its conditions
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        yield from name_faults(f"{place}.conditions", self, checking)
+        for name in self.conditions:
+            yield from name_faults(f"{place}.conditions", name, checking)

@@ -7,26 +7,23 @@ send. Tables of other rooms say how a kind is shown, permitted and sent.
 from abc import abstractmethod
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field
 
 from app.panel.base import (
-    Description,
-    FieldPath,
     Icon,
     Id,
     Interlocks,
     Label,
     Note,
-    Seconds,
+    Rows,
     Span,
-    TopicName,
     TopicQos,
-    Type,
 )
-from app.panel.checks.types import field_faults, whole_field
-from app.panel.file.wording import list_names
+from app.panel.checks.types import value_faults
+from app.panel.file.wording import no_such
+from app.panel.shared_keys import AgeKey, FieldKeys, NeedsKey, RobotKey, TopicKeys
 from app.panel.widgets.key_parts import (
     COLOURS,
     ICONS,
@@ -86,7 +83,7 @@ class TopicSource(NamedTuple):
     on_demand: bool = False
 
 
-class BaseWidget(Description):
+class BaseWidget(RobotKey):
     """The keys of every widget: `span` and `rows` are its size in the grid of its group; with `grow`
     its row takes the height that is left. Without `show_label` its label is only read aloud."""
 
@@ -94,9 +91,8 @@ class BaseWidget(Description):
     label: Label
     show_label: bool = True
     span: Span = 12
-    rows: Annotated[int, Field(ge=1, le=8)] = 1
+    rows: Rows = 1
     grow: bool = False
-    robot: Id | None = None  # by default the group's, else the page's
     kind: str
     why_needed: ClassVar[Mapping[str, str]] = {}  # why a key is required, if that is not obvious
     required_types: ClassVar[tuple[str, ...]] = ()  # that the server needs for this kind
@@ -163,22 +159,12 @@ class Input(EntryWidget):
         return format_value(value) if narrow else self.value_description
 
 
-class TopicWidget(BaseWidget):
+class TopicWidget(TopicKeys, BaseWidget):
     """A widget that publishes or shows a topic."""
 
-    topic: TopicName
-    type: Type
-    qos: TopicQos = TopicQos()
 
-
-class TopicField(Description):
+class TopicField(AgeKey, FieldKeys):
     """A field of a topic that a widget reads beside or instead of its topic."""
-
-    topic: TopicName
-    type: Type
-    field: FieldPath = "data"
-    max_age_s: Seconds | None = None
-    qos: TopicQos = TopicQos()
 
     def source(self, place: str) -> TopicSource:
         """Its topic; `place` is its table below the widget's."""
@@ -204,41 +190,33 @@ class DisplayWidget(BaseWidget):
         return ()
 
 
-class Display(TopicWidget, DisplayWidget):
+class Display(AgeKey, FieldKeys, TopicWidget, DisplayWidget):
     """A field of a topic that is shown; a value older than `max_age_s` is marked as old."""
 
     whole_types: ClassVar[Collection[str]] = ()  # of several fields, shown as one value
-    field: FieldPath = "data"
-    max_age_s: Seconds | None = None
 
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, (self.field,))
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        who = f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}"
         interfaces = checking.interfaces
-        faults = list(field_faults(place, self.type, self.field, interfaces))
+        faults = list(value_faults(place, self.type, self.field, who, interfaces, self.whole_types))
         yield from faults
-        if faults:
-            return
-        field_type = interfaces.type_at(self.type, self.field)
-        is_several = field_type.is_nested and str(field_type) not in self.whole_types
-        if is_several or field_type.container != "one":
-            message = whole_field(self.field, field_type, self.kind, interfaces)
-            yield Fault(f"{place}.field", message)
-        else:
-            yield from self.value_faults(place, str(field_type), interfaces)
+        if not faults:
+            field_type = interfaces.field_type(self.type, self.field)
+            yield from self.value_faults(place, field_type, interfaces)
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         """Faults with a field of this type, which is a single value."""
         yield from ()
 
 
-class Command(BaseWidget):
+class Command(NeedsKey, BaseWidget):
     """A widget that sends commands to the robot while its interlocks permit. `needs`: the role or group
     of users that may press it."""
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
-    needs: Id | None = None
 
     def sources(self) -> Iterator[TopicSource]:
         """The topics whose values it needs, beside its interlocks'."""
@@ -255,7 +233,7 @@ class Command(BaseWidget):
         for i, name in enumerate(self.interlocks):
             if name not in checking.interlocks:
                 at = f"[{i}]" if len(self.interlocks) > 1 else ""
-                message = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
+                message = no_such("interlock", name, checking.interlocks)
                 yield Fault(f"{place}.interlock{at}", message, cause=f"interlock {name}")
 
 

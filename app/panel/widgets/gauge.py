@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
-from app.panel.base import Label, Span
-from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS
-from app.panel.numbers import FORMAT, Factor
+from app.panel.base import FiniteNumber, Label, Span
+from app.panel.checks.types import number_faults, value_faults
+from app.panel.numbers import NUMBERS
+from app.panel.shared_keys import NumberFormat, NumberKeys, ScaleKeys, number_key_faults, scale_faults
 from app.panel.values import number_text
-from app.panel.widgets.displays import OrNumber, format_fault, number_field_faults, number_or_table
+from app.panel.widgets.displays import OrNumber, number_or_table
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
-from app.panel.widgets.numbers import Number, Unit
+from app.panel.widgets.numbers import Number
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
@@ -26,11 +26,21 @@ from app.system.texts.text import each_language
 APART: Final = 12.0  # percent of the scale between two figures
 
 
-class SetpointField(TopicField):
-    """A set-point that the robot reports. Without `scale` and `offset` it has those of the gauge."""
+class NumberBeside(TopicField):
+    """A number that the robot reports. Without `scale` and `offset` it has those of the number that it
+    stands beside."""
 
-    scale: Factor | None = None
-    offset: Factor | None = None
+    scale: FiniteNumber | None = None
+    offset: FiniteNumber | None = None
+
+    def faults(self, place: str, who: str, interfaces: Interfaces) -> Iterator[Fault]:
+        """Faults of the table at `place`, which is `who` ("a target")."""
+        yield from number_faults(place, self.type, self.field, who, interfaces)
+        yield from scale_faults(place, self.scale)
+
+
+class SetpointField(NumberBeside):
+    """A set-point that the robot reports."""
 
 
 if TYPE_CHECKING:
@@ -49,7 +59,7 @@ TWO: Final = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxI
 Band = Annotated[tuple[Number, Number], BeforeValidator(_check_normal), WithJsonSchema(TWO)]
 
 
-class Gauge(Display):
+class Gauge(NumberKeys, Display):
     """Shows a number between `min` and `max`. The limits are those of ISA-18.2: a value beyond `low` or
     `high` is abnormal, one beyond `low_low` or `high_high` is critical. All are in the shown unit."""
 
@@ -62,10 +72,6 @@ class Gauge(Display):
     high: Number | None = None
     high_high: Number | None = None
     setpoint: Setpoint | None = None
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
     orientation: Literal["vertical", "horizontal"] = "vertical"
     span: Span = 4
 
@@ -103,14 +109,13 @@ class Gauge(Display):
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
         if isinstance(self.setpoint, SetpointField):
-            at = f"{place}.setpoint"
-            yield from number_field_faults(at, self.setpoint, "a set-point", checking.interfaces)
+            yield from self.setpoint.faults(f"{place}.setpoint", "a set-point", checking.interfaces)
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         if field_type not in NUMBERS:
             yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a gauge is for numbers')
             return
-        yield from format_fault(place, self, field_type)
+        yield from number_key_faults(place, self, self.field, field_type)
         yield from _order_faults(place, self)
 
 
@@ -155,11 +160,8 @@ VALUE: Final = "{value}"
 MAX_LINES: Final = 2
 
 
-class TargetField(TopicField):
-    """A target that the robot reports. Without `scale` and `offset` it has those of the figure."""
-
-    scale: Factor | None = None
-    offset: Factor | None = None
+class TargetField(NumberBeside):
+    """A target that the robot reports."""
 
 
 if TYPE_CHECKING:
@@ -168,25 +170,19 @@ else:
     Target = Annotated[TargetField, WrapValidator(number_or_table), OrNumber()]
 
 
-class FigureLine(TopicField):
+class FigureLine(ScaleKeys, TopicField):
     """A further value beside the number: `text` says it, with `{value}` in it."""
 
     text: Label
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    scale: Factor = 1.0
-    offset: Factor = 0.0
+    format: NumberFormat | None = None
 
 
-class Figure(Display):
+class Figure(NumberKeys, Display):
     """Shows a number large, and of `target` how far it is: a bar of `segments` parts, 0 for none."""
 
     kind: Literal["figure"]
     target: Target | None = None
     segments: Annotated[int, Field(ge=0, le=24)] = 1
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
     lines: Annotated[tuple[FigureLine, ...], Field(strict=False, max_length=MAX_LINES)] = Field(
         (), alias="line"
     )
@@ -211,7 +207,7 @@ class Figure(Display):
         yield from super().faults(place, checking)
         interfaces = checking.interfaces
         if isinstance(self.target, TargetField):
-            yield from number_field_faults(f"{place}.target", self.target, "a target", interfaces)
+            yield from self.target.faults(f"{place}.target", "a target", interfaces)
         elif self.target is not None and self.target <= 0:
             yield Fault(f"{place}.target", f"{number_text(self.target)} must be more than 0")
         for number, line in enumerate(self.lines):
@@ -221,7 +217,7 @@ class Figure(Display):
         if field_type not in NUMBERS:
             yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a figure is a number')
             return
-        yield from format_fault(place, self, field_type)
+        yield from number_key_faults(place, self, self.field, field_type)
 
 
 def _line_faults(place: str, line: FigureLine, interfaces: Interfaces) -> Iterator[Fault]:
@@ -229,14 +225,8 @@ def _line_faults(place: str, line: FigureLine, interfaces: Interfaces) -> Iterat
     if lacking:
         message = f'"{lacking[0]}" must have {VALUE} once, like "{VALUE} min left"'
         yield Fault(f"{place}.text", message)
-    faults = list(field_faults(place, line.type, line.field, interfaces))
+    faults = list(value_faults(place, line.type, line.field, "a line", interfaces))
     yield from faults
-    if faults:
-        return
-    kind = interfaces.type_at(line.type, line.field)
-    if kind.is_nested or kind.container != "one":
-        yield Fault(f"{place}.field", f'"{line.field}" is {kind}: a line shows one value of it')
-    elif line.format and str(kind) not in NUMBERS:
-        yield Fault(f"{place}.format", f'is for numbers; "{line.field}" is {kind}')
-    else:
-        yield from format_fault(place, line, str(kind))
+    if not faults:
+        kind = interfaces.field_type(line.type, line.field)
+        yield from number_key_faults(place, line, line.field, kind)

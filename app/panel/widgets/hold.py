@@ -7,14 +7,14 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from app.panel.base import Description, Interlocks, Span, WrittenField
+from app.panel.base import Description, Interlocks, Rows, Span, WrittenField
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
+from app.panel.shared_keys import Unit
 from app.panel.template import set_field
 from app.panel.values import number_text
 from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand, SentMessage
 from app.panel.widgets.key_parts import ConfirmationKeys, KeyRole
-from app.panel.widgets.numbers import Unit
 from app.ros.messages import Interfaces
 from app.system.errors import Fault, FieldError, InterfaceError
 
@@ -187,17 +187,20 @@ TWIST: Final[Mapping[str, Any]] = {"linear": {"x": "{y}"}, "angular": {"z": "{x}
 TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 
 
+Deflection = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+
+
 class Axis(Description):
     """`max` is the value at full deflection; a negative one turns the axis around."""
 
-    max: Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)] = 1.0
+    max: Deflection = 1.0
     unit: Unit = ""
 
 
 class SideAxis(Axis):
     """The axis to the right. As ROS counts turns, its value is negative there."""
 
-    max: Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)] = -1.0
+    max: Deflection = -1.0
 
 
 class Joystick(HoldCommand):
@@ -216,7 +219,7 @@ class Joystick(HoldCommand):
     dead_zone: Annotated[float, Field(ge=0, le=0.9)] = 0.1
     ramp_s: Annotated[float, Field(ge=0, le=10)] = 0.0
     frame_id: Annotated[str, Field(max_length=100)] = "base_link"
-    rows: Annotated[int, Field(ge=1, le=8)] = 3
+    rows: Rows = 3
 
     @property
     def template(self) -> Mapping[str, Any]:

@@ -7,10 +7,10 @@ from typing import Annotated, Final, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Label, MessageField, Seconds, Span, TopicName, Type, non_empty
+from app.panel.base import Description, Label, MessageField, Span, TopicName, Type, non_empty
 from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS
-from app.panel.numbers import FORMAT
+from app.panel.numbers import NUMBERS
+from app.panel.shared_keys import AgeKey, NumberFormat, number_key_faults
 from app.panel.values import number_text
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.numbers import Number
@@ -93,7 +93,7 @@ class Joint(Description):
         return round(100 * min(max(part, 0.0), 1.0), 1)
 
 
-class Joints(TopicWidget, DisplayWidget):
+class Joints(AgeKey, TopicWidget, DisplayWidget):
     """Shows the elements of a list of numbers (`field`) that have the names of joints in the list
     `names` beside it."""
 
@@ -107,8 +107,7 @@ class Joints(TopicWidget, DisplayWidget):
         Field(strict=False, alias="joint", max_length=MAX_JOINTS),
         AfterValidator(non_empty),
     ]
-    format: Annotated[str, Field(pattern=FORMAT)] = "+.1f"
-    max_age_s: Seconds | None = None
+    format: NumberFormat = "+.1f"
     span: Span = 6
 
     def path(self, joint: Joint) -> str:
@@ -139,6 +138,7 @@ class Joints(TopicWidget, DisplayWidget):
         if numbers.container == "one" or numbers.name not in NUMBERS:
             yield Fault(f"{place}.field", f'"{self.field}" is {numbers}: joints are a list of numbers')
             return
+        yield from number_key_faults(place, self, self.field, "float64")  # in radians or metres
         around, dot, _ = self.field.rpartition(".")
         named = list(field_faults(place, self.type, f"{around}{dot}{self.names}", interfaces))
         yield from (Fault(f"{place}.names", fault.message) for fault in named)

@@ -2,27 +2,24 @@
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from app.panel.base import Span, panel_text
+from app.panel.base import Span
 from app.panel.numbers import Conversion, conversion, is_on_step, step_fault, units_like
+from app.panel.shared_keys import Unit
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault, InputError
-from app.system.texts import PanelText, Text, TextLike, number, say
+from app.system.texts import Text, TextLike, number, say
 from app.system.texts.locales import clear_text, is_unclear, lone_group, read_number
 from app.system.texts.text import after_space, number_like
 
 MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this, numbers of a browser are not exact
 
 Number = Annotated[float, Field(ge=-MAX_EXACT_NUMBER, le=MAX_EXACT_NUMBER)]
-if TYPE_CHECKING:
-    Unit = str | PanelText
-else:
-    Unit = panel_text(20, least=0)
 
 
 def no_number(label: TextLike, limits: TextLike, value: Any, *, whole: bool) -> Text:

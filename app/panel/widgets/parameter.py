@@ -16,10 +16,11 @@ from app.panel.base import (
     catalogue_default,
 )
 from app.panel.numbers import Range, decimal_text, step_fault
+from app.panel.shared_keys import Unit
 from app.panel.values import join_list, number_text, quote_element, same_value
 from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand, SentMessage
 from app.panel.widgets.inputs import BOOL_TEXTS, Option, SelectInput, option_faults
-from app.panel.widgets.numbers import Number, SteppedWidget, Unit
+from app.panel.widgets.numbers import Number, SteppedWidget
 from app.ros.dialects.dialect import Role
 from app.ros.messages import INTEGER_RANGES, Interfaces
 from app.ros.messages.names import PARAMETER_EVENTS

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from app.panel.base import Description, FieldPath, Seconds, Span, TopicName, Type
+from app.panel.base import Seconds, Span, TopicName, Type
 from app.panel.checks.templates import NOW_RULE, example_values, unknown_input_faults
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import number_faults, value_faults
 from app.panel.constants import mismatch_at
-from app.panel.numbers import FORMAT, to_float32
+from app.panel.numbers import to_float32
+from app.panel.shared_keys import FieldKey, NumberFormat, Unit, number_key_faults
 from app.panel.template import NOW, fill, placeholder_ids, placeholders
 from app.panel.values import number_text
-from app.panel.widgets.displays import LampCommand, number_field_faults
+from app.panel.widgets.displays import LampCommand
 from app.panel.widgets.families import (
     CheckContext,
     EntryWidget,
@@ -22,7 +23,7 @@ from app.panel.widgets.families import (
     TopicField,
     TopicSource,
 )
-from app.panel.widgets.numbers import Number, NumberInput, SteppedWidget, Unit
+from app.panel.widgets.numbers import Number, NumberInput, SteppedWidget
 from app.panel.widgets.templated import TemplateCommand
 from app.ros.messages import Interfaces
 from app.system.errors import Fault, FieldError
@@ -32,13 +33,12 @@ from app.system.texts.locales import read_number
 # Commands that publish a message once, and the confirmation of their effect.
 
 
-class Confirm(Description):
+class Confirm(FieldKey):
     """A field that confirms the effect of a command: it must have the value `equals` (or that of an
     input, `"{id}"`) within `within_s`. The default type is that of the topic elsewhere in the panel."""
 
     topic: TopicName
     type: Type | None = None
-    field: FieldPath = "data"
     equals: Any
     within_s: Seconds = 2.0
 
@@ -112,20 +112,13 @@ def confirm_faults(
             message = f"is missing; on {own_topic} this button publishes: name where the robot answers"
         yield Fault(f"{place}.type", message, cause=f"listens {confirm.topic}")
         return
-    faults = list(field_faults(place, known, confirm.field, checking.interfaces))
-    yield from faults
-    if not faults:
-        kind = checking.interfaces.field_type(known, confirm.field)
-        yield from _equals_faults(place, confirm, known, kind, checking)
+    faults = list(value_faults(place, known, confirm.field, "a confirmation", checking.interfaces))
+    yield from faults or _equals_faults(place, confirm, known, checking)
 
 
 def _equals_faults(
-    place: str, confirm: Confirm, type_name: str, kind: str, checking: CheckContext
+    place: str, confirm: Confirm, type_name: str, checking: CheckContext
 ) -> Iterator[Fault]:
-    if re.search(r"[/\]]", kind):
-        message = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
-        yield Fault(f"{place}.field", message)
-        return
     try:
         names = list(placeholders(confirm.equals, "equals"))
     except FieldError as error:
@@ -167,7 +160,7 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
     max: Number
     step: Annotated[Number, Field(gt=0)]
     unit: Unit = ""
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    format: NumberFormat | None = None
     within_s: Seconds = 2.0
     span: Span = 6
 
@@ -237,7 +230,16 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
             named = ", ".join(f"{{{name}}}" for name in placeholder_ids([self.message]))
             instead = f'; write "{{value}}" in place of {named}' if named else ""
             yield Fault(message, f'has no "{{value}}": every press would publish the same{instead}')
-        yield from number_field_faults(f"{place}.value", self.value, "a value", checking.interfaces)
+        yield from self._value_faults(place, checking.interfaces)
+
+    def _value_faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
+        """Faults of the reported field, and of the format of its numbers."""
+        at, source = f"{place}.value", self.value
+        faults = list(number_faults(at, source.type, source.field, "a value", interfaces))
+        yield from faults
+        if not faults:
+            kind = interfaces.field_type(source.type, source.field)
+            yield from number_key_faults(place, self, source.field, kind)
 
     def _as_number(self) -> NumberInput:
         """An input with the same limits, for texts and to try the message with."""

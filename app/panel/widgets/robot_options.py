@@ -8,7 +8,6 @@ from typing import Annotated, Any, Final, NamedTuple
 from pydantic import AfterValidator, Field, TypeAdapter
 
 from app.panel.base import (
-    Description,
     MessageField,
     MessageOrServiceType,
     NodeName,
@@ -18,6 +17,7 @@ from app.panel.base import (
     TopicQos,
 )
 from app.panel.checks.types import field_faults, type_fault
+from app.panel.shared_keys import AgeKey
 from app.panel.template import placeholders
 from app.panel.widgets.families import TopicSource
 from app.ros.dialects.dialect import Role
@@ -71,7 +71,7 @@ class ListingService(NamedTuple):
     request: str = "{}"
 
 
-class RobotOptions(Description):
+class RobotOptions(AgeKey):
     """A list of texts of the robot: a field of a topic or of a service's answer, or a parameter; with
     `range` the whole numbers that the parameter's integer range allows.
 
@@ -87,7 +87,6 @@ class RobotOptions(Description):
     type: MessageOrServiceType | None = None
     field: ListedField = "data"
     every_s: Annotated[Seconds, Field(ge=1.0)] = 10.0
-    max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
 
     @property

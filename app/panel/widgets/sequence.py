@@ -6,16 +6,21 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from app.panel.base import Description, Id, Interlocks, Label, Span
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import value_faults
 from app.panel.constants import parent_type, value_mismatch
-from app.panel.file.wording import list_names
+from app.panel.file.wording import no_such
 from app.panel.values import same_value
-from app.panel.widgets.displays import check_state_value, resolve_state_value
+from app.panel.widgets.displays import (
+    PictureName,
+    StateValue,
+    name_faults,
+    picture_faults,
+    resolve_state_value,
+)
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicField, TopicSource
 from app.ros.messages import INTEGER_RANGES, STRING_TYPES, Interfaces, Type
 from app.ros.messages.validation import format_value, unknown_constant
 from app.system.errors import Fault
-from app.system.pictures import PICTURE
 
 MAX_STEPS: Final = 50
 ALARM_LINES: Final = 4  # of the action of an alarm that are shown as steps
@@ -45,7 +50,6 @@ Mark = Annotated[
         }
     ),
 ]
-PictureName = Annotated[str, Field(pattern=PICTURE)]
 
 
 class CurrentStep(TopicField):
@@ -67,7 +71,7 @@ class RecoveryStep(Description):
 class SequenceStep(RecoveryStep):
     """A step of the usual sequence, under way while the `current` field has its `value`."""
 
-    value: Annotated[bool | int | str, BeforeValidator(check_state_value)] | None = None
+    value: StateValue | None = None
 
 
 class Sequence(DisplayWidget):
@@ -147,10 +151,10 @@ class Sequence(DisplayWidget):
             )
         for i, name in enumerate(self.fault):
             at = f"[{i}]" if len(self.fault) > 1 else ""
-            yield from _name_faults(f"{place}.fault{at}", name, checking)
+            yield from name_faults(f"{place}.fault{at}", name, checking)
         for i, name in enumerate(self.alarms):
             yield from _alarm_faults(f"{place}.alarms[{i}]", name, checking)
-        yield from _picture_faults(f"{place}.picture", self.picture, checking)
+        yield from picture_faults(f"{place}.picture", self.picture, checking.pictures)
         for at, step in self.all_steps:
             yield from self._step_faults(f"{place}.{at}", step, checking)
         if self.current is not None:
@@ -163,14 +167,14 @@ class Sequence(DisplayWidget):
 
     def _step_faults(self, place: str, step: RecoveryStep, checking: CheckContext) -> Iterator[Fault]:
         if step.condition is not None:
-            yield from _name_faults(f"{place}.condition", step.condition, checking)
+            yield from name_faults(f"{place}.condition", step.condition, checking)
         if step.text is None:
             if step.condition is None:
                 yield Fault(f"{place}.text", "is missing: what the operator does in this step")
             elif step.condition in checking.conditions and not checking.conditions[step.condition]:
                 message = f'is missing: "{step.condition}" has no action that could stand in its place'
                 yield Fault(f"{place}.text", message, cause=f"action {step.condition}")
-        yield from _picture_faults(f"{place}.picture", step.picture, checking)
+        yield from picture_faults(f"{place}.picture", step.picture, checking.pictures)
         if step.mark is not None and not (step.picture or self.picture):
             yield Fault(
                 f"{place}.mark", "has no meaning without a picture: give the step or the widget one"
@@ -180,13 +184,12 @@ class Sequence(DisplayWidget):
         self, place: str, current: CurrentStep, interfaces: Interfaces
     ) -> Iterator[Fault]:
         at = f"{place}.current"
-        faults = list(field_faults(at, current.type, current.field, interfaces))
+        faults = list(value_faults(at, current.type, current.field, "a step", interfaces))
         yield from faults
         if faults:
             return
         kind = interfaces.type_at(current.type, current.field)
-        is_usable = kind.name in INTEGER_RANGES or kind.name in STRING_TYPES or kind.name == "bool"
-        if kind.container != "one" or not is_usable:
+        if kind.name not in INTEGER_RANGES and kind.name not in STRING_TYPES and kind.name != "bool":
             message = f'"{current.field}" is {kind}: a step is a whole number, a text or a bool'
             yield Fault(f"{at}.field", message)
             return
@@ -209,22 +212,10 @@ class Sequence(DisplayWidget):
             seen.append(value)
 
 
-def _name_faults(place: str, name: str, checking: CheckContext) -> Iterator[Fault]:
-    if name not in checking.conditions:
-        message = f'no interlock or condition "{name}"; there is {list_names(checking.conditions)}'
-        yield Fault(place, message, cause=f"interlock {name}")
-
-
 def _alarm_faults(place: str, name: str, checking: CheckContext) -> Iterator[Fault]:
     if name not in checking.alarms:
-        message = f'no alarm "{name}"; there is {list_names(checking.alarms)}'
+        message = no_such("alarm", name, checking.alarms)
         yield Fault(place, message, cause=f"alarm {name}")
     elif not checking.alarms[name]:
         message = f'"{name}" has no action that could be shown: give that alarm one'
         yield Fault(place, message, cause=f"action {name}")
-
-
-def _picture_faults(place: str, name: str | None, checking: CheckContext) -> Iterator[Fault]:
-    if name is not None and name not in checking.pictures:
-        message = f'"{name}" is not among the pictures; there is {list_names(checking.pictures)}'
-        yield Fault(place, message, cause=f"picture {name}")

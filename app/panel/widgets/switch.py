@@ -3,15 +3,13 @@
 import itertools
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
-
-from pydantic import BeforeValidator
+from typing import Any, ClassVar, Final, Literal, Self
 
 from app.panel.base import SaidLabel, Seconds, Span, TopicName, TopicQos, catalogue_default
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import value_faults
 from app.panel.constants import parent_type
 from app.panel.values import same_value
-from app.panel.widgets.displays import check_state_value, resolve_state_value
+from app.panel.widgets.displays import StateValue, resolve_state_value
 from app.panel.widgets.families import (
     CheckContext,
     Command,
@@ -31,7 +29,6 @@ from app.system.errors import Fault, InputError
 from app.system.texts import say
 
 Position = Literal["on", "off", ""]
-ReportedState = Annotated[bool | int | str, BeforeValidator(check_state_value)]
 # The keys that only one way to send has.
 WAYS: Final[Mapping[str, str]] = {"topic": "message", "service": "request"}
 
@@ -55,8 +52,8 @@ class Switch(EntryWidget, CompositeCommand):
     reported: SwitchReport
     on: SaidLabel = catalogue_default("on")
     off: SaidLabel = catalogue_default("off")
-    on_value: ReportedState = True
-    off_value: ReportedState = False
+    on_value: StateValue = True
+    off_value: StateValue = False
     topic: TopicName | None = None
     service: TopicName | None = None
     type: str
@@ -168,11 +165,8 @@ class Switch(EntryWidget, CompositeCommand):
             return
         missing = list(self._missing_faults(place))
         yield from missing
-        faults = list(
-            field_faults(
-                f"{place}.reported", self.reported.type, self.reported.field, checking.interfaces
-            )
-        )
+        source, at = self.reported, f"{place}.reported"
+        faults = list(value_faults(at, source.type, source.field, "a report", checking.interfaces))
         yield from faults
         if missing or faults:
             return

@@ -5,21 +5,19 @@ from typing import Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Label, MessageField, Seconds, Span, non_empty
-from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS, parent_type
-from app.panel.times import DEFAULT_FORMATS, time_faults
+from app.panel.base import Description, Label, MessageField, Span, non_empty
+from app.panel.checks.types import entry_faults, field_faults
+from app.panel.shared_keys import AgeKey, NumberKeys, NumberOrTimeFormat, number_key_faults
+from app.panel.times import DEFAULT_FORMATS
 from app.panel.widgets.displays import (
-    CONSTANTS,
-    FORMAT_OR_TIME,
+    ConstantPrefix,
     LampState,
+    States,
     constant_faults,
-    format_fault,
-    resolve_state_value,
+    resolved_states,
     state_faults,
 )
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
-from app.panel.widgets.numbers import Unit
 from app.ros.messages import Interfaces
 from app.system.errors import Fault
 from app.system.texts import PanelText
@@ -28,19 +26,19 @@ MAX_COLUMNS: Final = 8
 MAX_ROWS: Final = 20
 MAX_ENTRIES: Final = 10_000
 READ_BY_DEFAULT: Final = 2_000
+EntriesRead = Annotated[int, Field(ge=1, le=MAX_ENTRIES)]
 
 ListPath = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
 
 
-class Column(Description):
+class Column(NumberKeys):
     """One column: a field of each entry, or the entry itself where that is a single value."""
 
     label: Label
     field: MessageField | None = None
-    format: Annotated[str, Field(pattern=FORMAT_OR_TIME)] | None = None
-    unit: Unit = ""
-    constants: Annotated[str, Field(pattern=CONSTANTS)] | None = None
-    states: Annotated[tuple[LampState, ...], Field(strict=False)] = ()
+    format: NumberOrTimeFormat | None = None
+    constants: ConstantPrefix | None = None
+    states: States = ()
     width: Annotated[int, Field(ge=1, le=12)] = 1
 
 
@@ -60,11 +58,11 @@ class ColumnField(NamedTuple):
     unit: str | PanelText
     constants: str | None
     states: tuple[LampState, ...]
-    scale: float = 1.0
-    offset: float = 0.0
+    scale: float
+    offset: float
 
 
-class Table(TopicWidget, DisplayWidget):
+class Table(AgeKey, TopicWidget, DisplayWidget):
     """Shows the first `rows_shown` of all entries of a list. With a `key`, the latest entry for each of
     its values is kept, as several messages bring them."""
 
@@ -76,10 +74,9 @@ class Table(TopicWidget, DisplayWidget):
         AfterValidator(non_empty),
     ]
     rows_shown: Annotated[int, Field(ge=1, le=MAX_ROWS)] = 5
-    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = READ_BY_DEFAULT
+    entries_read: EntriesRead = READ_BY_DEFAULT
     sort: Sort | None = None
     key: MessageField | None = None
-    max_age_s: Seconds | None = None
     span: Span = 12
 
     def path(self, entry: int, field: str | None) -> str:
@@ -103,7 +100,7 @@ class Table(TopicWidget, DisplayWidget):
         """A column's field, of the first entry."""
         path = self.path(0, column.field)
         keys = (column.format, column.unit, column.constants, column.states)
-        return ColumnField(self.type, path, *keys)
+        return ColumnField(self.type, path, *keys, column.scale, column.offset)
 
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, ())  # its list is read by itself
@@ -115,14 +112,8 @@ class Table(TopicWidget, DisplayWidget):
     def _resolved(self, column: Column, interfaces: Interfaces) -> Column:
         if not column.states:
             return column
-        field = self.column_field(column)
-        kind = interfaces.field_type(field.type, field.field)
-        constants = interfaces.constants(parent_type(field, interfaces))
-        states = [
-            state.model_copy(update={"value": resolve_state_value(state.value, kind, constants)})
-            for state in column.states
-        ]
-        return column.model_copy(update={"states": tuple(states)})
+        states = resolved_states(self.column_field(column), interfaces)
+        return column.model_copy(update={"states": states})
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         interfaces = checking.interfaces
@@ -153,34 +144,18 @@ class Table(TopicWidget, DisplayWidget):
         kind = interfaces.field_type(field.type, field.field)
         if column.states:
             yield from state_faults(place, field, kind, interfaces, "a column with states")
-            for key in ("format", "unit", "constants"):
+            for key in ("format", "unit", "scale", "offset", "constants"):
                 if key in column.model_fields_set:
                     yield Fault(f"{place}.{key}", "is not for a column with states: they are its texts")
             return
-        if times := list(time_faults(place, column.format, kind, column.unit)):
-            yield from times
-            return
-        for key in ("format", "unit") if kind not in DEFAULT_FORMATS else ():
-            if getattr(column, key) and kind not in NUMBERS:
-                yield Fault(
-                    f"{place}.{key}", f'is for numbers; "{column.field or self.field}" is {kind}'
-                )
-                return
-        yield from format_fault(place, field, kind)
+        yield from number_key_faults(place, column, column.field or self.field, kind)
         yield from constant_faults(place, field, interfaces)
 
     def _entry_faults(
         self, place: str, field: str | None, interfaces: Interfaces, whole: Collection[str] = ()
     ) -> Iterator[Fault]:
         """Faults of a field of each entry, which must be a single value, or of a type in `whole`."""
-        path = self.path(0, field)
-        for fault in field_faults("", self.type, path, interfaces):
-            yield Fault(place, fault.message)
-            return
-        kind = interfaces.type_at(self.type, path)
-        if (kind.is_nested and str(kind) not in whole) or kind.container != "one":
-            named = f'"{field}" of an entry' if field else "an entry"
-            yield Fault(place, f"{named} is {kind}: a cell shows one value of it, not all")
+        yield from entry_faults(place, self.type, self.field, field, "a cell", interfaces, whole)
 
     def _order_faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
         if self.key is not None:

@@ -9,22 +9,16 @@ from typing import Annotated, Final, Literal, Protocol
 from pydantic import AfterValidator, Field
 
 from app.panel.base import (
-    Description,
-    FieldPath,
+    FiniteNumber,
     Label,
     Seconds,
     Span,
-    TopicName,
-    TopicQos,
-    Type,
     non_empty,
 )
-from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS
-from app.panel.numbers import FORMAT, Factor
+from app.panel.checks.types import number_faults
+from app.panel.shared_keys import AgeKey, FieldKeys, NumberKeys, number_key_faults
 from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
-from app.panel.widgets.numbers import Unit
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
 
@@ -77,40 +71,32 @@ Duration = Annotated[str, AfterValidator(_check_duration)]
 Axis = Literal["left", "right"]
 
 
-class Pen(Description):
+class Pen(NumberKeys, FieldKeys):
     """One line of a trend: a field as `value * scale + offset`. `normal` is the lowest and the highest
     normal value, and `axis` the side with its numbers."""
 
-    topic: TopicName
-    type: Type
-    qos: TopicQos = TopicQos()
-    field: FieldPath = "data"
     label: Label
-    unit: Unit = ""
-    scale: Factor = 1.0
-    offset: Factor = 0.0
-    format: Annotated[str, Field(pattern=FORMAT)] | None = None
-    low: Factor | None = None
-    high: Factor | None = None
-    normal: Annotated[tuple[Factor, ...], Field(strict=False, min_length=2, max_length=2)] | None = None
+    low: FiniteNumber | None = None
+    high: FiniteNumber | None = None
+    normal: (
+        Annotated[tuple[FiniteNumber, ...], Field(strict=False, min_length=2, max_length=2)] | None
+    ) = None
     axis: Axis = "left"
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        faults = list(field_faults(place, self.type, self.field, checking.interfaces))
+        interfaces = checking.interfaces
+        faults = list(number_faults(place, self.type, self.field, "a pen", interfaces))
         yield from faults
         if not faults:
-            field_type = checking.interfaces.type_at(self.type, self.field)
-            if field_type.container != "one" or field_type.name not in NUMBERS:
-                yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a pen is for a number')
-        if self.scale == 0:
-            yield Fault(f"{place}.scale", "is 0: every value would be the same")
+            kind = interfaces.field_type(self.type, self.field)
+            yield from number_key_faults(place, self, self.field, kind)
         if self.low is not None and self.high is not None and self.low >= self.high:
             yield Fault(f"{place}.low", f"{self.low:g} is not below high, which is {self.high:g}")
         if self.normal is not None and self.normal[0] >= self.normal[1]:
             yield Fault(f"{place}.normal", "the first number must be below the second")
 
 
-class Trend(DisplayWidget):
+class Trend(AgeKey, DisplayWidget):
     """Fields over the time of `window`, of which the server keeps `keep`. A silence longer than
     `max_age_s` is a gap. `min` and `max` are of the left axis."""
 
@@ -123,10 +109,10 @@ class Trend(DisplayWidget):
     keep: Duration = "24h"
     disk: bool = False
     max_age_s: Seconds = 5.0
-    min: Factor | None = None
-    max: Factor | None = None
-    right_min: Factor | None = None
-    right_max: Factor | None = None
+    min: FiniteNumber | None = None
+    max: FiniteNumber | None = None
+    right_min: FiniteNumber | None = None
+    right_max: FiniteNumber | None = None
     keys: bool = True
     span: Span = 12
 
