@@ -44,12 +44,13 @@ from app.web.assets import load_assets, require_files
 from app.web.caller import LanguageHeaders
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.metrics import Metrics
+from app.web.pages.compiled_templates import COMPILED
 from app.web.pages.page_templates import PageTemplates
 from app.web.path_methods import method_guard
 from app.web.requests import LONGEST
 from app.web.root_path import RootPath, root_path_of
 from app.web.route_needs import route_guard
-from app.web.route_tables import add_routes
+from app.web.route_tables import LateRoutes, add_routes, load_used
 from app.web.routes import pages
 from app.web.security import BearerGuard, RequestGuard
 from app.web.server import (
@@ -110,6 +111,7 @@ def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None
     """The last that is added sees a request first."""
     if settings.dev:
         app.add_exception_handler(Exception, on_error_in_development)
+    app.add_middleware(LateRoutes)
     app.add_middleware(LanguageHeaders)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(RequestGuard, hosts=settings.hosts, embed=embed)
@@ -134,7 +136,7 @@ async def _lifespan(
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
             once = (
                 _log_urls(app.state.server, ports, settings.hosts),
-                pages.compiled(state.templates.environment(panel.language)),
+                _prepare(app, state, panel),
             )
             tasks = [
                 *(spawn_logged(work, log, "a task of the start failed") for work in once),
@@ -151,6 +153,12 @@ async def _lifespan(
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
                 watchdog.notify_stopping()
+
+
+async def _prepare(app: FastAPI, state: AppState, panel: Panel) -> None:
+    """What the pages use next, while the connection is set up."""
+    await pages.compiled(state.templates.environment(panel.language))
+    await load_used(app, panel)
 
 
 async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
@@ -203,7 +211,7 @@ async def _app_state(
             metrics = Metrics(
                 fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
             )
-            made = PageTemplates(templates, page_parts(panel))
+            made = PageTemplates(templates, page_parts(panel), shipped_path(COMPILED))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
             await access.reload()
             fleet.alarms.watch_sign_ins(access)

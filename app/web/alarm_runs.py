@@ -102,11 +102,3 @@ class AlarmRuns:
         robot = alarm.definition.robot if alarm else ""
         known = {session.entry.id if session.entry else "": session for session in sessions}
         return known.get(robot, self._state.fleet.first)
-
-
-def command_text(session: RobotSession, act_id: str) -> TextLike:
-    """What became of the command of an earlier act; "" if it had none."""
-    receipt = session.presses.receipt(press_id_of(act_id))
-    if receipt is None:
-        return ""
-    return sentence_of(session.presses.widget(receipt.widget).label, receipt)

@@ -15,6 +15,7 @@ import posixpath
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Final
 
@@ -68,20 +69,29 @@ PICTURE_TYPES: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Asset:
-    """`packed` is the content by gzip, packed once and not for each who asks; empty where that is not
-    smaller."""
+    """A file that is sent: its `source` without what `left_out` finds. It is made smaller and packed at
+    the first request, once; `packs` is False where packing saves nothing."""
 
-    content: bytes
+    source: bytes
     media_type: str
-    packed: bytes
+    packs: bool = True
+    left_out: re.Pattern[bytes] | None = None
+
+    @cached_property
+    def content(self) -> bytes:
+        return self.left_out.sub(b"", self.source) if self.left_out else self.source
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The content by gzip; empty where that is not smaller."""
+        return gzip.compress(self.content, mtime=0) if self.packs else b""
 
 
-def asset(content: bytes, suffix: str) -> Asset:
-    """What is sent of the content of a file with this suffix."""
-    sent = LEFT_OUT[suffix].sub(b"", content)
-    return Asset(sent, MEDIA_TYPES[suffix], gzip.compress(sent, mtime=0))
+def asset(source: bytes, suffix: str) -> Asset:
+    """What is sent of the source of a file with this suffix."""
+    return Asset(source, MEDIA_TYPES[suffix], left_out=LEFT_OUT[suffix])
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +101,9 @@ class Assets:
     files: dict[str, Asset]
     revision: str
     own_fonts: tuple[str, ...] = ()  # the names of the files of the panel's fonts
-    imports: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # script → those it imports
-    layers: Asset = Asset(b"", "text/css", b"")  # the stylesheet without the panel's styles
+    layers: Asset = Asset(b"", "text/css")  # the stylesheet without the panel's styles
     panel_styles: tuple[Path, ...] = ()
+    _imports: dict[str, tuple[str, ...]] = field(default_factory=dict)
     # The kinds of widgets that have a script, with its name, and those that have a stylesheet.
     scripts: ClassVar[Mapping[str, str]] = {
         name: name if kind.script is True else kind.script
@@ -111,7 +121,7 @@ class Assets:
         if f"{name}.css" not in self.files:
             parts = [self.layers, *(self.files[f"kinds/{kind}.css"] for kind in own)]
             content = b"\n".join(part.content for part in parts)
-            joined = Asset(content, self.layers.media_type, gzip.compress(content, mtime=0))
+            joined = Asset(content, self.layers.media_type)
             self.files[f"{name}.css"] = _with_styles(joined, self.panel_styles)
         return name
 
@@ -122,17 +132,18 @@ class Assets:
         every = dict.fromkeys(f"{script}.js" for script in (*scripts, *of_kinds))
         waiting = [*every]
         for script in waiting:
-            further = [name for name in self.imports.get(script, ()) if name not in every]
+            further = [name for name in self.imports(script) if name not in every]
             every |= dict.fromkeys(further)
             waiting += further
         return [script.removesuffix(".js") for script in every]
 
-
-def _imported(script: str, content: bytes) -> tuple[str, ...]:
-    """The names of the scripts that a script imports as it starts."""
-    folder = posixpath.dirname(script)
-    names = IMPORT.findall(content.decode())
-    return tuple(posixpath.normpath(posixpath.join(folder, name)) for name in names)
+    def imports(self, script: str) -> tuple[str, ...]:
+        """The names of the scripts that a script imports as it starts."""
+        if script not in self._imports:
+            folder = posixpath.dirname(script)
+            names = IMPORT.findall(self.files[script].content.decode()) if script in self.files else ()
+            self._imports[script] = tuple(posixpath.normpath(posixpath.join(folder, n)) for n in names)
+        return self._imports[script]
 
 
 def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
@@ -140,20 +151,18 @@ def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
     if not styles:
         return sheet
     content = b"\n".join([sheet.content, *(file.read_bytes() for file in styles)])
-    return Asset(content, sheet.media_type, gzip.compress(content, mtime=0))
+    return Asset(content, sheet.media_type)
 
 
 def picture(file: Path) -> Asset:
     """A picture of the panel."""
-    content = file.read_bytes()
-    packed = gzip.compress(content, mtime=0) if file.suffix == ".svg" else b""
-    return Asset(content, PICTURE_TYPES[file.suffix], packed)
+    return Asset(file.read_bytes(), PICTURE_TYPES[file.suffix], file.suffix == ".svg")
 
 
 def font(file: Path) -> Asset:
     """A font of the panel. WOFF2 is packed already."""
-    content, form = file.read_bytes(), font_format(file)
-    return Asset(content, f"font/{form}", b"" if form == "woff2" else gzip.compress(content, mtime=0))
+    form = font_format(file)
+    return Asset(file.read_bytes(), f"font/{form}", form != "woff2")
 
 
 def font_styles(fonts: Sequence[Font]) -> Iterator[str]:
@@ -213,7 +222,7 @@ def load_assets(
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
     files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
     fonts = sorted((static / FONTS).glob("*.woff2"))  # packed already
-    files |= {f"{FONTS}/{file.name}": Asset(file.read_bytes(), "font/woff2", b"") for file in fonts}
+    files |= {f"{FONTS}/{file.name}": Asset(file.read_bytes(), "font/woff2", False) for file in fonts}
     of_panel = {
         font_name(number, key): font(file)
         for number, own_font in enumerate(own_fonts)
@@ -222,13 +231,10 @@ def load_assets(
     files |= {f"{FONTS}/{name}": sent for name, sent in of_panel.items()}
     digest = hashlib.sha256()
     for name, sent in sorted(files.items()):
-        digest.update(name.encode() + b"\0" + sent.content + b"\0")
+        digest.update(name.encode() + b"\0" + sent.source + b"\0")
     for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
-    imports = {
-        name: _imported(name, sent.content) for name, sent in files.items() if name.endswith(".js")
-    }
-    return Assets(files, digest.hexdigest()[:12], tuple(of_panel), imports, sheet, tuple(styles))
+    return Assets(files, digest.hexdigest()[:12], tuple(of_panel), sheet, tuple(styles))
 
 
 def require_files(static: Path, templates: Path) -> None:

@@ -23,11 +23,11 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from app.cell.permission.client_places import KIOSK, ClientPlaces, client_key, shares
 from app.records.principal import where
-from app.system.certificates import ServedCertificate
 from app.system.concurrency import keep_running
 from app.system.errors import SettingsError
 from app.system.log import RepeatedRecords
 from app.system.process.listen_sockets import check_port_free
+from app.system.used_certificates import ServedCertificate
 from app.web.requests import LONGEST
 
 # The transport of a client's connection: it holds the client's place, and closes so that the client

@@ -11,8 +11,9 @@ from jinja2.meta import find_referenced_templates
 from app.cell.view.publisher import SECTIONS
 from app.panel.widgets.kinds import KINDS
 from app.system.settings import shipped_path
+from app.web.pages.compiled_templates import CompiledTemplates, compile_all, template_names
 from app.web.pages.page_templates import PageTemplates
-from app.web.routes.pages import compiled
+from app.web.routes.pages import compiled, is_of_a_page
 
 
 def needed(environment: Environment, name: str) -> Iterator[str]:
@@ -71,3 +72,22 @@ def test_templates_in_a_folder_that_cannot_be_written_are_compiled_each_time(tmp
     templates = templates_of(tmp_path)
     (tmp_path / "__pycache__").write_text("not a folder")
     assert templates.render("page.html", "en") == "<p>1.5</p>"
+
+
+def test_the_templates_of_the_wheel_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_all(shipped_path("templates"), tmp_path / "compiled")
+    from_source = PageTemplates(shipped_path("templates"))
+    monkeypatch.setattr(Environment, "_parse", None)  # nothing is compiled again
+    monkeypatch.setattr(CompiledTemplates, "load_bytecode", lambda self, bucket: None)
+    compiled_ones = PageTemplates(shipped_path("templates"), compiled=tmp_path / "compiled")
+    environment = compiled_ones.environment("ja")
+    names = template_names(environment, is_of_a_page)
+    assert len(names) > len(KINDS)
+    assert {environment.get_template(name).name for name in names} == {*names}
+    monkeypatch.undo()
+    context = {"widget": {"id": "a", "kind": "label", "label": "<A>"}}
+    rendered = compiled_ones.render("_failed.html", "ja", **context)
+    assert "&lt;A&gt;" in rendered
+    assert rendered == from_source.render("_failed.html", "ja", **context)

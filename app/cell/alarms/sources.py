@@ -184,7 +184,9 @@ ENOUGH: Final = 1.1  # of the free space below which the alarm is raised, until 
 def own_definitions() -> Iterator[tuple[OwnAlarm, Definition]]:
     """The panel's own alarms, which are of no robot."""
     for name, priority in PRIORITIES.items():
-        alarm = Alarm.model_validate({"id": name, "priority": priority})
+        alarm = Alarm.model_construct(
+            id=name, priority=priority
+        )  # a panel without alarms has no schema
         rules = AlarmRules(PLAIN, (priority,))
         yield name, Definition(name, "", alarm, rules, Delays(), (None,))
 

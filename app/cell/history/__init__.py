@@ -4,7 +4,3 @@ Trends are recorded from each sample, and written to disk. Recordings are MCAP f
 Lichtblick and rosbag2 open. A ring buffer keeps the latest samples. A press starts a recording with
 them, which continues for a while. A separate thread writes the files, so that it never delays a press.
 """
-
-from app.cell.history.recording import Recorder, Recordings
-
-__all__ = ["Recorder", "Recordings"]

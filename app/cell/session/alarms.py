@@ -56,9 +56,8 @@ from app.cell.session.turn import RobotAlarms
 from app.panel.alarm import AlarmRules
 from app.panel.model import Panel
 from app.records.press_record import Log
-from app.system.certificates import NO_FILES, Listed, UsedCertificates, about
-from app.system.errors import KioskError
 from app.system.texts import TextLike, joined, say
+from app.system.used_certificates import NO_FILES, UsedCertificates, readable
 
 # What the server sees of itself, for the panel's own alarms: its log, its disk, its clock, the
 # certificates that it uses, its connection to the broker of MQTT, its users, their sign-ins and its
@@ -251,23 +250,12 @@ class OwnAlarms:
             self._set("panel_certificate", unused_certificate_entry(file))
             self._evaluate()
             return
-        listed = await asyncio.to_thread(_listed, self._certificates.all_files)
+        listed = await asyncio.to_thread(readable, self._certificates.all_files)
         if listed:
             first = min(listed, key=lambda certificate: certificate.until)
             entry = certificate_entry(str(first.file), first.until, datetime.now(UTC))
             self._set("panel_certificate", entry)
             self._evaluate()
-
-
-def _listed(files: Sequence[Path]) -> list[Listed]:
-    """The certificates that can be read."""
-    listed = []
-    for file in files:
-        try:
-            listed.append(about(file))
-        except KioskError as error:
-            log.warning("when a certificate ends is not known: %s", error)
-    return listed
 
 
 def _usage(folder: Path) -> Usage:

@@ -19,11 +19,11 @@ from app.panel.widgets.trend import trends_of
 from app.records import Limits, NullLog, OperatorLog
 from app.records.starts import KeptFiles, StartRecord, read_start_files
 from app.ros.zenoh.config import Config, config_from, config_to, tls_files
-from app.system.certificates import ServedCertificate, UsedCertificates
 from app.system.settings import Mode, Settings
+from app.system.used_certificates import ServedCertificate, UsedCertificates
 
 if TYPE_CHECKING:
-    from app.cell.history import Recordings
+    from app.cell.history.recording import Recordings
     from app.cell.history.trends import TrendWriter
 
 log = logging.getLogger("kiosk")
@@ -139,7 +139,7 @@ def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
     """Imports the MCAP writer only if the panel records: it takes time and memory."""
     if panel.record is None:
         return None
-    from app.cell.history import Recordings
+    from app.cell.history.recording import Recordings
 
     folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)

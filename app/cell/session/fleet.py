@@ -40,7 +40,7 @@ from app.system.errors import InputError, NotFound
 from app.system.texts import TextLike, joined, say
 
 if TYPE_CHECKING:
-    from app.cell.history import Recordings
+    from app.cell.history.recording import Recordings
 
 
 # Interlocks and conditions of one robot that widgets of another robot name.

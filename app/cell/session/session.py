@@ -59,7 +59,7 @@ from app.system.log import RobotLog
 from app.system.texts import TextLike
 
 if TYPE_CHECKING:
-    from app.cell.history import Recorder, Recordings
+    from app.cell.history.recording import Recorder, Recordings
     from app.cell.history.trends import TrendRecorder
 
 
@@ -470,7 +470,7 @@ def _recorder(
     panel, recordings = context.panel, server.recordings
     if recordings is None or panel.record is None:
         return None
-    from app.cell.history import Recorder
+    from app.cell.history.recording import Recorder
 
     recordings.add_listener(context.signals.changed.emit)
     name = entry.id if entry else ""

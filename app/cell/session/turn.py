@@ -41,7 +41,7 @@ from app.system.log import RobotLog
 from app.system.texts import say
 
 if TYPE_CHECKING:
-    from app.cell.history import Recorder
+    from app.cell.history.recording import Recorder
 
 
 # Wires the commands of one robot: presses, holds and their trackers.

@@ -13,6 +13,7 @@ from fastapi import Request
 from fastapi.responses import HTMLResponse, Response
 from markupsafe import Markup
 
+from app.cell.commands.alarm_acts import press_id_of, sentence_of
 from app.cell.commands.control_acts import TOO_OFTEN
 from app.cell.commands.receipts import Receipt
 from app.cell.permission.roles import role_reason, unmet
@@ -32,7 +33,6 @@ from app.system import clock
 from app.system.clock import format_datetime, format_day, format_time, iso_time
 from app.system.printable import printable_texts
 from app.system.texts import Text, TextLike, localized, say
-from app.web.alarm_runs import command_text
 from app.web.app_state import AppState
 from app.web.assets import PICTURES
 from app.web.caller import QUERY as EMBED
@@ -361,3 +361,11 @@ def framed_page(
     html = state.templates.render(page.template, caller.language, **frame, **context)
     headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})
     return caller.with_client_cookie(HTMLResponse(html, page.status, headers), token)
+
+
+def command_text(session: RobotSession, act_id: str) -> TextLike:
+    """What became of the command of an earlier act; "" if it had none."""
+    receipt = session.presses.receipt(press_id_of(act_id))
+    if receipt is None:
+        return ""
+    return sentence_of(session.presses.widget(receipt.widget).label, receipt)

@@ -5,15 +5,12 @@ the usual macros in it, then the frame around it.
 """
 
 import logging
-import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
-from jinja2.bccache import Bucket
+from jinja2 import Environment
 from markupsafe import Markup
 
 from app.panel.layout import Page
@@ -26,6 +23,7 @@ from app.system.texts import Text, render, say
 from app.system.texts.locales import clear_text, list_separator, number_in, symbols
 from app.system.version import installed_version
 from app.web.assets import PAGE_GUARD
+from app.web.pages.compiled_templates import environment_of
 
 if TYPE_CHECKING:
     from app.panel.page_template import PageParts
@@ -35,39 +33,19 @@ log = logging.getLogger("kiosk.web")
 FAILURE: Final = say("widget_failed")
 
 
-class CompiledTemplates(FileSystemBytecodeCache):
-    """Compiled templates in `__pycache__` beside their sources, by the rules of Python's own bytecode:
-    written where the folder can be written, used while the source is the same."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(str(folder / "__pycache__"), "%s.jinja.pyc")
-
-    def load_bytecode(self, bucket: Bucket) -> None:
-        with suppress(OSError):
-            super().load_bytecode(bucket)
-
-    def dump_bytecode(self, bucket: Bucket) -> None:
-        if not sys.dont_write_bytecode:
-            with suppress(OSError):
-                Path(self.directory).mkdir(exist_ok=True)
-                super().dump_bytecode(bucket)
-
-
 class PageTemplates:
     """An environment for each language in use; a template is compiled, or read compiled, at its first
     use."""
 
-    def __init__(self, folder: Path, own: "Mapping[str, PageParts] | None" = None) -> None:
-        """`own` is what the pages' own templates make, by the ids of the pages."""
-        self._base = Environment(
-            loader=FileSystemLoader(folder),
-            autoescape=True,
-            undefined=StrictUndefined,
-            auto_reload=False,
-            trim_blocks=True,
-            lstrip_blocks=True,
-            bytecode_cache=CompiledTemplates(folder),
-        )
+    def __init__(
+        self,
+        folder: Path,
+        own: "Mapping[str, PageParts] | None" = None,
+        compiled: Path | None = None,
+    ) -> None:
+        """`own` is what the pages' own templates make, by the ids of the pages; `compiled` the folder
+        of those that the wheel has compiled."""
+        self._base = environment_of(folder, compiled)
         self._base.globals["icon"] = icon
         self._base.globals["cleaning_s"] = CLEANING_S
         self._base.globals["failure"] = FAILURE

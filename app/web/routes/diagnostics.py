@@ -66,7 +66,7 @@ from app.web.requests import (
 )
 
 if TYPE_CHECKING:
-    from app.cell.history import Recorder
+    from app.cell.history.recording import Recorder
 
 
 # What the page of diagnostics shows, as JSON for programs.

@@ -13,6 +13,7 @@ from app.system.errors import NotFound
 from app.system.texts import say
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import QUERY, caller_of, frame_ancestors, only_shows, says_embedded
+from app.web.pages.compiled_templates import template_names
 from app.web.pages.context import page_context
 from app.web.requests import PAGE, Described, errors
 from app.web.route_needs import check_page
@@ -91,7 +92,7 @@ def is_of_a_page(name: str) -> bool:
 async def compiled(templates: Environment) -> None:
     """Compiles the templates of a page, so that the first page is as quick as the next."""
     await asyncio.sleep(COMPILED_AFTER_S)
-    for name in templates.list_templates(filter_func=is_of_a_page):
+    for name in template_names(templates, is_of_a_page):
         templates.get_template(name)
         await asyncio.sleep(0)
 

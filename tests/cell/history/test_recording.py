@@ -16,7 +16,6 @@ from rosbags.typesys import get_types_from_msg
 
 from app.cell.commands.press import fingerprint
 from app.cell.commands.receipts import Receipt
-from app.cell.history import Recorder, Recordings
 from app.cell.history.recording import (
     COPY_BELOW_BYTES,
     OVERHEAD_BYTES,
@@ -24,7 +23,9 @@ from app.cell.history.recording import (
     UNFINISHED,
     Channel,
     McapFile,
+    Recorder,
     RecordingFolder,
+    Recordings,
     RingBuffer,
     recording_name,
     to_buffered,
