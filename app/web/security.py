@@ -11,14 +11,15 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import JSONResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.cell.permission.client_limits import RATE_LIMITS, RateLimit
 from app.panel.rules import EmbedRules
 from app.system.printable import printable
 from app.system.texts import render, say
 from app.web.assets import PAGE_GUARD_HASH
-from app.web.caller import caller_in, only_shows
+from app.web.caller import Caller, caller_in, only_shows
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
@@ -161,7 +162,20 @@ def _without_port(host: str) -> str | None:
 # reads them. Pure ASGI, for WebSockets too.
 
 CHALLENGE: Final = {"www-authenticate": 'Bearer realm="operator-panel", error="invalid_token"'}
-AGAIN: Final = {"retry-after": "1"}
+
+
+def too_many(caller: Caller, limit: RateLimit) -> Response:
+    """The answer over a limit, a sentence: to render a page would take the time that is saved."""
+    sentence, again_s = render(say(limit.sentence), caller.language), limit.retry_after_s
+    headers = {"retry-after": str(again_s), "cache-control": "no-store"}
+    if caller.accepts_html:
+        return PlainTextResponse(sentence, 429, headers | {"refresh": str(2 * again_s)})
+    return JSONResponse({"error": sentence}, 429, headers)
+
+
+def unknown(caller: Caller) -> Response:
+    """The answer to a token that the panel does not know."""
+    return JSONResponse({"error": render(say("token_unknown"), caller.language)}, 401, CHALLENGE)
 
 
 class BearerGuard:
@@ -176,9 +190,8 @@ class BearerGuard:
             if caller.bearer and (access := caller.state.access).configured:
                 known = access.knows(caller.bearer)
                 if not known or not access.admit_token(caller.bearer):
-                    sentence = say("token_too_often" if known else "token_unknown")
-                    content = {"error": render(sentence, caller.language)}
-                    status, headers = (429, AGAIN) if known else (401, CHALLENGE)
-                    await refuse(JSONResponse(content, status, headers), scope, receive, send)
+                    limit = RATE_LIMITS["token_requests"]
+                    answer = too_many(caller, limit) if known else unknown(caller)
+                    await refuse(answer, scope, receive, send)
                     return
         await self._app(scope, receive, send)

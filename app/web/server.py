@@ -21,6 +21,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResp
 from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from app.cell.permission.client_limits import CONNECTIONS_MOST, PLACE_LIMITS
 from app.cell.permission.client_places import KIOSK, ClientPlaces, client_key, shares
 from app.records.principal import where
 from app.system.concurrency import keep_running
@@ -154,7 +155,6 @@ connection_log = logging.getLogger("kiosk.connections")
 
 HEAD_WITHIN_S: Final = 10.0  # from its first byte, or from the opening of the connection
 HEAD_MOST: Final = 65_536  # bytes after those that came with its first one
-CONNECTIONS_MOST: Final = 2000
 FILES_WANTED: Final = 4096  # as the unit's LimitNOFILE
 FILES_KEPT: Final = 200  # for all that is no connection
 
@@ -167,7 +167,7 @@ class Connection(HttpToolsProtocol):
     """
 
     proxies: ClassVar = NamedProxies()
-    places: ClassVar = ClientPlaces(shares(CONNECTIONS_MOST), proxies)
+    places: ClassVar = ClientPlaces(PLACE_LIMITS["connections"].places, proxies)
     waiting: ClassVar[dict["Connection", None]] = {}  # for their first head, the oldest first
 
     client_transport: ClientTransport

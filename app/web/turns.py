@@ -13,14 +13,12 @@ from collections import OrderedDict, deque
 from enum import IntEnum
 from typing import Final, Generic, TypeVar
 
-from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from app.cell.permission.client_limits import RATE_LIMITS, RateGuard
 from app.cell.permission.client_places import KIOSK
-from app.system.limits import Quota, TokenBuckets
-from app.system.texts import render, say
-from app.web.caller import Caller, caller_in
-from app.web.security import moves, refuse
+from app.web.caller import caller_in
+from app.web.security import moves, refuse, too_many
 
 # Whose request is next: those that may move something first, then what the kiosk's own machine reads,
 # then what others read, and within each of these the clients in turn.
@@ -90,12 +88,9 @@ class TurnQueue(Generic[Item]):
 
 log = logging.getLogger("kiosk.connections")
 
-# Of a client on another machine. A first page loads 30 files; presses have limits of their own, below.
-READ_QUOTA: Final = Quota(600, 60)
-COMMAND_QUOTA: Final = Quota(400, 200)
-WAITING_MOST: Final = 64  # of such a client
+WAITING_MOST: Final = 64  # of a client on another machine
 KIOSK_WAITING_MOST: Final = 512
-RETRY_AFTER_S: Final = 1
+RATES: Final = {Lane.COMMAND: "commands", Lane.READ: "reads"}
 REFUSED_AFTER_S: Final = 0.5
 PAUSE_MOST_S: Final = 0.1  # after a request that read something: as long as it took, at most this
 
@@ -105,7 +100,7 @@ class Turns:
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
-        self._reads, self._commands = TokenBuckets(READ_QUOTA), TokenBuckets(COMMAND_QUOTA)
+        self._rates = RateGuard(*RATES.values())
         self._queue: TurnQueue[asyncio.Future[None]] = TurnQueue(WAITING_MOST, KIOSK_WAITING_MOST)
         self._giving: asyncio.Task[None] | None = None
         self._came = asyncio.Event()
@@ -118,7 +113,7 @@ class Turns:
             where = scope["client"][0] if scope.get("client") else "a local socket"
             log.warning("too many requests from %s: answered 429", where)
             await asyncio.sleep(REFUSED_AFTER_S)
-            await refuse(_too_many(caller_in(scope)), scope, receive, send)
+            await refuse(too_many(caller_in(scope), RATE_LIMITS["reads"]), scope, receive, send)
 
     async def _turn(self, scope: Scope) -> bool:
         """Waits for the turn of a request; False if its client has too many."""
@@ -139,11 +134,8 @@ class Turns:
 
     def _admit(self, client: str, lane: Lane) -> bool:
         """Whether a client may have one more request."""
-        if client not in KIOSK:
-            rates = self._commands if lane is Lane.COMMAND else self._reads
-            if not rates.has_token(client):
-                return False
-            rates.take_token(client)
+        if client not in KIOSK and self._rates.exceeded(False, **{RATES[lane]: client}):
+            return False
         return self._queue.has_room(client, lane)
 
     async def _give(self, begun: Lane | None) -> None:
@@ -179,12 +171,3 @@ class Turns:
                 await self._came.wait()
         except TimeoutError:
             pass
-
-
-def _too_many(caller: Caller) -> Response:
-    """A sentence: to render a page would take the time that is saved here."""
-    sentence = render(say("too_many_requests"), caller.language)
-    headers = {"retry-after": str(RETRY_AFTER_S), "cache-control": "no-store"}
-    if caller.accepts_html:
-        return PlainTextResponse(sentence, 429, headers | {"refresh": str(2 * RETRY_AFTER_S)})
-    return JSONResponse({"error": sentence}, 429, headers)

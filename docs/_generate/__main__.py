@@ -14,6 +14,7 @@ from bench.report.pages import comparison_table, last_results, readme_section
 from docs._generate.findings import findings_tables
 from docs._generate.icon_names import icon_list
 from docs._generate.keys import key_tables
+from docs._generate.limits import limits_table
 from docs._generate.locks import lock_tables, translated_page, translations
 from docs._generate.places import models_table, paths_table, sentences_table
 from docs._generate.schema import FILE as SCHEMA
@@ -31,6 +32,7 @@ def files() -> Iterator[tuple[Path, str]]:
         "reference/icons.md": {"icons": icon_list()},
         "reference/locks.md": lock_tables(),
         "reference/settings.md": {"settings": settings_table()},
+        "reference/http.md": {"limits": limits_table()},
         "reference/sentences.md": {"sentences": sentences_table()},
         "how-to/doctor.md": findings_tables(),
         "comparison.md": {"figures": comparison_table(last_results())},

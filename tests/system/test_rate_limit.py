@@ -2,12 +2,16 @@
 
 import pytest
 
-from app.cell.commands.judge import ADDRESS_QUOTA, CANCEL_QUOTA, CLIENT_QUOTA, TOTAL_QUOTA, PressLimits
+from app.cell.commands.judge import PressLimits
+from app.cell.permission.client_limits import RATE_LIMITS
 from app.records import Origin
 from app.records.principal import Client, Principal, anonymous
 from app.system.limits import MAX_BUCKETS, Quota, TokenBuckets
 
 AT_THE_CELL = "127.0.0.1"
+CLIENT_QUOTA, ADDRESS_QUOTA, TOTAL_QUOTA, CANCEL_QUOTA = (
+    RATE_LIMITS[name].quota for name in ("presses", "address_presses", "other_presses", "cancels")
+)
 
 
 class Pressing:

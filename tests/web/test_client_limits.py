@@ -10,9 +10,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from typing import Final
 
 import httpx
@@ -21,15 +22,20 @@ from websockets.exceptions import ConnectionClosed
 from websockets.protocol import State
 from websockets.sync.client import ClientConnection, connect
 
-from app.cell.session.frames import VIEWERS
-from app.web.turns import READ_QUOTA
+from app.cell.permission.client_limits import RATE_LIMITS, VIEWERS
+from app.system.texts import render, say
+from app.web.caller import COOKIE
+from tests.cell.commands.test_press_limits import FREE
+from tests.support.apps.small import PRESSES
 from tests.support.holds import PANEL
 from tests.support.parts import ENOUGH_S, ROOT, Server, until
 from tests.support.servers import demo_server
+from tests.support.users import token_of
 from tests.web.test_hold_socket import Socket, held
 
 pytestmark = pytest.mark.promise("security")
 
+READ_QUOTA: Final = RATE_LIMITS["reads"].quota
 KIOSK: Final = "127.0.0.1"
 OTHER: Final = "127.0.0.2"
 ANOTHER: Final = "127.0.0.3"
@@ -239,3 +245,78 @@ def test_a_viewer_that_asks_for_nothing_is_closed(cell: Server) -> None:
         with pytest.raises(ConnectionClosed):
             silent[0].recv(ENOUGH_S)
         assert silent[0].close_code == 4408
+
+
+# Each rate of the table, over HTTP. The test is a proxy, which says the addresses of the clients.
+
+
+def post(server: Server, path: str, address: str, body: object, **headers: str) -> httpx.Response:
+    """`address` is "" for the kiosk's own machine."""
+    way = {"x-forwarded-for": address} if address else {}
+    return httpx.post(f"{server.url}{path}", json=body, headers=way | headers, timeout=ENOUGH_S)
+
+
+def pressed(server: Server, address: str, **headers: str) -> httpx.Response:
+    return post(server, "/widgets/free", address, {"inputs": {}}, **headers)
+
+
+def canceled(server: Server, press_id: str) -> httpx.Response:
+    return post(server, "/widgets/count/cancel", "", {"press": press_id})
+
+
+def read(server: Server, address: str) -> httpx.Response:
+    headers = {"x-forwarded-for": address}
+    return httpx.get(f"{server.url}/healthz", headers=headers, timeout=ENOUGH_S)
+
+
+def by_token(server: Server, name: str) -> httpx.Response:
+    bearer = (server.data / f"{name}.token").read_text()
+    return server.http.get("/healthz", headers={"authorization": f"Bearer {bearer}"})
+
+
+def signed_in(server: Server, address: str, number: int) -> httpx.Response:
+    return post(server, "/session", address, {"user": f"nobody {number}", "password": "none"})
+
+
+# The request of a client, by its number, and that of another one.
+Ask = Callable[[Server, int], httpx.Response]
+FAR, FARTHER, AT_THE_CELL = "192.0.2.7", "192.0.2.8", ""
+ASKS: Final[dict[str, tuple[Ask, Ask]]] = {
+    "presses": (lambda s, _: pressed(s, FAR), lambda s, _: pressed(s, FARTHER)),
+    "address_presses": (
+        lambda s, n: pressed(s, FAR, cookie=f"{COOKIE}={n:032x}"),
+        lambda s, _: pressed(s, FARTHER),
+    ),
+    "other_presses": (
+        lambda s, n: pressed(s, f"198.51.100.{n + 1}"),
+        lambda s, _: pressed(s, AT_THE_CELL),
+    ),
+    "cancels": (lambda s, _: canceled(s, "p1"), lambda s, _: canceled(s, "p2")),
+    "reads": (lambda s, _: read(s, FAR), lambda s, _: read(s, FARTHER)),
+    "commands": (
+        lambda s, _: post(s, "/session/here", FAR, {}),
+        lambda s, _: post(s, "/session/here", FARTHER, {}),
+    ),
+    "token_requests": (lambda s, _: by_token(s, "line"), lambda s, _: by_token(s, "cell")),
+    "sign_ins": (
+        lambda s, n: signed_in(s, f"198.51.100.{n + 1}", n),
+        lambda s, n: signed_in(s, AT_THE_CELL, n),
+    ),
+}
+
+
+@pytest.mark.long("table")
+@pytest.mark.parametrize("name", ASKS)
+def test_over_a_rate_a_client_is_told_so_and_no_one_else_is(name: str, tmp_path: Path) -> None:
+    assert {*ASKS, "provider_sign_ins"} == {*RATE_LIMITS}  # that one needs a provider
+    for token in ("line", "cell"):
+        (tmp_path / f"{token}.token").write_text(token_of(tmp_path, token, "operator"))
+    more = {"STRICT_LIMIT": name, "KIOSK_DATA": str(tmp_path), "KIOSK_PROXIES": KIOSK}
+    ask, another = ASKS[name]
+    with demo_server(tmp_path, PANEL + FREE, app="tests.support.apps.strict:app", **more) as server:
+        answers = (ask(server, number) for number in range(5 * PRESSES))
+        refused = next(answer for answer in answers if answer.status_code == 429)
+        assert another(server, 0).status_code != 429
+    limit, said = RATE_LIMITS[name], refused.json()
+    assert refused.headers["retry-after"] == str(limit.retry_after_s)
+    assert render(say(limit.sentence)) in (said.get("error") or said["reason"])

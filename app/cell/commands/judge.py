@@ -9,6 +9,7 @@ from typing import Final
 
 from app.cell.commands.press import EVENT_ID, Press
 from app.cell.commands.receipts import MAX_FINAL_CHECKS, Refusal
+from app.cell.permission.client_limits import RATE_LIMITS, RateGuard
 from app.cell.permission.control import ControlAuthority
 from app.cell.permission.press_permission import ServerConditions, cause_of, judged, with_hint
 from app.cell.permission.roles import UNKNOWN_USERS, ConfirmLocks
@@ -24,7 +25,6 @@ from app.records.press_record import Log, PendingEntry, origin_of
 from app.records.principal import Principal
 from app.system import clock
 from app.system.errors import InputError, PressRefused
-from app.system.limits import Quota, TokenBuckets
 from app.system.texts import TextLike, number, say
 
 # The server's own conditions for a press, and whether the view that the operator saw is stale.
@@ -221,18 +221,8 @@ class PressJudge:
 
 # Rate limits of presses, for all robots together. A press over a limit is not checked, sent or
 # recorded.
-#
-# A client is a browser with a cookie; programs without one are one client per address. Addresses have
-# their own limit, because cookies are easily invented, and all addresses share a total limit. The
-# kiosk's own machine is exempt from the total: a flood from the network must not block the panel at the
-# cell.
 
-# A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
-CLIENT_QUOTA: Final = Quota(100, 50)
-ADDRESS_QUOTA: Final = Quota(200, 100)
-TOTAL_QUOTA: Final = Quota(400, 200)
-CANCEL_QUOTA: Final = Quota(20, 5)  # of one goal, by all clients together
-RETRY_AFTER_S: Final = 1  # every bucket refills sooner; Retry-After is in whole seconds
+RETRY_AFTER_S: Final = RATE_LIMITS["presses"].retry_after_s
 
 
 class PressLimits:
@@ -243,35 +233,28 @@ class PressLimits:
     ) -> None:
         """`leave_out` counts a refused press for the operator's log, which has no entry of it."""
         self._count_unlogged = leave_out
-        self._clients = TokenBuckets(CLIENT_QUOTA, monotonic)
-        self._addresses = TokenBuckets(ADDRESS_QUOTA, monotonic)
-        self._all = TokenBuckets(TOTAL_QUOTA, monotonic)
-        self._cancels = TokenBuckets(CANCEL_QUOTA, monotonic)
+        rows = "presses", "address_presses", "other_presses", "cancels"
+        self._guard = RateGuard(*rows, monotonic=monotonic)
         self.refused = 0
 
     def admit(self, who: Principal) -> bool:
         """Whether a client may press now. Counts refused presses, here and for the log."""
-        needed: list[tuple[TokenBuckets, Hashable]] = [
-            (self._clients, (who.client.address, who.client.id)),
-            (self._addresses, who.client.address),
-        ]
-        if not who.client.local:
-            needed.append((self._all, ""))
-        if not all(buckets.has_token(key) for buckets, key in needed):
-            return self._refuse(who)
-        for buckets, key in needed:
-            buckets.take_token(key)
-        return True
+        client = who.client
+        return self._admitted(
+            who,
+            presses=(client.address, client.id),
+            address_presses=client.address,
+            other_presses="",
+        )
 
     def admit_cancel(self, who: Principal, *goal: str) -> bool:
         """Whether a goal may be canceled now. The limit is per goal, so that presses and other goals
         never block a cancel."""
-        if not self._cancels.has_token(goal):
-            return self._refuse(who)
-        self._cancels.take_token(goal)
-        return True
+        return self._admitted(who, cancels=goal)
 
-    def _refuse(self, who: Principal) -> bool:
+    def _admitted(self, who: Principal, **keys: Hashable) -> bool:
+        if self._guard.exceeded(who.client.local, **keys) is None:
+            return True
         self.refused += 1
         self._count_unlogged(origin_of(who))
         return False

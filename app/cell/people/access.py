@@ -30,12 +30,12 @@ from app.cell.people.secrets_hash import (
 from app.cell.people.sessions import Session, Sessions
 from app.cell.people.users import Edit, User, UserBook, name_key, rights_of
 from app.cell.people.users_file import NEVER_READ, Loaded, Stamp, UsersFile, is_lost
+from app.cell.permission.client_limits import RATE_LIMITS, RateGuard
 from app.cell.permission.client_places import client_key
 from app.panel.roles import ROLES, VIEWER
 from app.panel.rules import AccessRules
 from app.records.principal import Client, Principal, public_id
-from app.system.errors import TooMany
-from app.system.limits import BoundedDict, Quota, TokenBuckets
+from app.system.limits import BoundedDict
 from app.system.texts import TextLike, say
 
 # Hashes secrets beside the event loop, on one thread for the kiosk's own machine and one for all
@@ -44,8 +44,6 @@ from app.system.texts import TextLike, say
 
 NICE: Final = 10
 MOST_WAITING: Final = 4
-OTHERS_QUOTA: Final = Quota(10, per_s=1)  # sign-ins from all other machines together
-AGAIN_S: Final = 2
 
 Result = TypeVar("Result")
 
@@ -55,7 +53,7 @@ class SecretChecker:
 
     def __init__(self, cost: Cost, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.cost = cost
-        self._others = TokenBuckets(OTHERS_QUOTA, monotonic)
+        self._rate = RateGuard("sign_ins", monotonic=monotonic)
         self._waiting = {True: 0, False: 0}
         self._threads = {
             True: ThreadPoolExecutor(1, "sign-in-here"),
@@ -65,10 +63,8 @@ class SecretChecker:
 
     def admit(self, local: bool) -> None:
         """TooMany if more sign-ins are under way than may be."""
-        if self._waiting[local] >= MOST_WAITING or not (local or self._others.has_token("")):
-            raise TooMany(say("sign_in_busy"), AGAIN_S)
-        if not local:
-            self._others.take_token("")
+        if self._waiting[local] >= MOST_WAITING or self._rate.exceeded(local, sign_ins=""):
+            raise RATE_LIMITS["sign_ins"].error
 
     async def user_of(
         self, book: UserBook, name: str, way: Way, secret: str, local: bool
@@ -263,7 +259,6 @@ def _leak_of(key: Key) -> Leak:
 
 log = logging.getLogger("kiosk.access")
 
-TOKEN_QUOTA: Final = Quota(100, 50)
 WATCHED_EVERY_S: Final = 0.5
 EndReason = Literal["sign_out", "hand_over", "idle", "changed", "limit"]
 # Why a session ended that its user did not end.
@@ -322,7 +317,7 @@ class Access:
         self._stamp: Stamp | None = NEVER_READ
         self._monotonic = monotonic
         self._end_reasons = BoundedDict[str, EndReason](MAX_END_REASONS)  # by client
-        self._token_requests = TokenBuckets(TOKEN_QUOTA, monotonic)
+        self._token_requests = RateGuard("token_requests", monotonic=monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
 
@@ -401,10 +396,9 @@ class Access:
     def admit_token(self, bearer: str) -> bool:
         """Whether a program may make a request now, by the rate limit of its token."""
         token = self.book.token(bearer)
-        if token is None or not self._token_requests.has_token(token.hash):
+        if token is None:
             return False
-        self._token_requests.take_token(token.hash)
-        return True
+        return not self._token_requests.exceeded(False, token_requests=token.hash)
 
     def _program(self, client: Client, bearer: str) -> Principal:
         token = self.book.token(bearer)

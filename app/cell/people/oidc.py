@@ -20,12 +20,13 @@ from urllib.error import HTTPError
 from urllib.parse import quote, urlencode
 from urllib.request import HTTPRedirectHandler, Request, build_opener
 
+from app.cell.permission.client_limits import RATE_LIMITS, RateGuard
 from app.cell.permission.client_places import client_key
 from app.panel.roles import ROLES
 from app.panel.rules import OidcRules, is_protected
 from app.records.principal import Client
 from app.system.errors import KioskError, TooMany
-from app.system.limits import BoundedDict, Quota, TokenBuckets
+from app.system.limits import BoundedDict
 from app.system.printable import printable
 from app.system.texts import Text, TextLike, say
 
@@ -300,8 +301,7 @@ LONGEST_NAME: Final = 60
 LIFE_S: Final = 600.0  # for somebody to type a password there
 MAX_PENDING: Final = 500
 MOST_WAITING: Final = 8
-BEGIN_QUOTA: Final = Quota(10, per_s=0.5)  # of each other machine
-AGAIN_S: Final = 2
+LIMIT: Final = RATE_LIMITS["provider_sign_ins"]
 
 REASONS: Final = frozenset(
     {
@@ -350,17 +350,14 @@ class OidcSignIns:
         self._monotonic = monotonic
         self._pending = BoundedDict[str, PendingSignIn](MAX_PENDING)
         self._threads = ThreadPoolExecutor(2, "oidc")
-        self._quota = TokenBuckets(BEGIN_QUOTA, monotonic)
+        self._rate = RateGuard("provider_sign_ins", monotonic=monotonic)
         self._waiting = 0
 
     async def begin(self, client: Client, redirect_uri: str) -> tuple[str, str]:
         """The provider's address for a browser, and the state of this sign-in. OidcError if the
         provider is away, TooMany for too many at once."""
-        key = client_key(client.address)
-        if not client.local:
-            if not self._quota.has_token(key):
-                raise TooMany(say("sign_in_busy"), AGAIN_S)
-            self._quota.take_token(key)
+        if self._rate.exceeded(client.local, provider_sign_ins=client_key(client.address)):
+            raise LIMIT.error
         pending = PendingSignIn(client, redirect_uri, self._monotonic())
         url = await self._run(
             partial(
@@ -410,7 +407,7 @@ class OidcSignIns:
 
     async def _run(self, work: Callable[[], Result]) -> Result:
         if self._waiting >= MOST_WAITING:
-            raise TooMany(say("sign_in_busy"), AGAIN_S)
+            raise LIMIT.error
         self._waiting += 1
         try:
             return await asyncio.get_running_loop().run_in_executor(self._threads, work)

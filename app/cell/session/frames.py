@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.cell.link.peer import RobotContext
-from app.cell.permission.client_places import ClientPlaces, PlaceLimits
+from app.cell.permission.client_limits import VIEWERS
+from app.cell.permission.client_places import ClientPlaces
 from app.cell.robot.pictures import NoPicture, Picture, picture
 from app.cell.robot.topics import CameraTopicState
 from app.panel.widgets.displays import Camera
@@ -23,7 +24,6 @@ from app.system.errors import LinkError, TooMany
 from app.system.texts import TextLike, say
 
 LINGER_S: Final = 6.0  # a page without scripts requests the next frame after five seconds
-VIEWERS: Final = PlaceLimits(total=32, others=28, client=12, kiosk=16)  # of one topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)

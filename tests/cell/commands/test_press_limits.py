@@ -17,7 +17,7 @@ import pytest
 from playwright.sync_api import Page
 from websockets.exceptions import ConnectionClosed
 
-from app.cell.commands.judge import CLIENT_QUOTA
+from app.cell.permission.client_limits import RATE_LIMITS
 from app.web.routes.presses import MOST_REFUSED
 from tests.support.apps.small import PRESSES
 from tests.support.holds import PANEL
@@ -42,6 +42,7 @@ action = "/count"
 type = "example_interfaces/action/Fibonacci"
 goal = { order = 40 }
 """
+CLIENT_QUOTA = RATE_LIMITS["presses"].quota
 FORM = {"content-type": "application/x-www-form-urlencoded"}
 TOO_OFTEN = "too many presses in a short time. Wait a second, then press again."
 numbers = count()

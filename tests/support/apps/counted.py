@@ -7,11 +7,13 @@ limits.
 import asyncio
 import gc
 from collections.abc import Iterator, Sized
-from typing import Any
+from dataclasses import replace
+from typing import Any, cast
 
 from fastapi import Request
 
-from app.cell.commands import judge, services
+from app.cell.commands import services
+from app.cell.permission.client_limits import RATE_LIMITS
 from app.main import app
 from app.system.limits import Quota
 from app.system.texts import text
@@ -20,7 +22,8 @@ from app.web.app_state import site_of
 LATE_S = 0.5
 UNLIMITED = Quota(1e9, 1e9)
 vars(services)["LATE_S"] = LATE_S  # Final in the application
-vars(judge).update(CLIENT_QUOTA=UNLIMITED, ADDRESS_QUOTA=UNLIMITED)
+for name in ("presses", "address_presses"):
+    cast(dict[str, Any], RATE_LIMITS)[name] = replace(RATE_LIMITS[name], quota=UNLIMITED)
 
 
 @app.get("/sizes")
