@@ -18,7 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from bench import flood
+from bench import flood, light
 from bench.kiosk import Kiosk
 from bench.peer import Peer
 from bench.peers import PEERS
@@ -98,6 +98,13 @@ class Run:
             for name, figures in flood.steps():
                 self._store.add("flood", 0, name, figures)
 
+    def light(self) -> None:
+        """What this panel costs beside the least that its libraries take."""
+        self._store.begin("light")
+        with timed("light"), self._store.faults("light"):
+            for name, figures in light.steps():
+                self._store.add("light", 0, name, figures)
+
     def _shown(self) -> list[tuple[str, Peer]]:
         """The peers whose pages show texts, each event stream once."""
         return [(p.id, p) for p in self._peers if p.button and p.id not in SAME_STREAM]
@@ -115,7 +122,9 @@ class Run:
                     self._store.add(phase, turn, name, measure(self._rig, peer))
 
 
-PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth", "dialects", "flood")
+PHASES: Final = (
+    *("down", "bridge", "up", "cost", "stalled", "start", "growth", "dialects", "flood", "light"),
+)
 
 
 @contextmanager

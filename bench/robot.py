@@ -10,46 +10,10 @@ import random
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Final
 
-from bench.ways import OverRmw, OverRos, OverZenoh, Way
+from bench.over_zenoh import Load, OverZenoh
+from bench.ways import OverRmw, OverRos, Way
 from tests.ros_nodes.commands import obey
-
-TICK_S: Final = 0.001
-
-
-def text_of(number: int, size: int) -> str:
-    """A text of at least `size` bytes that begins with its number."""
-    return f"#{number:09d}#".ljust(size, "x")
-
-
-class Load:
-    """Publishes texts on several topics, at `hz` on each, until `end`."""
-
-    def __init__(self, say: list[Callable[[str], None]], hz: float, size: int) -> None:
-        self.put_at: list[int] = []  # time by number
-        self._say = say
-        self._per_s = hz * len(say)
-        self._size = size
-        self._ends = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        began = time.monotonic()
-        while not self._ends.is_set():
-            due = (time.monotonic() - began) * self._per_s
-            while (number := len(self.put_at)) < due:
-                text = text_of(number, self._size)
-                self.put_at.append(time.monotonic_ns())
-                self._say[number % len(self._say)](text)
-            next_s = began + (len(self.put_at)) / self._per_s - time.monotonic()
-            self._ends.wait(max(TICK_S, next_s))
-
-    def end(self) -> list[int]:
-        self._ends.set()
-        self._thread.join()
-        return self.put_at
 
 
 class Robot:

@@ -4,8 +4,6 @@ node on rmw_zenoh."""
 import contextlib
 import hashlib
 import itertools
-import json
-import socket
 import struct
 import threading
 import time
@@ -18,9 +16,8 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool, String
 from zenoh.handlers import Callback
 
-ENABLED: Final = "/operation_enabled"
-COMMAND: Final = "/operation1"
-HEADER: Final = b"\x00\x01\x00\x00"  # CDR, little-endian
+from bench.over_zenoh import COMMAND, ENABLED, HEADER, listening
+
 DEEP: Final = QoSProfile(depth=1000)
 # Types and hashes, as rmw_zenoh's key expressions end.
 TYPES: Final = {
@@ -40,67 +37,6 @@ class Way(Protocol):
     def offer(self, topic: str) -> None: ...
     def say(self, topic: str, text: str) -> None: ...
     def close(self) -> None: ...
-
-
-class OverZenoh:
-    """Keys, CDR payloads, tokens and admin space like those of a robot behind zenoh-bridge-ros2dds."""
-
-    def __init__(self, namespace: str = "") -> None:
-        self.locator = f"tcp/127.0.0.1:{free_port()}"
-        self.heard: list[tuple[int, str]] = []
-        self._prefix = f"{namespace[1:]}/" if namespace else ""
-        self._session = zenoh.open(listening(self.locator))
-        self._zid = str(self._session.zid())
-        self._publishers: dict[str, Any] = {}
-        self._kept = [
-            self._queryable("version", '"1.10.2"'),
-            self._queryable("config", json.dumps({"namespace": namespace or "/"})),
-            self._session.declare_subscriber(
-                self._prefix + COMMAND[1:], Callback(self._hear, indirect=False)
-            ),
-            self._token("MS", COMMAND, "String"),
-            self._session.liveliness().declare_token(f"@/{self._zid}/@ros2_lv"),
-        ]
-        self._offer(ENABLED, "Bool")
-
-    def _hear(self, sample: zenoh.Sample) -> None:
-        at = time.monotonic_ns()
-        self.heard.append((at, sample.payload.to_bytes()[8:].split(b"\0")[0].decode()))
-
-    def _queryable(self, entity: str, text: str) -> Any:
-        key = f"@/{self._zid}/ros2/{entity}"
-
-        def answer(query: zenoh.Query) -> None:
-            with query:
-                query.reply(key, text.encode())
-
-        return self._session.declare_queryable(key, Callback(answer, indirect=False), complete=True)
-
-    def _token(self, role: str, topic: str, type_name: str) -> Any:
-        key = (self._prefix + topic[1:]).replace("/", "§")
-        token = f"@/{self._zid}/@ros2_lv/{role}/{key}/std_msgs§msg§{type_name}/:1:0:0,10"
-        return self._session.liveliness().declare_token(token)
-
-    def _offer(self, topic: str, type_name: str) -> None:
-        if topic not in self._publishers:
-            # As in the bridge for reliable topics; express, because a bridge forwards without batching.
-            self._publishers[topic] = self._session.declare_publisher(
-                self._prefix + topic[1:], congestion_control=zenoh.CongestionControl.DROP, express=True
-            )
-            self._kept.append(self._token("MP", topic, type_name))
-
-    def offer(self, topic: str) -> None:
-        self._offer(topic, "String")
-
-    def enable(self, value: bool) -> None:
-        self._publishers[ENABLED].put(HEADER + bytes([value]))
-
-    def say(self, topic: str, text: str) -> None:
-        data = text.encode() + b"\0"
-        self._publishers[topic].put(HEADER + len(data).to_bytes(4, "little") + data)
-
-    def close(self) -> None:
-        self._session.close()
 
 
 class OverRos:
@@ -200,22 +136,3 @@ class OverRmw:
 
     def close(self) -> None:
         self._session.close()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-def listening(locator: str) -> zenoh.Config:
-    config = zenoh.Config()
-    for place, value in {
-        "mode": '"peer"',
-        "listen/endpoints": f'["{locator}"]',
-        "scouting/multicast/enabled": "false",
-        "scouting/gossip/enabled": "false",
-        "timestamping/enabled": "true",
-    }.items():
-        config.insert_json5(place, value)
-    return config

@@ -234,3 +234,20 @@ def test_rmw_zenoh_is_held_against_the_bridge() -> None:
     assert "| over the bridge | 4.00" in whole(
         measured | {"machine": {}}, {"kiosk-bridge": "over the bridge"}
     )
+
+
+def test_a_row_beside_its_floor_says_what_is_asked() -> None:
+    rows = {
+        "a press": {
+            "unit": "ms",
+            "panel": 5.0,
+            "floor": 1.0,
+            "ratio": 5.0,
+            "asked": 3.5,
+            "reached": False,
+        },
+        "idle": {"unit": "%", "panel": 1.5, "floor": 0.2, "ratio": 7.5, "asked": 2, "reached": True},
+    }
+    text = whole(results(light={"rounds": [rows]}), TITLES)
+    assert "| a press | 5 ms | 1 ms | 5.00 × | 3.5 ×: missed |" in text
+    assert "| idle | 1.5 % | 0.2 % | 7.50 × | 2 % |" in text

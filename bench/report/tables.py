@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from bench.light_rows import asked
 from bench.report.figures import ratio
 from bench.report.picture import picture
 from bench.report.store import Results, figure
@@ -48,6 +49,7 @@ def whole(results: Results, titles: Titles) -> str:
         "Growth of this panel": growth_table(results),
         "Both dialects": dialects_table(results, titles),
         "A flood of alarms on this panel": flood_table(results),
+        "Beside the floors of its libraries": light_table(results),
         "Not measured": faults(results, titles),
     }
     sections = [f"## {title}\n\n{part}" for title, part in parts.items() if part]
@@ -208,6 +210,22 @@ def flood_table(results: Results) -> str:
     ]
     head = ["10,000 alarms, and", "presses", "p50 in ms", "longest in ms", "server CPU %", "MiB"]
     return table([head, *rows]) if rows else ""
+
+
+def light_table(results: Results) -> str:
+    """What this panel takes beside the floors of `bench/light.py`, and what is asked of it."""
+    rounds = results.get("light", {}).get("rounds") or [{}]
+    rows = [
+        [
+            name,
+            f"{figures['panel']:.3g} {figures['unit']}",
+            f"{figures['floor']:.3g} {figures['unit']}",
+            f"{figures['ratio']:.2f} ×",
+            asked(figures),
+        ]
+        for name, figures in rounds[0].items()
+    ]
+    return table([["", "this panel", "floor", "ratio", "asked"], *rows]) if rows else ""
 
 
 def dialects_table(results: Results, titles: Titles) -> str:

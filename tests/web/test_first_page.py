@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import pytest
 
+from tests.budgets import check
 from tests.support.parts import ROOT, SHIPPED, Server
 from tests.support.servers import demo_server, ready
 
@@ -47,19 +48,11 @@ FILES: Final = re.compile(
     r'<link rel="(?:stylesheet|modulepreload|preload)" href="([^"]+)"'
     r'|<img [^>]*src="([^"]+)"|data-src="([^"]+)"'
 )
-GROWTH: Final = 1.05
 
 
 class FirstPage(NamedTuple):
     requests: int
     size: int  # in bytes
-
-
-# The limits, and the figures of 2026-11-29.
-MOST: Final = FirstPage(12, 60_000)
-SHIPPED_PAGE: Final = FirstPage(12, 53_700)
-MOST_OF_THREE: Final = FirstPage(12, 45_000)
-PAGE_OF_THREE: Final = FirstPage(8, 38_600)
 
 
 def first_page(server: Server) -> FirstPage:
@@ -77,10 +70,9 @@ def first_page(server: Server) -> FirstPage:
     return FirstPage(1 + len(files), size)
 
 
-def is_within(page: FirstPage, usual: FirstPage, most: FirstPage) -> None:
-    """No more than the usual figures and what they may grow by, and within the limits."""
-    assert page.requests <= min(usual.requests, most.requests)
-    assert page.size <= min(GROWTH * usual.size, most.size)
+def check_page(page: FirstPage, name: str) -> None:
+    check(f"first page, {name}: requests", page.requests)
+    check(f"first page, {name}: bytes", page.size)
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +82,9 @@ def shipped() -> Iterator[Server]:
 
 
 def test_first_page_of_the_shipped_panel_has_its_size(shipped: Server) -> None:
-    is_within(first_page(shipped), SHIPPED_PAGE, MOST)
+    check_page(first_page(shipped), "shipped panel")
 
 
 def test_first_page_of_three_widgets_has_its_size(tmp_path: Path) -> None:
     with demo_server(tmp_path, THREE) as server:
-        is_within(first_page(server), PAGE_OF_THREE, MOST_OF_THREE)
+        check_page(first_page(server), "three widgets")

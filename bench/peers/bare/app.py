@@ -28,7 +28,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     config = zenoh.Config.from_file(os.environ["KIOSK_ZENOH"])
     config.insert_json5("transport/shared_memory/enabled", "false")  # it would leave files behind
     with zenoh.open(config) as session:
-        app.state.start = session.declare_publisher("start")
+        app.state.start = session.declare_publisher("operation1")
         receive: Any = zenoh.handlers.Callback(lambda sample: None, indirect=False)
         kept = [session.declare_subscriber(topic, receive) for topic in TOPICS]
         yield
@@ -45,5 +45,5 @@ async def page(request: Request) -> HTMLResponse:
 
 @app.post("/press")
 async def press(press: Press, request: Request) -> dict[str, str]:
-    request.app.state.start.put(b"\x00\x01\x00\x00\x01")
+    request.app.state.start.put(b"\x00\x01\x00\x00\x03\x00\x00\x00go\x00")
     return {"id": press.id, "outcome": "published"}

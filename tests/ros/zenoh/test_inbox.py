@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 import pytest
 
 from app.ros.zenoh.inbox import KEPT_BYTES, KEPT_MOST, UNSEEN_BYTES, UNSEEN_MOST, Inbox
+from tests.budgets import check
 
 
 class Sent:
@@ -210,6 +211,25 @@ def test_what_nobody_looks_at_wakes_nobody_and_waits_for_a_whole_drain(
     assert list(inbox.drain(whole=False).samples) == ["permit"]
     sample = inbox.drain().samples["heard"]
     assert (sample.payload, sample.skipped, inbox.has_idle) == (b"two", 1, False)
+
+
+@pytest.mark.parametrize(
+    ("key", "frames", "name"),
+    [
+        ("unseen", 20, "wake-ups for 1,000 messages that no one looks at"),
+        ("heard", 20, "wake-ups for 1,000 messages in 20 frames"),
+        ("permit", 1000, "wake-ups for 1,000 permissions, a turn after each"),
+    ],
+)
+def test_messages_wake_the_loop_no_more_often(
+    inbox: Inbox, woken: list[bool], key: str, frames: int, name: str
+) -> None:
+    inbox.set_idle({"unseen"})
+    for number in range(1000):
+        inbox.put(key, b"%d" % number, None)
+        if (number + 1) % (1000 // frames) == 0:
+            inbox.drain(whole=False)
+    check(name, len(woken))
 
 
 @pytest.mark.parametrize("change", ["token", "transport", "cache"])
