@@ -9,10 +9,10 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 from app.cell.alarms.history import EVENT_NAMES, MAX_PAGE, NEWEST, HistoryFilter
 from app.cell.commands.acts import ActReceipt
 from app.cell.commands.alarm_acts import ALARM_ACTS
-from app.cell.commands.press import PRESS_ID
 from app.cell.commands.receipts import Receipt
 from app.system.clock import iso_time
-from app.web.answers import ReceiptAnswer
+from app.web.acts import ActBody
+from app.web.answers import ActAnswer, ReceiptAnswer
 from app.web.pages.alarms import AlarmChoice, Show, Sort
 from app.web.requests import Moment
 
@@ -70,19 +70,15 @@ class AlarmQuery(BaseModel):
         return AlarmChoice(self.show, self.priority, self.group, self.robot, self.sort, self.alarm)
 
 
-class AlarmActBody(BaseModel):
+class AlarmActBody(ActBody):
     """`occurrence` is what the screen showed, for `acknowledge`; `reason` is needed for `shelve` and
     `out_of_service`, and `until` or `for_s` (seconds) for `shelve`. `at` is when it was touched, in the
     server's own time. The same `id` again is the same act. `seen` is the id of the last event."""
-
-    model_config = ConfigDict(extra="forbid")
 
     occurrence: Occurrence | None = None
     reason: Annotated[str, Field(max_length=200)] = ""
     until: Moment | None = None
     for_s: Annotated[float, Field(gt=0, le=86_400)] | None = None
-    at: Moment | None = None
-    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(max_length=40)] = ""
 
     def values(self, alarm: str, now: float) -> dict[str, Any]:
@@ -101,14 +97,10 @@ class AlarmActBody(BaseModel):
         return values
 
 
-class AcknowledgeBody(BaseModel):
+class AcknowledgeBody(ActBody):
     """`alarms` has the occurrences that the screen showed, by the alarms' ids."""
 
-    model_config = ConfigDict(extra="forbid")
-
     alarms: Annotated[dict[str, Occurrence], Field(max_length=MAX_ACKNOWLEDGED)]
-    at: Moment | None = None
-    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(max_length=40)] = ""
 
 
@@ -208,19 +200,12 @@ class HistoryAnswer(BaseModel):
     older: int | None
 
 
-class AlarmReceipt(BaseModel):
+class AlarmReceipt(ActAnswer):
     """The receipt of an act: `reason` is "" where it was done, `code` is its stable name. `command` is
     the receipt of the alarm's `ack_command`, null if none was sent or answered; `reason` then says
     what became of it."""
 
-    id: str
     alarm: str
-    act: str
-    outcome: str
-    code: str
-    reason: str
-    at: AwareDatetime
-    done: bool
     command: ReceiptAnswer | None
 
 

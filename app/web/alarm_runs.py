@@ -57,7 +57,7 @@ class AlarmRuns:
         runner = session.alarm_acts
         # One rendered page has one id for all its buttons, and each is an act of its own.
         act_id = f"{body.id}.{act}.{alarm_id}" if body.id else secrets.token_hex(8)
-        at = body.at.timestamp() if self._scripted and body.at else None
+        at = body.at.timestamp() if body.at else None
         values = body.values(alarm_id, time.time())
         if body.id and body.for_s is not None and (earlier := runner.request(act_id)):
             values = dict(earlier.values)  # its end was that of the first request

@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
-from fastapi import Request
 from fastapi.responses import JSONResponse, Response
 from pydantic import AwareDatetime, BaseModel, Field, JsonValue
 
-from app.cell.commands.acts import ActReceipt
 from app.cell.commands.judge import RETRY_AFTER_S
 from app.system.texts import localized
-from app.web.caller import caller_of
+from app.web.caller import Caller
 
 # The receipt of a press as JSON, and the HTTP status by the cause of its refusal.
 
@@ -55,9 +53,10 @@ class ActAnswer(BaseModel):
     done: bool
 
 
-def act_answer(request: Request, receipt: ActReceipt, **more: Any) -> Response:
-    """The receipt in the language of the request, with `more` beside it."""
-    said = {**receipt.as_json(), "done": receipt.done, **more}
-    content = localized(said, caller_of(request).language)
-    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
+def receipt_answer(caller: Caller, content: Mapping[str, Any], cause: str) -> Response:
+    """Receipts as JSON, in the language of who asks; `cause` is why the first that was not done was
+    refused."""
+    headers = {"cache-control": "no-store"}
+    if cause == "limit":
+        headers["retry-after"] = str(RETRY_AFTER_S)
+    return JSONResponse(localized(content, caller.language), STATUS[cause], headers)

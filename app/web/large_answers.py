@@ -1,5 +1,5 @@
-"""Answers that may be large: made and packed on a thread, one at a time, so that holds and events go on
-beside them."""
+"""Listings: a page for who reads pages, JSON for programs. Answers that may be large are made and
+packed on a thread, one at a time, so that holds and events go on beside them."""
 
 import asyncio
 import gzip
@@ -22,6 +22,11 @@ SMALL: Final = 50  # rows of which an answer takes some milliseconds
 _turn: Final = asyncio.Semaphore(1)
 
 
+def wants_page(request: Request) -> bool:
+    """Whether the client reads pages; a program gets JSON."""
+    return "text/html" in request.headers.get("accept", "")
+
+
 async def rows_answer(request: Request, content: Callable[[], dict[str, Any]], count: int) -> Response:
     """The JSON of a content with so many rows, with its texts in the reader's language. `content` may
     be called on a thread: its rows must not change."""
@@ -34,8 +39,8 @@ async def rows_answer(request: Request, content: Callable[[], dict[str, Any]], c
 
 async def packed_answer(request: Request, body: bytes) -> Response:
     """The JSON, packed if it is long and the client takes that."""
-    headers = {"cache-control": "no-store", "vary": "accept-encoding"}
-    if caller_of(request).accepts_gzip and len(body) > PACKED_BYTES:
+    headers = {"cache-control": "no-store", "vary": "accept, accept-encoding"}
+    if "gzip" in request.headers.get("accept-encoding", "") and len(body) > PACKED_BYTES:
         body = await asyncio.to_thread(gzip.compress, body, LEVEL)
         headers["content-encoding"] = "gzip"
     return Response(body, media_type=JSON, headers=headers)

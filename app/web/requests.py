@@ -3,7 +3,7 @@
 import asyncio
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Annotated, Any, Final, TypeVar
 from urllib.parse import parse_qsl
@@ -13,6 +13,7 @@ from pydantic import AwareDatetime, BaseModel, BeforeValidator, JsonValue, Valid
 from pydantic import Field as PydanticField
 from starlette.types import Message
 
+from app.system import clock
 from app.system.errors import InputError, TooSlow
 
 # Parts of openapi.json that several routes share: error responses and request bodies.
@@ -164,6 +165,7 @@ def _check(name: str, field: Field, text: str) -> None:
 LONGEST: Final = 64 * 1024  # bytes of a body; bytes or characters of a message on a socket
 BODY_WITHIN_S: Final = 10.0
 FIELDS_MOST: Final = 200  # of a form
+TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 TOO_BIG: Final = 1009  # RFC 6455
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -184,21 +186,32 @@ def kind_of(request: Request) -> str:
 
 
 async def act_body_of(
-    request: Request, form: FormFields | None = None, most: int = FIELDS_MOST
+    request: Request,
+    form: FormFields | None = None,
+    most: int = FIELDS_MOST,
+    files: Mapping[str, Callable[[bytes], dict[str, Any]]] | None = None,
 ) -> tuple[bool, dict[str, Any]]:
     """Whether the body of an act is a form, and its content: JSON, a form of at most so many fields
-    without the empty ones, or nothing at all. InputError for what is none, and for a form without
-    `form`."""
-    kind, content = kind_of(request), await body_of(request)
+    without the empty ones, a file of one of these media types, or nothing at all. InputError for what
+    is none, and for a form without `form`."""
+    kind, content, files = kind_of(request), await body_of(request), files or {}
     if kind == FORM and form is not None:
-        return True, dict(form.filled(form_of(content, most)))
+        return True, await _apart(content, lambda: form.filled(form_of(content, most)))
+    if kind in files:
+        return False, await _apart(content, lambda: files[kind](content))
     if kind not in (JSON, ""):
-        kinds = f'"{JSON}" or "{FORM}"' if form is not None else f'"{JSON}"'
+        *others, last = (f'"{known}"' for known in (JSON, *files, *([FORM] if form else ())))
+        kinds = f"{', '.join(others)} or {last}" if others else last
         raise InputError(f'the body must be {kinds}, not "{kind}"')
     decoded = json_of(content or b"{}")
     if not isinstance(decoded, dict):
         raise InputError("the body must be an object")
     return False, decoded
+
+
+async def _apart(content: bytes, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What `read` returns, on a thread if the content is large."""
+    return await asyncio.to_thread(read) if len(content) > LONGEST else read()
 
 
 def form_of(body: bytes, most: int = FIELDS_MOST) -> dict[str, str]:
@@ -215,6 +228,21 @@ def form_of(body: bytes, most: int = FIELDS_MOST) -> dict[str, str]:
             raise InputError("a field is in the form twice")
         fields[name] = value
     return fields
+
+
+def is_second_tap(form: Mapping[str, str]) -> bool:
+    """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
+    brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
+    shown_at = form_moment(form, "_since")
+    return shown_at is not None and clock.server_now() - shown_at < TAP_AGAIN_S
+
+
+def form_moment(form: Mapping[str, str], name: str) -> float | None:
+    """A time in the server's own seconds, None without one; InputError for what is none."""
+    text = form.get(name, "")
+    if text and not re.fullmatch(MOMENT, text):
+        raise InputError(f'{name}: "{text:.40}" is not that of a page')
+    return float(text) if text else None
 
 
 async def received(socket: WebSocket) -> Message:

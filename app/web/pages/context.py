@@ -14,7 +14,6 @@ from fastapi.responses import HTMLResponse, Response
 from markupsafe import Markup
 
 from app.cell.commands.alarm_acts import press_id_of, sentence_of
-from app.cell.commands.control_acts import TOO_OFTEN
 from app.cell.commands.receipts import Receipt
 from app.cell.permission.roles import role_reason, unmet
 from app.cell.session.session import RobotSession
@@ -33,6 +32,7 @@ from app.system import clock
 from app.system.clock import format_datetime, format_day, format_time, iso_time
 from app.system.printable import printable_texts
 from app.system.texts import Text, TextLike, localized, say
+from app.web.acts import said_of
 from app.web.app_state import AppState
 from app.web.assets import PICTURES
 from app.web.caller import QUERY as EMBED
@@ -111,7 +111,6 @@ def page_json(data: Mapping[str, Any], language: str) -> Markup:
 
 # The context of `frame.html`, the frame around every page.
 
-TOO_SOON: Final = say("press_too_soon")
 RELOADED: Final = "reloaded"  # by itself, without a tap
 RELOADED_S: Final = 2.0  # after the time to reload, a page is an old one: a press on it is refused
 
@@ -273,7 +272,7 @@ def page_context(
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
-        refused=_refused(session, request.query_params.get("control", "")),
+        refused=said_of(request.query_params.get("control", ""), [session.control_acts]),
         back=f"{state.root}/{alarms_page}" if is_alarms else back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
@@ -288,23 +287,13 @@ def _faded(receipt: Receipt | None) -> Receipt | None:
     return receipt if age_s < kept_s else replace(receipt, reason="")
 
 
-def _refused(session: RobotSession, query: str) -> TextLike:
-    """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
-    if query == TOO_OFTEN.code:
-        return TOO_OFTEN
-    receipt = session.control_acts.receipt(query)
-    return receipt.reason if receipt else ""
-
-
 def _alarm_refused(state: AppState, query: str) -> TextLike:
-    """What the receipt of an act on alarms says: `query` is its id, or the code where it is not
-    kept."""
-    if query in (TOO_OFTEN.code, TOO_SOON.code):
-        return say(query)
-    for session in state.fleet.sessions:
-        if receipt := session.alarm_acts.receipt(query):
-            return command_text(session, query) or receipt.reason
-    return ""
+    """What the receipt of an act on alarms says, and its command."""
+    sessions = state.fleet.sessions
+    for session in sessions:
+        if session.alarm_acts.receipt(query) and (said := command_text(session, query)):
+            return said
+    return said_of(query, [session.alarm_acts for session in sessions])
 
 
 # A page that is none of the panel's own, such as the operator's log, in the frame of the panel.

@@ -10,7 +10,6 @@ from urllib.parse import urlencode
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from app.cell.commands.press import PRESS_ID
 from app.cell.robot.traffic import MAX_COLUMNS, RoundTripSummary
 from app.cell.session.doctor_process import DoctorProcess, FoundFault
 from app.cell.session.looks import Look, NodeRoundTrips, Survey
@@ -45,8 +44,8 @@ from app.system.texts import (
     text_in,
 )
 from app.system.version import installed_version
+from app.web.acts import ActBody
 from app.web.answers import ActAnswer
-from app.web.requests import Moment
 
 # Values of the page of diagnostics as texts, in no language yet.
 
@@ -207,15 +206,11 @@ class LookQuery(BaseModel):
     form: Form = "text"
 
 
-class DiagnosticActBody(BaseModel):
+class DiagnosticActBody(ActBody):
     """The same `id` again is the same act. `at` is when it was touched, in the server's own time.
     `robot` is the id of one of several robots, whose recording is shared."""
 
-    model_config = ConfigDict(extra="forbid")
-
-    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     robot: Annotated[str, Field(max_length=64)] = ""
-    at: Moment | None = None
 
 
 class RoundTripsAnswer(BaseModel):

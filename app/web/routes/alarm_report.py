@@ -2,24 +2,21 @@
 
 import asyncio
 import json
-import secrets
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Annotated, Final, Literal, NamedTuple, TypedDict
-from urllib.parse import quote, urlencode
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.cell.alarms.figures import Figures
 from app.cell.alarms.history import HistoryRow
 from app.cell.alarms.records import text_of
 from app.cell.alarms.report import AlarmReport, Shift, StatePeriod, read_report, read_states, shift_at
-from app.cell.commands.acts import ActReceipt, ActRequest
-from app.cell.commands.control_acts import TOO_OFTEN
 from app.cell.commands.press import PRESS_ID
 from app.cell.commands.shift_acts import LONGEST_MESSAGE, SHIFT_ACTION
 from app.cell.view.times import duration_text
@@ -29,9 +26,9 @@ from app.records import Filter, LogRow, OperatorLog
 from app.system.clock import format_datetime, format_time
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, date_and_time, number, say, time_of_day
-from app.web.answers import ActAnswer, act_answer
+from app.web.acts import ActBody, act_responses, said_of, sent_act
+from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
-from app.web.caller import caller_of
 from app.web.pages.alarm_figures import (
     FiguresContext,
     clock_text,
@@ -43,17 +40,7 @@ from app.web.pages.alarms import word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import ACTION_WORDS, outcome_of, who_of
 from app.web.pages.log_words import word as log_word
-from app.web.requests import (
-    FormFields,
-    Moment,
-    TypedTime,
-    act_body_of,
-    as_model,
-    described_body,
-    errors,
-    parse_form_time,
-    refusals,
-)
+from app.web.requests import FormFields, TypedTime, described_body, errors, parse_form_time
 from app.web.routes.alarm_history import read_figures_of
 
 # The query of the shift report: of which time it is.
@@ -356,19 +343,14 @@ def now() -> float:
 
 router = APIRouter()
 
-FORM_FIELDS_MOST: Final = 10
 MESSAGE_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "text": {"maxLength": LONGEST_MESSAGE}})
 MESSAGES_READ: Final = 20  # of two shifts, the newest
 
 
-class MessageBody(BaseModel):
+class MessageBody(ActBody):
     """The same `id` again is the same message. `at` is when it was touched, in the server's time."""
 
-    model_config = ConfigDict(extra="forbid")
-
     text: Annotated[str, Field(max_length=LONGEST_MESSAGE)] = ""
-    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    at: Moment | None = None
 
 
 class MessageReceipt(ActAnswer):
@@ -399,8 +381,7 @@ async def report(
     query = urlencode(form.model_dump(exclude={"act"}, exclude_defaults=True))
     path = f"alarms/report?{query}"
     page = FramedPage("alarm-report.html", word("report_title"), alarms_page=path)
-    receipt = state.fleet.first.shift_acts.receipt(form.act)
-    refused = TOO_OFTEN if form.act == TOO_OFTEN.code else receipt.reason if receipt else ""
+    refused = said_of(form.act, [state.fleet.first.shift_acts])
     texts = {"word": word, "log_word": log_word, "refused_message": refused}
     return framed_page(request, state, page, {**context, **texts})
 
@@ -409,36 +390,14 @@ async def report(
     "/alarms/report",
     response_model=MessageReceipt,
     summary="Leave a message to the next shift",
-    responses=errors(408, 413, 422)
-    | refusals(MessageReceipt)
-    | {
-        303: {"description": "of a form: back to the report, with the receipt's id if it was refused"},
-        503: {"model": MessageReceipt, "description": "the operator's log can't be written"},
-    },
+    responses=act_responses(MessageReceipt),
     openapi_extra=described_body(MessageBody, MESSAGE_FORM.schema, required=False),
 )
 async def leave_message(request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, MESSAGE_FORM, FORM_FIELDS_MOST)
-    body = as_model(MessageBody, content)
-    who, token = caller_of(request).identified()
-    runner = state.fleet.first.shift_acts
-    act_id = body.id or secrets.token_hex(8)
-    at = body.at.timestamp() if body.at and not is_form else None
-    act = ActRequest("message", who, values={"text": body.text}, at=at, scripted=not is_form)
-    if not state.limits.admit(who):
-        receipt = runner.limited(act, act_id, TOO_OFTEN)
-    else:
-        with state.in_flight.track():
-            receipt = await runner.act(act, act_id)
-    return caller_of(request).with_client_cookie(_answer(request, state, receipt, is_form), token)
-
-
-def _answer(request: Request, state: AppState, receipt: ActReceipt, is_form: bool) -> Response:
-    if is_form:
-        shown = receipt.code if receipt.cause == "limit" else receipt.id
-        query = f"?act={quote(shown, safe='')}" if receipt.reason else ""
-        return RedirectResponse(f"{state.root}/alarms/report{query}", status_code=303)
-    return act_answer(request, receipt)
+    sent = await sent_act(request, state, MessageBody, MESSAGE_FORM)
+    asked = sent.asked("message", values={"text": sent.body.text})
+    receipt = await sent.run(state.fleet.first.shift_acts, asked, sent.act_id())
+    return sent.answer(receipt, f"{state.root}/alarms/report")
 
 
 async def _messages(state: AppState, before: Shift, shift: Shift) -> list[LogRow]:

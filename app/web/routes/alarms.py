@@ -3,13 +3,13 @@ and scripts, forms without them."""
 
 import asyncio
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, Final
 from urllib.parse import quote, urlencode, urlsplit
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict
 from pydantic import Field as PydanticField
 
@@ -17,16 +17,15 @@ from app.cell.alarms.history import read_history
 from app.cell.alarms.records import finite, transition
 from app.cell.alarms.shown import more_text
 from app.cell.alarms.states import AlarmInstance
-from app.cell.commands.acts import ActReceipt
 from app.cell.commands.alarm_acts import ALARM_ACTS, CONFIRMED
-from app.cell.commands.judge import RETRY_AFTER_S
 from app.cell.commands.press import PRESS_ID
 from app.cell.people.access import PIN_HERE
 from app.cell.people.secrets_hash import LONGEST
 from app.cell.permission.roles import ConfirmedBy, role_lock, role_name, role_verdict, strictest
 from app.records.principal import Principal
 from app.system.errors import NotFound
-from app.system.texts import TextLike, localized, say
+from app.system.texts import TextLike, say
+from app.web.acts import SentAct, act_responses, sent_with
 from app.web.alarm_answers import (
     AcknowledgeBody,
     AlarmActBody,
@@ -39,9 +38,9 @@ from app.web.alarm_answers import (
     receipt_json,
 )
 from app.web.alarm_runs import AlarmRun, AlarmRuns
-from app.web.answers import STATUS
+from app.web.answers import receipt_answer
 from app.web.app_state import AppState, CurrentState
-from app.web.caller import caller_of
+from app.web.caller import Caller, caller_of
 from app.web.large_answers import rows_answer
 from app.web.pages.alarms import alarms_context, chosen_rows, segment_counts, word
 from app.web.pages.confirm import Subject, confirm_sheet
@@ -50,17 +49,14 @@ from app.web.pages.words import Ask
 from app.web.requests import (
     PAGE,
     SINCE,
-    Described,
     Field,
     FormFields,
     act_body_of,
-    as_model,
     described_body,
     errors,
-    refusals,
+    is_second_tap,
 )
 from app.web.routes.confirm import FIELDS, checked_entry, entered_fields
-from app.web.routes.presses import is_second_tap
 
 # Acts on alarms that a person confirms with a PIN, password or badge: the page that asks for it.
 
@@ -201,24 +197,6 @@ AlarmAct = Annotated[str, Path(json_schema_extra={"enum": list(ALARM_ACTS)})]
 
 FORM_FIELDS_MOST: Final = 600
 OCCURRENCE: Final = "occurrence."  # begins the fields of a form that acknowledges several alarms
-TOO_OFTEN: Final = say("control_too_often")
-TOO_SOON: Final = say("press_too_soon")
-
-
-def _acts(model: type[BaseModel]) -> Described:
-    """The responses of an act: receipts of this model."""
-    return (
-        errors(404, 408, 413, 422)
-        | refusals(model)
-        | {
-            303: {
-                "description": "of a form: back to the page that it came from, with the receipt's id"
-            },
-            503: {"model": model, "description": "the operator's log can't be written"},
-        }
-    )
-
-
 FORM_PARTS: Final[Mapping[str, Field]] = {
     "id": {"pattern": PRESS_ID},
     "page": {"description": "the path of the panel's page to go back to"},
@@ -253,15 +231,14 @@ ACT_FORM: Final = FormFields(
 async def alarms(
     request: Request, state: CurrentState, query: Annotated[AlarmQuery, Query()]
 ) -> Response:
-    content: dict[str, Any]
-    if not query.history and caller_of(request).accepts_html:
-        return _page(request, state, query)
     if query.history:
         read = partial(read_history, wanted=query.filter(), limit=query.limit)
         rows = await state.fleet.alarms.history.read(read)
         older = rows[-1].seq if len(rows) == query.limit else None
-        content = {"history": [transition(row) for row in rows], "older": older}
-        return await rows_answer(request, lambda: content, len(rows))
+        history = {"history": [transition(row) for row in rows], "older": older}
+        return await rows_answer(request, lambda: history, len(rows))
+    if caller_of(request).accepts_html:
+        return _page(request, state, query)
     content = _listed_alarms(state, query, caller_of(request).language)
     return await rows_answer(request, partial(_with_finite, content), len(content["alarms"]))
 
@@ -300,104 +277,91 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     "/alarms/acknowledge",
     response_model=AlarmReceipts,
     summary="Acknowledge several alarms, such as those that a page shows",
-    responses=_acts(AlarmReceipts),
+    responses=act_responses(AlarmReceipts),
     openapi_extra=described_body(AcknowledgeBody, ACKNOWLEDGE_FORM.schema, required=True),
 )
 async def acknowledge(request: Request, state: CurrentState) -> Response:
     is_form, content = await act_body_of(request, ACKNOWLEDGE_FORM, FORM_FIELDS_MOST)
-    if is_form:
-        shown = {k.removeprefix(OCCURRENCE): v for k, v in content.items() if k.startswith(OCCURRENCE)}
-        body = as_model(AcknowledgeBody, {"alarms": shown, "id": content.get("id")})
-    else:
-        body = as_model(AcknowledgeBody, content)
+    sent = sent_with(request, state, AcknowledgeBody, content, is_form, _shown_alarms)
     acts = {
-        alarm: AlarmActBody(occurrence=occurrence, at=body.at, id=body.id, seen=body.seen)
-        for alarm, occurrence in body.alarms.items()
+        alarm: AlarmActBody(
+            occurrence=occurrence, at=sent.body.at, id=sent.body.id, seen=sent.body.seen
+        )
+        for alarm, occurrence in sent.body.alarms.items()
     }
-    return await _answer(
-        request, state, "acknowledge", acts, content if is_form else None, several=True
-    )
+    pairs = await _run(sent, "acknowledge", acts)
+    return _answer(sent, pairs, {"receipts": [receipt_json(alarm, *run) for alarm, run in pairs]})
+
+
+def _shown_alarms(form: Mapping[str, str]) -> dict[str, Any]:
+    """The body of a form: the occurrences that its page showed."""
+    shown = {
+        name.removeprefix(OCCURRENCE): occurrence
+        for name, occurrence in form.items()
+        if name.startswith(OCCURRENCE)
+    }
+    return {"alarms": shown, "id": form.get("id")}
 
 
 @router.post(
     "/alarms/{alarm:path}/{act}",
     response_model=AlarmReceipt,
     summary="Acknowledge, shelve or reset an alarm, or take it out of service",
-    responses=_acts(AlarmReceipt),
+    responses=act_responses(AlarmReceipt),
     openapi_extra=described_body(AlarmActBody, ACT_FORM.schema, required=False),
 )
 async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentState) -> Response:
-    is_form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
+    is_form, content = await act_body_of(request, ACT_FORM)
     confirmed: ConfirmedBy | None = None
     if is_form:
         confirmed, asked = await confirmed_act(request, state, alarm, act, content)
         if asked is not None:
             return asked
-    filled = {k: v for k, v in content.items() if k not in ("page", "_since")}
-    body = as_model(AlarmActBody, filled if is_form else content)
-    return await _answer(
-        request, state, act, {alarm: body}, content if is_form else None, confirmed=confirmed
-    )
+    sent = sent_with(request, state, AlarmActBody, content, is_form)
+    pairs = await _run(sent, act, {alarm: sent.body}, confirmed)
+    return _answer(sent, pairs, receipt_json(alarm, *pairs[0][1]))
 
 
-async def _answer(
-    request: Request,
-    state: AppState,
+async def _run(
+    sent: SentAct[Any],
     act: str,
     bodies: Mapping[str, AlarmActBody],
-    form: Mapping[str, str] | None,
-    *,
-    several: bool = False,
     confirmed: ConfirmedBy | None = None,
-) -> Response:
-    """Runs an act on alarms and answers with the receipts."""
-    # Without a cookie the client is anonymous; its next request has this one.
-    who, token = caller_of(request).identified()
-    refusal = TOO_SOON if form is not None and is_second_tap(form) else None
-    if not state.limits.admit(who):
-        refusal = TOO_OFTEN
-    runs = AlarmRuns(state, who, refusal, scripted=form is None, confirmed=confirmed)
-    with state.in_flight.track():
+) -> list[tuple[str, AlarmRun]]:
+    """Runs an act on each of these alarms."""
+    scripted = sent.form is None
+    runs = AlarmRuns(sent.state, sent.who, sent.refusal(), scripted=scripted, confirmed=confirmed)
+    with sent.state.in_flight.track():
         answers = await asyncio.gather(*(runs.run(act, alarm, body) for alarm, body in bodies.items()))
-    pairs = list(zip(bodies, answers, strict=True))
-    if form is not None:
-        response: Response = _back(request, state, form, [answer.receipt for answer in answers])
-    else:
-        response = _json(request, pairs, several)
-    return caller_of(request).with_client_cookie(response, token)
+    return list(zip(bodies, answers, strict=True))
 
 
-def _json(request: Request, pairs: list[tuple[str, AlarmRun]], several: bool) -> Response:
-    receipts = [receipt_json(alarm, *answer) for alarm, answer in pairs]
-    cause = next((answer.receipt.cause for _, answer in pairs if not answer.receipt.done), "")
-    headers = {"retry-after": str(RETRY_AFTER_S)} if cause == "limit" else None
-    content = {"receipts": receipts} if several else receipts[0]
-    return JSONResponse(
-        localized(content, caller_of(request).language), status_code=STATUS[cause], headers=headers
-    )
-
-
-def _back(
-    request: Request, state: AppState, form: Mapping[str, str], receipts: Iterable[ActReceipt]
+def _answer(
+    sent: SentAct[Any], pairs: Sequence[tuple[str, AlarmRun]], content: dict[str, Any]
 ) -> Response:
-    """A redirect to the page of the form, which shows the first receipt that says something."""
-    receipt = next((receipt for receipt in receipts if receipt.reason), None)
-    page = form.get("page") or _referring_page(request)
-    page = page.removeprefix(state.root)
-    page = page if OWN_PAGE.fullmatch(page) else "/"
-    if receipt is not None:
-        shown = receipt.code if receipt.cause == "limit" else receipt.id
-        page += f"{'&' if '?' in page else '?'}act={quote(shown, safe='')}"
-    return RedirectResponse(state.root + page, status_code=303)
+    """The receipts; of a form the page that it came from, with the first that says something."""
+    receipts = [run.receipt for _, run in pairs]
+    if sent.form is not None:
+        said = next((receipt for receipt in receipts if receipt.reason), None)
+        return sent.back(_page_of(sent, sent.form), said)
+    cause = next((receipt.cause for receipt in receipts if not receipt.done), "")
+    return sent.with_cookie(receipt_answer(sent.caller, content, cause))
 
 
-def _referring_page(request: Request) -> str:
+def _page_of(sent: SentAct[Any], form: Mapping[str, str]) -> str:
+    """The page of a form; the first one for what is none of this panel's."""
+    page = form.get("page") or _referring_page(sent.caller)
+    page = page.removeprefix(sent.state.root)
+    return sent.state.root + (page if OWN_PAGE.fullmatch(page) else "/")
+
+
+def _referring_page(caller: Caller) -> str:
     """The path and query of the page that a browser names as the referrer, if it is one of this
     server."""
     try:
-        referrer = urlsplit(request.headers.get("referer", ""))
+        referrer = urlsplit(caller.headers.get("referer", ""))
     except ValueError:
         return ""
-    if referrer.netloc != request.headers.get("host"):
+    if referrer.netloc != caller.headers.get("host"):
         return ""
     return f"{referrer.path}?{referrer.query}" if referrer.query else referrer.path

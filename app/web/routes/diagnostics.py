@@ -1,19 +1,16 @@
 """The page of diagnostics, the same as JSON, a live look into a topic, and the acts of the page."""
 
-import asyncio
-import secrets
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import fields
 from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Any, Final
-from urllib.parse import quote, urlencode
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, Response
 
-from app.cell.commands.acts import ActReceipt, ActRequest
-from app.cell.commands.control_acts import TOO_OFTEN
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
 from app.cell.commands.press import PRESS_ID
 from app.cell.robot.traffic import RoundTripSummary
@@ -35,11 +32,12 @@ from app.ros.graph.model import SurveyedTopic, topic_forwarding
 from app.ros.messages.names import Qos
 from app.system.clock import iso_time
 from app.system.errors import KioskError, NotFound
-from app.system.texts import TextLike, localized, say
-from app.web.answers import act_answer
+from app.system.texts import TextLike, say
+from app.web.acts import act_responses, said_of, sent_act
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
 from app.web.downloads import SharedLinks, links_of
+from app.web.large_answers import rows_answer
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.diagnostics import (
     TEXTS,
@@ -54,16 +52,7 @@ from app.web.pages.diagnostics import (
     versions,
     word,
 )
-from app.web.requests import (
-    JSON,
-    PAGE,
-    FormFields,
-    act_body_of,
-    as_model,
-    described_body,
-    errors,
-    refusals,
-)
+from app.web.requests import JSON, PAGE, FormFields, described_body, errors
 
 if TYPE_CHECKING:
     from app.cell.history.recording import Recorder
@@ -190,8 +179,6 @@ def look_json(look: Look) -> dict[str, Any]:
 router = APIRouter()
 
 DiagnosticAct = Annotated[str, Path(json_schema_extra={"enum": list(DIAGNOSTIC_ACTS)})]
-HEADERS: Final[Mapping[str, str]] = {"cache-control": "no-store", "vary": "accept"}
-FORM_FIELDS_MOST: Final = 8
 ACT_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "page": {}, "robot": {"maxLength": 64}})
 DEPTH: Final = 10  # of the bridge's reader for a look: two messages a second are shown
 ZIP: Final = "application/zip"
@@ -207,13 +194,11 @@ async def diagnostics(
     request: Request, state: CurrentState, query: Annotated[DiagnosticsQuery, Query()]
 ) -> Response:
     session = _session(state, query.robot)
-    if not _for_browser(request):
-        survey = await _survey(session)
-        content = diagnostics_json(session, survey, state.doctor, versions())
-        content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
-        answer = await asyncio.to_thread(localized, content, caller_of(request).language)
-        return JSONResponse(answer, headers=HEADERS)
-    return await _page(request, state, session, query)
+    if caller_of(request).accepts_html:
+        return await _page(request, state, session, query)
+    content = diagnostics_json(session, await _survey(session), state.doctor, versions())
+    content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
+    return await rows_answer(request, lambda: content, sys.maxsize)
 
 
 @router.get(
@@ -224,19 +209,18 @@ async def diagnostics(
 )
 async def look(request: Request, state: CurrentState, query: Annotated[LookQuery, Query()]) -> Response:
     """Goes on for six seconds after each request."""
-    session, language = _session(state, query.robot), caller_of(request).language
-    looked = await _look(session, query.topic)
-    if not _for_browser(request):
-        return JSONResponse(localized(look_json(looked), language), headers=HEADERS)
-    html = state.templates.render("_look.html", language, looked=looked, form=query.form, **TEXTS)
-    return HTMLResponse(html, headers=HEADERS)
+    looked = await _look(_session(state, query.robot), query.topic)
+    if not caller_of(request).accepts_html:
+        return await rows_answer(request, lambda: look_json(looked), len(looked.messages))
+    about = {"looked": looked, "form": query.form, **TEXTS}
+    html = state.templates.render("_look.html", caller_of(request).language, **about)
+    return HTMLResponse(html, headers={"cache-control": "no-store", "vary": "accept"})
 
 
 @router.post(
     "/diagnostics/{act}",
     summary="Begin a check by the doctor, get the support bundle, or share a recording with Foxglove",
-    responses=errors(404, 408, 413, 422)
-    | refusals(DiagnosticReceipt)
+    responses=act_responses(DiagnosticReceipt)
     | {
         200: {
             "content": {
@@ -245,35 +229,27 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
             },
             "description": "of `check` and `foxglove` the receipt, of `bundle` the zip",
         },
-        303: {"description": "of a form: back to the page, with the receipt's id"},
         503: {"description": "the operator's log can't be written, or the bundle not be made"},
     },
     openapi_extra=described_body(DiagnosticActBody, ACT_FORM.schema, required=False),
 )
 async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Response:
     session = _session(state, "")
-    is_form, content = await act_body_of(request, ACT_FORM, FORM_FIELDS_MOST)
-    body = as_model(DiagnosticActBody, {k: v for k, v in content.items() if k != "page" or not is_form})
-    who, token = caller_of(request).identified()
-    act_id = f"{body.id}.{act}" if body.id and is_form else body.id or secrets.token_hex(8)
-    at = body.at.timestamp() if body.at and not is_form else None
-    requested = ActRequest(act, who, at=at, scripted=not is_form)
-    runner, recorder = session.diagnostic_acts, state.fleet.of_robot(body.robot).commands.recorder
+    sent = await sent_act(request, state, DiagnosticActBody, ACT_FORM)
+    robot = sent.body.robot
+    recorder = state.fleet.of_robot(robot).commands.recorder
     if act == "foxglove" and recorder is None:
         raise NotFound(say("recording_off"))
-    if not state.limits.admit(who):
-        receipt = runner.limited(requested, act_id, TOO_OFTEN)
-    else:
-        with state.in_flight.track():
-            receipt = await runner.act(requested, act_id)
+    act_id = sent.act_id(act) if sent.form else sent.act_id()
+    receipt = await sent.run(session.diagnostic_acts, sent.asked(act), act_id)
     if receipt.done and act == "bundle":
-        answer = await _bundle(state)
-    else:
-        address = ""
-        if receipt.done and act == "foxglove" and recorder is not None:
-            address = await _share(request, state, recorder, body.robot, act_id)
-        answer = _back(state, content, receipt) if is_form else _receipt(request, receipt, address)
-    return caller_of(request).with_client_cookie(answer, token)
+        return sent.with_cookie(await _bundle(state))
+    address = ""
+    if receipt.done and act == "foxglove" and recorder is not None:
+        address = await _share(request, state, recorder, robot, act_id)
+    query = sent.form.get("page", "") if sent.form else ""
+    page = f"{state.root}/diagnostics{f'?{query}' if query else ''}"
+    return sent.answer(receipt, page, recording=address)
 
 
 def _session(state: AppState, robot: str) -> RobotSession:
@@ -281,10 +257,6 @@ def _session(state: AppState, robot: str) -> RobotSession:
     if not state.fleet.panel.diagnostics.enabled:
         raise NotFound(word("off"))
     return state.fleet.of_robot(robot)
-
-
-def _for_browser(request: Request) -> bool:
-    return caller_of(request).accepts_html
 
 
 async def _page(
@@ -302,7 +274,7 @@ async def _page(
     name = "_diagnostics.html" if query.part else "diagnostics.html"
     page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
     more = {
-        "act_refused": _refusal(state.fleet.of_robot(""), query.act),
+        "act_refused": said_of(query.act, [state.fleet.first.diagnostic_acts]),
         "mqtt": state.fleet.alarms.mqtt,
         "shared": _shared(request, state, query.robot),
     }
@@ -389,23 +361,3 @@ async def _share(
     if recording is None:
         recording = state.shared.share(await recorder.last_minute(), robot, act_id)
     return links_of(recording, str(request.base_url)).address
-
-
-def _receipt(request: Request, receipt: ActReceipt, address: str) -> Response:
-    return act_answer(request, receipt, recording=address)
-
-
-def _back(state: AppState, form: Mapping[str, str], receipt: ActReceipt) -> Response:
-    """A redirect to the page, which shows why the act was refused."""
-    query = form.get("page", "")
-    shown = receipt.code if receipt.cause == "limit" else receipt.id
-    if receipt.reason:
-        query += f"{'&' if query else ''}act={quote(shown, safe='')}"
-    return RedirectResponse(f"{state.root}/diagnostics{f'?{query}' if query else ''}", status_code=303)
-
-
-def _refusal(session: RobotSession, query: str) -> TextLike:
-    if query == TOO_OFTEN.code:
-        return TOO_OFTEN
-    receipt = session.diagnostic_acts.receipt(query)
-    return receipt.reason if receipt else ""

@@ -5,7 +5,7 @@ import json
 import logging
 import re
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, NamedTuple
@@ -39,7 +39,6 @@ from app.web.pages.words import ask_of
 from app.web.requests import (
     FORM,
     JSON,
-    MOMENT,
     PAGE,
     TEXT,
     Described,
@@ -50,7 +49,9 @@ from app.web.requests import (
     body_of,
     described_body,
     errors,
+    form_moment,
     form_of,
+    is_second_tap,
     json_of,
     kind_of,
     received,
@@ -83,7 +84,6 @@ class PressForm:
 
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
-TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 QUESTION_LIFE_S: Final = 30.0  # the answer is a press, and no later one
 
 
@@ -93,7 +93,8 @@ async def pressed_by_form(
     """The response to a press: a redirect to the page with its receipt, or the question before the
     press. `session` is that of the widget's robot, `page` that of the robot whose page it was."""
     fields, presses = form.fields, session.presses
-    too_soon, before = _is_second_tap(fields), fields.pop("_last", "")
+    too_soon, before = is_second_tap(fields), fields.pop("_last", "")
+    fields.pop("_since", None)
     if is_stop(form.widget) and not form.widget.asks:
         too_soon = False  # to stop twice does no harm
     shown_on = fields.pop("_page", "")
@@ -188,7 +189,8 @@ def _until(fields: dict[str, str]) -> float | None:
 
     It can't say when it was pressed, but a page that does not reload itself is none to press on.
     """
-    until = _moment(fields, "_until")
+    until = form_moment(fields, "_until")
+    fields.pop("_until", None)
     return until if until is None else min(until, clock.server_now())
 
 
@@ -202,22 +204,6 @@ def _language(state: AppState, form: PressForm) -> str:
     return language
 
 
-def _is_second_tap(fields: dict[str, str]) -> bool:
-    """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
-    brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
-    shown_at = _moment(fields, "_since")
-    return shown_at is not None and clock.server_now() - shown_at < TAP_AGAIN_S
-
-
-def _moment(fields: dict[str, str], name: str) -> float | None:
-    text = fields.pop(name, "")
-    if not text:
-        return None
-    if not re.fullmatch(MOMENT, text):
-        raise InputError(f'{name}: "{text:.40}" is not that of a page')
-    return float(text)
-
-
 def page_after(
     state: AppState, page: RobotSession, widget: str, receipt_id: str, shown_on: str = ""
 ) -> str:
@@ -225,11 +211,6 @@ def page_after(
     whose page it was, `shown_on` the page's id where it was pressed, "" if unknown."""
     receipt = f"?receipt={quote(receipt_id)}" if receipt_id else ""
     return f"{page.base}/pages/{_page_of(state.fleet.panel, widget, shown_on).id}{receipt}"
-
-
-def is_second_tap(form: Mapping[str, str]) -> bool:
-    """Whether the form of an act, on a page without scripts, is sent sooner than anyone reads it."""
-    return _is_second_tap({"_since": form["_since"]}) if "_since" in form else False
 
 
 router = APIRouter()

@@ -2,18 +2,17 @@
 is a press of its set (`POST /widgets/{set}`)."""
 
 import asyncio
-import secrets
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any, Final, Literal, NamedTuple
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
-from app.cell.commands.acts import ActReceipt, ActRequest
-from app.cell.commands.judge import RETRY_AFTER_S
+from app.cell.commands.acts import ActReceipt
 from app.cell.commands.press import PRESS_ID
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.permission.roles import ConfirmedBy, role_verdict
@@ -32,8 +31,9 @@ from app.cell.recipes.recipe import (
 from app.cell.session.session import RobotSession
 from app.panel.base import ID
 from app.system.errors import InputError, NotFound
-from app.system.texts import Text, TextLike, localized, number, say
-from app.web.answers import STATUS
+from app.system.texts import TextLike, number, say
+from app.web.acts import ActBody, act_responses, said_of, sent_with
+from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.caller import caller_of
 from app.web.pages.confirm import Subject, confirm_sheet, recipe_ask
@@ -42,24 +42,16 @@ from app.web.pages.recipe_comparison import comparison, seen_of
 from app.web.pages.recipes_page import Mode, entries_of, recipes_context, word
 from app.web.pages.words import Ask, AskedChange
 from app.web.requests import (
-    FORM,
-    JSON,
     LONGEST,
     SINCE,
     TEXT,
     FormFields,
-    Moment,
-    as_model,
-    body_of,
+    act_body_of,
     described_body,
     errors,
-    form_of,
-    json_of,
-    kind_of,
-    refusals,
+    is_second_tap,
 )
 from app.web.routes.confirm import checked_entry, entered_fields
-from app.web.routes.presses import is_second_tap
 
 # Changes of recipes that a person confirms with a PIN, password or badge: the page that asks for it.
 #
@@ -176,14 +168,13 @@ def _subject(edit: Edit) -> Subject | None:
     return Subject(f"recipe {load.id}", confirmation, needs, ask, act)
 
 
-TOO_OFTEN: Final = say("control_too_often")
-TOO_SOON: Final = say("press_too_soon")
 CSV: Final = "text/csv"
 RecipeId = Annotated[str, Field(max_length=64)]
 # Fields of a form that are not the value of an input: "-" stands before them, as before no input.
 OWN_FIELDS: Final = ("id", "recipe", "version", "to", "name", "csv", "decimal", "seen")
 
 
+FILES: Final = {CSV: lambda content: {"csv": decoded(content)}}
 VALUES: Final = {"type": "object", "description": "values by the ids of inputs"}
 
 
@@ -201,12 +192,10 @@ class RecipesQuery(BaseModel):
     reloaded: bool = False
 
 
-class RecipeActBody(BaseModel):
+class RecipeActBody(ActBody):
     """`version` is that which the screen showed, `to` the one to restore. `decimal` is the decimal sign
     of the `csv`, where the file does not say it; `seen` is the comparison that a page has shown. The
     same `id` again is the same act. `at` is when it was touched, in the server's own time."""
-
-    model_config = ConfigDict(extra="forbid")
 
     recipe: RecipeId = ""
     version: Annotated[int, Field(ge=0, lt=2**53)] | None = None
@@ -216,8 +205,6 @@ class RecipeActBody(BaseModel):
     csv: str | None = None
     decimal: Literal[".", ","] | None = None
     seen: Annotated[str, Field(max_length=80)] = ""
-    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    at: Moment | None = None
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -227,16 +214,8 @@ class RecipeActBody(BaseModel):
         )
 
 
-class RecipeReceipt(BaseModel):
+class RecipeReceipt(ActAnswer):
     """The receipt of an act, as that of a press; `done`: it was applied."""
-
-    id: str
-    act: str
-    outcome: str
-    code: str
-    reason: str
-    at: str
-    done: bool
 
 
 ACT_FORM: Final = FormFields(
@@ -296,7 +275,7 @@ async def page(
     if (its := _session_of(state, session, set)) is not session:
         return RedirectResponse(f"{its.base}/recipes/{set}", status_code=303)
     loads = session.panel.recipe_loads
-    said = _receipt_text(session, query.act)
+    said = said_of(query.act, [session.recipe_acts])
     context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
     chosen = context["chosen"]
     shown = chosen.id if chosen else ""
@@ -309,14 +288,7 @@ async def page(
     return framed_page(request, state, framed, {**context, **more})
 
 
-ACT_RESPONSES: Final = (
-    errors(404, 408, 413, 422)
-    | refusals(RecipeReceipt)
-    | {
-        303: {"description": "of a form: back to the page, with the receipt on it"},
-        503: {"model": RecipeReceipt, "description": "the disk or the operator's log refuses it"},
-    }
-)
+ACT_RESPONSES: Final = act_responses(RecipeReceipt)
 ACT_BODY: Final = described_body(RecipeActBody, ACT_FORM.schema, required=False)
 
 
@@ -344,42 +316,24 @@ async def import_csv(
 async def act(
     set: SetId, act: ActName, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
-    book, kind, content = _book(state, set), kind_of(request), await body_of(request)
-    session = _session_of(state, session, set)
-    form = await asyncio.to_thread(_form, content) if kind == FORM else None
-    entered = entered_fields(form) if form is not None else {}
-    caller = caller_of(request)
-    body = _form_body(book, act, form, caller.language) if form is not None else _body(kind, content)
-    who, token = caller.identified()
-    act_id = f"{body.id}.{act}.{body.recipe}"[:400] if body.id else secrets.token_hex(8)
-    at = body.at.timestamp() if body.at else None
-    confirmed, asking = None, None
-    read = await _read(book, act, body)
-    if form is not None and read and body.seen != seen_of(book, body.csv, body.decimal):
-        compared = _compared(request, state, session, Import(book, body, read["rows"]))
-        return caller.with_client_cookie(compared, token)
-    if form is not None:
-        edit = Edit(book, act, body.recipe, body.inputs, form, entered)
+    book, session = _book(state, set), _session_of(state, session, set)
+    is_form, content = await act_body_of(request, ACT_FORM, files=FILES)
+    entered = entered_fields(content) if is_form else {}
+    read_form = partial(_form_body, book, act, caller_of(request).language)
+    sent = sent_with(request, state, RecipeActBody, content, is_form, read_form)
+    body, confirmed, read = sent.body, None, await _read(book, act, sent.body)
+    if is_form:
+        if read and body.seen != seen_of(book, body.csv, body.decimal):
+            compared = _compared(request, state, session, Import(book, body, read["rows"]))
+            return sent.with_cookie(compared)
+        edit = Edit(book, act, body.recipe, body.inputs, content, entered)
         confirmed, asking = await confirmed_edit(request, state, session, edit)
-    if asking is not None:
-        return asking
-    asked = ActRequest(act, who, f"{set}/{body.recipe}", body.inputs, at, form is None)
+        if asking is not None:
+            return asking
+    asked = sent.asked(act, f"{set}/{body.recipe}", body.inputs)
     asked = asked._replace(confirmed=confirmed, read=read)
-    runner = session.recipe_acts
-    refusal = TOO_SOON if form is not None and is_second_tap(form) else None
-    if not state.limits.admit(who):
-        refusal = TOO_OFTEN
-    with state.in_flight.track():
-        receipt = (
-            await runner.act(asked, act_id)
-            if refusal is None
-            else runner.limited(asked, act_id, refusal)
-        )
-    if form is None:
-        answer: Response = _receipt(request, receipt)
-    else:
-        answer = _back(session, set, act, body, receipt, book)
-    return caller.with_client_cookie(answer, token)
+    receipt = await sent.run(session.recipe_acts, asked, sent.act_id(act, body.recipe))
+    return sent.answer(receipt, _shown(session, book, body, receipt))
 
 
 def _book(state: AppState, set_id: str) -> RecipeBook:
@@ -417,19 +371,7 @@ def _compared(request: Request, state: AppState, session: RobotSession, asked: I
     return framed_page(request, state, framed, {**context, **more})
 
 
-def _form(content: bytes) -> dict[str, str]:
-    return ACT_FORM.filled(form_of(content))
-
-
-def _body(kind: str, content: bytes) -> RecipeActBody:
-    if kind == CSV:
-        return RecipeActBody(csv=decoded(content))
-    if kind not in (JSON, ""):
-        raise InputError(f'the body must be "{JSON}", "{CSV}" or "{FORM}", not "{kind}"')
-    return as_model(RecipeActBody, json_of(content or b"{}"))
-
-
-def _form_body(book: RecipeBook, act: str, form: Mapping[str, str], language: str) -> RecipeActBody:
+def _form_body(book: RecipeBook, act: str, language: str, form: Mapping[str, str]) -> dict[str, Any]:
     """The body of a form: its other fields are the values of inputs, as the reader writes them."""
     known = {field.id: field for field in book.load.fields}
     own: dict[str, Any] = {key: form[f"-{key}"] for key in OWN_FIELDS if f"-{key}" in form}
@@ -446,7 +388,7 @@ def _form_body(book: RecipeBook, act: str, form: Mapping[str, str], language: st
     for key in form:
         if key not in known and key != "_since" and key.removeprefix("-") not in OWN_FIELDS:
             raise InputError(f'the form has an unknown field "{key:.40}"')
-    return as_model(RecipeActBody, own)
+    return own
 
 
 async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str, Any]:
@@ -459,36 +401,12 @@ async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str,
     return {"rows": await asyncio.to_thread(list, rows)}
 
 
-def _receipt(request: Request, receipt: ActReceipt) -> Response:
-    content = localized({**receipt.as_json(), "done": receipt.done}, caller_of(request).language)
-    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
-
-
-def _back(
-    session: RobotSession,
-    set_id: str,
-    act: str,
-    body: RecipeActBody,
-    receipt: ActReceipt,
-    book: RecipeBook,
-) -> Response:
-    """A redirect to the page, which shows the recipe and what the receipt says."""
+def _shown(session: RobotSession, book: RecipeBook, body: RecipeActBody, receipt: ActReceipt) -> str:
+    """The page of the set after an act, with the recipe that it shows."""
     recipe = body.recipe
-    if receipt.done and act in ("create", "copy"):
+    if receipt.done and receipt.act in ("create", "copy"):
         name = clean_name(body.name or "").casefold()
         recipe = next((r.id for r in book.recipes if r.name.casefold() == name), recipe)
-    query = {"recipe": recipe} if recipe and not (receipt.done and act == "delete") else {}
-    if receipt.reason:
-        query["act"] = receipt.code if receipt.cause == "limit" else receipt.id
-    path = f"{session.base}/recipes/{set_id}"
-    return RedirectResponse(f"{path}?{urlencode(query)}" if query else path, status_code=303)
-
-
-def _receipt_text(session: RobotSession, query: str) -> TextLike:
-    """What the receipt of an act says: `query` is its id, or the code where it is not kept."""
-    known: Mapping[str, Text] = {text.code: text for text in (TOO_OFTEN, TOO_SOON)}
-    if query in known:
-        return known[query]
-    receipt = session.recipe_acts.receipt(query) if query else None
-    return receipt.reason if receipt else ""
+    path = f"{session.base}/recipes/{book.load.id}"
+    is_gone = receipt.done and receipt.act == "delete"
+    return f"{path}?{urlencode({'recipe': recipe})}" if recipe and not is_gone else path

@@ -1,0 +1,262 @@
+"""Every act as JSON and as a form: the same receipt, the same entry of the operator's log, the same
+refusal. All are sent in the same order to two servers alike, one of which gets forms only."""
+
+import html
+import re
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import httpx
+import pytest
+
+from app.cell.commands.alarm_acts import ALARM_ACTS
+from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
+from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.recipe_acts import RECIPE_ACTS
+from app.cell.commands.shift_acts import SHIFT_ACTS
+from app.cell.commands.user_acts import USER_ACTS
+from tests.cell.recipes.panels import CARTON, PANEL
+from tests.support.parts import ROOT, Server, until
+from tests.support.servers import panel_file, ready
+from tests.support.users import Browsers, add_user, log_rows
+
+ALARM: Final = """
+[[alarm]]
+id = "air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+text = "Air pressure low"
+low = 5.0
+[demo."/air"]
+values = [4.5]
+[control]
+required = true
+[record]
+topics = ["/air"]
+"""
+PIN: Final = "2580"
+SECRET: Final = "7391"
+RECIPE: Final = {**CARTON, "speed": 82.5}
+CSV: Final = "name,length,speed,gripper,fast,note\nTray,600,80,fork,true,x\n"
+COMPARED: Final = ("kind", "who", "action", "values", "outcome", "reason", "text")
+BY_TIME: Final = {action for action, _ in HAND_OVERS.values()}  # entries of no act
+A_TIME: Final = r"\d{4}-\d\d-\d\d[T ][\d:.+]+|\d\d:\d\d(:\d\d)?"
+Fields = Mapping[str, Any]
+
+
+class Row(NamedTuple):
+    """An act: what a program sends, and the form of a page where its fields differ."""
+
+    path: str
+    body: Fields = MappingProxyType({})
+    form: Fields | None = None
+    code: str = ""  # of its refusal
+
+    @property
+    def fields(self) -> dict[str, str]:
+        sent = self.body if self.form is None else self.form
+        return {name: str(value) for name, value in sent.items()}
+
+
+def _recipe(**fields: Any) -> dict[str, Any]:
+    """The fields of a form of recipes: "-" stands before its own, the others are values of inputs."""
+    values = fields.pop("values", {})
+    typed = {name: str(value).lower() for name, value in values.items()}
+    return typed | {f"-{name}": value for name, value in fields.items()}
+
+
+def _edit(act: str, code: str = "", /, **body: Any) -> Row:
+    return Row(f"/recipes/boxes/{act}", body, _recipe(**body), code)
+
+
+ROWS: Final = (
+    Row("/control/release"),
+    Row("/control/take"),
+    Row("/control/ask"),
+    Row("/control/give", {"to": "0123456789ab"}, code="control_changed"),
+    Row("/control/keep", {"to": "0123456789ab"}, code="control_changed"),
+    Row("/alarms/air/acknowledge", {"occurrence": 9}, code="alarm_came_again"),
+    Row("/alarms/acknowledge", {"alarms": {"air": 1}}, {"occurrence.air": 1}),
+    Row("/alarms/air/acknowledge", {"occurrence": 1}),
+    Row("/alarms/air/shelve", {"reason": "test", "for_s": 600}),
+    Row("/alarms/air/unshelve"),
+    Row("/alarms/air/out_of_service", {"reason": "test"}),
+    Row("/alarms/air/in_service"),
+    Row("/alarms/air/reset", code="alarm_not_latched"),
+    Row("/alarms/air/shelve", {"for_s": 600}, code="alarm_reason_missing"),
+    Row("/alarms/none/reset", code="alarm_gone"),
+    Row("/alarms/report", {"text": "Belt 2 slips."}),
+    Row("/alarms/report", code="alarms_message_empty"),
+    Row("/diagnostics/bundle"),
+    Row("/diagnostics/foxglove"),
+    Row("/diagnostics/check"),
+    Row("/users/add", {"name": "Ito", "role": "viewer", "groups": [], "pin": SECRET},
+        {"name": "Ito", "role": "viewer", "way": "pin", "secret": SECRET}),
+    Row("/users/add", {"name": "Ito", "role": "viewer", "groups": []},
+        {"name": "Ito", "role": "viewer"},
+        code="users_no_way"),
+    Row("/users/role", {"name": "Ito", "role": "operator", "groups": []},
+        {"name": "Ito", "role": "operator"}),
+    Row("/users/pin", {"name": "Ito", "pin": "8206"}, {"name": "Ito", "secret": "8206"}),
+    Row("/users/password", {"name": "Ito", "password": "long enough"},
+        {"name": "Ito", "secret": "long enough"}),
+    Row("/users/badge", {"name": "Ito", "badge": "04A2"}, {"name": "Ito", "secret": "04A2"}),
+    Row("/users/badge", {"name": "Ito", "none": True}, {"name": "Ito", "none": "true"}),
+    Row("/users/disable", {"name": "Ito"}),
+    Row("/users/enable", {"name": "Ito"}),
+    Row("/users/remove", {"name": "Ito"}),
+    Row("/users/remove", {"name": "Ito"}, code="users_unknown"),
+    Row("/users/token", {"name": "mes", "role": "viewer"}),
+    Row("/users/revoke", {"name": "mes"}),
+    _edit("create", name="Carton", values=RECIPE),
+    _edit("create", "recipe_name_taken", name="Carton", values=RECIPE),
+    _edit("save", recipe="carton", version=1, values={**RECIPE, "length": 500}),
+    _edit("save", "recipe_changed_since", recipe="carton", version=1, values=RECIPE),
+    _edit("restore", recipe="carton", version=2, to=1),
+    _edit("copy", recipe="carton", version=3, name="Second"),
+    _edit("rename", recipe="second", version=1, name="Third"),
+    _edit("import", csv=CSV),
+    _edit("import", "between_sentences", csv="name\n"),
+    _edit("delete", recipe="second", version=2),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browsers() -> Iterator[Browsers]:
+    every = Browsers()
+    yield every
+    every.close()
+
+
+def cell(folder: Path) -> Server:
+    data = folder / "data"
+    data.mkdir(mode=0o700)
+    add_user(data, "Sato", "engineer", pin=PIN)
+    add_user(data, "Mori", "viewer", pin=PIN)
+    panel = panel_file(folder, PANEL + ALARM)
+    return ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
+
+
+def _is_raised(server: Server) -> bool:
+    return bool(server.http.get("/alarms").json()["alarms"])
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Server]]:
+    """One gets JSON, the other one forms."""
+    with (
+        cell(tmp_path_factory.mktemp("json")) as first,
+        cell(tmp_path_factory.mktemp("form")) as second,
+    ):
+        for server in (first, second):
+            until(partial(_is_raised, server), "the alarm is raised")
+        yield first, second
+
+
+class Sent(NamedTuple):
+    """What came of an act: its answer, and the page after a form."""
+
+    answer: httpx.Response
+    page: str
+
+
+def sent_by(
+    client: httpx.Client, log: httpx.Client, name: str, as_form: bool
+) -> tuple[list[Sent], list[dict[str, str]]]:
+    """What came of all rows, and the entries of the log; `name` begins the ids."""
+    send, before = _by_form if as_form else _by_json, len(log_rows(log))
+    answers = []
+    for place, row in enumerate(ROWS):
+        client.post("/control/here", json={"touched": True}).raise_for_status()
+        answers.append(send(row, client, f"{name}-{place}"))
+    entries = [
+        {column: _timeless(entry[column]) for column in COMPARED}
+        for entry in log_rows(log)[before:]
+        if entry["action"] not in BY_TIME
+    ]
+    return answers, entries
+
+
+def _by_json(row: Row, client: httpx.Client, act_id: str) -> Sent:
+    return Sent(client.post(row.path, json={**row.body, "id": act_id}), "")
+
+
+def _by_form(row: Row, client: httpx.Client, act_id: str) -> Sent:
+    fields = row.fields | {"-id" if row.path.startswith("/recipes") else "id": act_id}
+    headers = {"accept": "text/html"}
+    answer = client.post(row.path, data=fields, headers=headers)
+    if seen := re.search(r'name="-seen" value="([^"]+)"', answer.text):  # the comparison before
+        answer = client.post(row.path, data={**fields, "-seen": seen[1]}, headers=headers)
+    location = answer.headers.get("location")
+    page = client.get(location, headers=headers, follow_redirects=True) if location else answer
+    is_page = page.headers["content-type"].startswith("text/html")
+    return Sent(answer, html.unescape(page.text) if is_page else "")
+
+
+def _timeless(text: str) -> str:
+    return re.sub(A_TIME, "a time", text)
+
+
+def receipt_of(answer: httpx.Response) -> dict[str, Any]:
+    content = answer.json()
+    receipt: dict[str, Any] = content.get("receipts", [content])[0]
+    return receipt
+
+
+def test_all_acts_are_here() -> None:
+    named = {(room, act) for _, room, *_, act in (row.path.split("/") for row in ROWS)}
+    tables = {
+        "control": CONTROL_ACTS,
+        "alarms": ALARM_ACTS,
+        "diagnostics": DIAGNOSTIC_ACTS,
+        "users": USER_ACTS,
+        "recipes": RECIPE_ACTS,
+    }
+    assert {(room, act) for room, acts in tables.items() for act in acts} <= named
+    assert ([*SHIFT_ACTS], ("alarms", "report") in named) == (["message"], True)
+
+
+def test_every_act_is_the_same_by_json_and_by_form(
+    browsers: Browsers, cells: tuple[Server, Server]
+) -> None:
+    by_json, by_form = (browsers.signed_in(server.url, "Sato", pin=PIN) for server in cells)
+    programs, logged = sent_by(by_json, by_json, "sato", as_form=False)
+    pages, logged_of_forms = sent_by(by_form, by_form, "sato", as_form=True)
+    assert logged == logged_of_forms
+    for row, program, page, entry in zip(ROWS, programs, pages, logged, strict=True):
+        if row.path == "/diagnostics/bundle":
+            assert {s.answer.headers["content-type"] for s in (program, page)} == {"application/zip"}
+            continue
+        receipt, is_token = receipt_of(program.answer), row.path == "/users/token"
+        assert (receipt["code"], receipt["done"]) == (row.code, not row.code), (row, receipt)
+        assert (program.answer.status_code == 200) is receipt["done"], row
+        assert (entry["outcome"] == "refused") is not receipt["done"], row
+        assert page.answer.status_code == (200 if is_token else 303), (row, page.answer.text)
+        assert _timeless(receipt["reason"]) in _timeless(page.page), row
+        assert bool(receipt.get("token")) is is_token, row
+
+
+def test_every_act_is_refused_alike_by_json_and_by_form(
+    browsers: Browsers, cells: tuple[Server, Server]
+) -> None:
+    logs = [browsers.signed_in(server.url, "Sato", pin=PIN) for server in cells]
+    by_json, by_form = (browsers.signed_in(server.url, "Mori", pin=PIN) for server in cells)
+    programs, logged = sent_by(by_json, logs[0], "mori", as_form=False)
+    pages, logged_of_forms = sent_by(by_form, logs[1], "mori", as_form=True)
+    assert logged == logged_of_forms
+    judged = 0
+    for row, program, page in zip(ROWS, programs, pages, strict=True):
+        receipt, statuses = receipt_of(program.answer), (program.answer, page.answer)
+        if "error" in receipt:  # who may not see the page sends nothing that is judged
+            assert [answer.status_code for answer in statuses] == [403, 403], row
+            assert receipt["error"] in page.page, row
+            continue
+        judged += 1
+        may_always = row.path == "/control/release"
+        refusal = ("control_changed", 409) if may_always else ("role_needed", 403)
+        assert (receipt["code"], program.answer.status_code) == refusal, (row, receipt)
+        assert page.answer.status_code == 303, row
+    assert len(logged) == judged
