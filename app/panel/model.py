@@ -23,6 +23,7 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import (
     EVENT_TYPE,
     EVENTS,
@@ -295,6 +296,12 @@ class Panel(PanelKeys):
         for w in (w for w in self.widgets() if isinstance(w, LogView)):
             kept[w.topic] = max(w.keep, kept.get(w.topic, 0))
         return kept
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """The topics of the maps that the panel shows."""
+        shown = (widget for widget in self.widgets() if isinstance(widget, MapView))
+        return tuple(dict.fromkeys(widget.topic for widget in shown))
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""

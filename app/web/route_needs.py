@@ -30,6 +30,8 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/widgets/{widget}/frames": ANYBODY,
     "/widgets/{widget}/lines": ANYBODY,
     "/widgets/{widget}/lock": ANYBODY,
+    "/widgets/{widget}/map.png": ANYBODY,
+    "/widgets/{widget}/map/{version}/{column}-{row}.png": ANYBODY,
     "/widgets/{widget}/trend": ANYBODY,
     "/alarms": ANYBODY,
     "/help": ANYBODY,

@@ -23,7 +23,9 @@ from app.web.route_needs import ROBOT
 FIRST: Final = ("pages", "events", "static", "health")
 # The others, by the first segment of their paths.
 LATE: Final[Mapping[str, tuple[str, ...]]] = {
-    "widgets": (*("presses", "confirm", "holds", "parameters", "frames", "widget_data", "lock_help"),),
+    "widgets": (
+        *("presses", "confirm", "holds", "parameters", "frames", "maps", "widget_data", "lock_help"),
+    ),
     "presses": ("presses",),
     "control": ("control",),
     "alarms": ("alarms", "alarm_history", "alarm_report"),
@@ -44,7 +46,7 @@ DESCRIPTION: Final = "openapi.json"  # it describes all
 ROBOT_ROUTES: Final = frozenset(
     {
         *("pages", "events", "presses", "confirm", "control", "holds", "parameters", "frames"),
-        *("widget_data", "lock_help", "recipes"),
+        *("maps", "widget_data", "lock_help", "recipes"),
     }
 )
 PAGE: Final = ("widgets", "presses", "control", "display", "help")  # what a page itself requests

@@ -102,6 +102,14 @@ CAMERAS: Final = (
         marks={'data-kind="camera"': 'data-kind="camera" data-late'},
     ),
 )
+MAP: Final[Table] = {"label": texts.HALL.table}
+NOWHERE: Final = {"grid": None, "pose": None, "about": ""}
+MAPS: Final = (
+    Example(
+        "waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting", topic="/map")} | NOWHERE
+    ),
+    Example("unreadable", "map", MAP, {"state": "unreadable", "note": say("map_empty")} | NOWHERE),
+)
 LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}
 LOGS: Final = (
     Example("lines", "log", LOG, {"state": "live", "note": "", "count": "5"}),

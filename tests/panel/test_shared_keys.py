@@ -17,6 +17,7 @@ from app.cell.alarms.sources import read_source, read_suppression
 from app.cell.permission.conditions import condition_state, condition_verdict
 from app.cell.permission.interlocks import link_verdict
 from app.cell.recipes.reported import reported_fields
+from app.cell.robot.maps import read_grid
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import CameraTopicState
 from app.cell.view.kinds import attributes_of
@@ -35,6 +36,7 @@ from app.panel.widgets.table import Table
 from app.ros.zenoh.sample import Sample
 from app.system.toml_values import value_text
 from docs._generate import schema
+from tests.cell.view.test_map_values import INFO, moved
 from tests.support.beside_panel import put_beside
 from tests.support.builders import BRIDGE, INTERFACES, NOW, endpoint, robot_there
 from tests.support.parts import TESTS
@@ -66,7 +68,18 @@ ONE: Final[Mapping[str, tuple[type[BaseModel], ...]]] = {
 OTHERS: Final[Mapping[str, frozenset[str]]] = {
     "topic": frozenset(),
     "type": frozenset(
-        {"options_from", "switch", "recipe", "call", "action", "parameter", "camera", "log_widget"}
+        {
+            "options_from",
+            "switch",
+            "recipe",
+            "call",
+            "action",
+            "parameter",
+            "camera",
+            "map",
+            "pose",
+            "log_widget",
+        }
     ),
     "field": frozenset({"options_from", "list", "table", "column", "joints"}),
     "max_age_s": frozenset({"oidc"}),
@@ -336,7 +349,7 @@ ROWS: Final[Mapping[str, Row]] = {
 }  # fmt: skip
 # Those that read no field of one value: they are in the test of age.
 OF_TOPICS: Final = frozenset(
-    {"source", "joints", "table", "camera", "log_widget", "options_from", "readback"}
+    {"source", "joints", "table", "camera", "map", "pose", "log_widget", "options_from", "readback"}
 )
 # Those that only publish.
 PUBLISHED: Final = frozenset({"publish", "hold", "step", "joystick", "switch", "recipe"})
@@ -400,6 +413,7 @@ def test_keys_of_numbers_have_one_finding_beside_a_text(tmp_path: Path, name: st
 JOINTS: Final = "sensor_msgs/msg/JointState"
 LIST: Final = "std_msgs/msg/Float64MultiArray"
 IMAGE: Final = "sensor_msgs/msg/Image"
+GRID: Final = "nav_msgs/msg/OccupancyGrid"
 AGED: Final[Mapping[str, Row]] = {
     **{name: row for name, row in ROWS.items() if "max_age_s" in MODELS[name].model_fields},
     "trend": Row(
@@ -414,6 +428,7 @@ AGED: Final[Mapping[str, Row]] = {
         widget("table", field="data", column=[{"label": "N"}]), type=LIST
     ),
     "camera": Row(widget("camera"), type=IMAGE),
+    "map": Row(widget("map"), type=GRID),
     "options_from": Row(within("options_from", "select"), type=JOINTS),
     "readback": Row(
         lambda keys: on_page(
@@ -432,6 +447,7 @@ SENT: Final[Mapping[str, Any]] = {
     BOOL: {"data": True},
     INT: {"data": 0},
     IMAGE: {},
+    GRID: {"header": {"frame_id": "map"}, "info": INFO, "data": [0, 100]},
 }
 MORE: Final[Mapping[str, Keys]] = {"options_from": {"field": "name"}}
 
@@ -464,6 +480,9 @@ def cell(folder: Path, name: str, **keys: Any) -> tuple[Panel, RobotState]:
         robot.update(robot.key(topic), sample)
         if kind == LIST:
             robot.table_entries.record_sample(robot.key(topic), sample)
+        if kind == GRID:
+            robot.maps[robot.key(topic)].grid = read_grid(INTERFACES, bytes(sample.payload))
+            moved(robot, 1.0)
     robot.camera_topics[robot.key("/air")] = CameraTopicState(NOW, 0.0)
     return panel, robot
 

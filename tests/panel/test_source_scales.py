@@ -110,7 +110,7 @@ REFUSED: Final = {
     "table": on_page('kind = "table"\nlabel = "T"\nsource = "count"'),
 }  # fmt: skip
 # Those that read no one field.
-OF_TOPIC: Final = frozenset({"recipe.readback", "switch", "camera", "log"})
+OF_TOPIC: Final = frozenset({"recipe.readback", "switch", "camera", "map", "map.pose", "log"})
 
 
 def tables_with_source() -> Iterator[str]:

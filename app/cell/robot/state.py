@@ -16,6 +16,7 @@ from app.cell.robot.definitions import DefinitionDifference, difference
 from app.cell.robot.graph import EndpointPresence, LiveGraph, required_endpoints
 from app.cell.robot.history import History
 from app.cell.robot.log_lines import LogLines
+from app.cell.robot.maps import MapState
 from app.cell.robot.option_list import OptionList
 from app.cell.robot.parameter_state import ParameterState
 from app.cell.robot.publishers import (
@@ -29,6 +30,7 @@ from app.cell.robot.tables import TableEntries
 from app.cell.robot.topics import CameraTopicState, Slices, Topic
 from app.cell.robot.topics import Reading as Reading
 from app.cell.robot.traffic import RoundTrips, Traffic
+from app.cell.robot.transforms import TransformTree
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.panel.used import selects_by_command
@@ -133,6 +135,8 @@ class RobotState:
             for lines in [LogLines(interfaces, keep)]
             for key in self.possible_keys(topic)
         }
+        self.maps = {self.key(topic): MapState() for topic in panel.maps}
+        self.transforms = TransformTree()
         self.history = History(time.monotonic(), time.time())
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:

@@ -61,6 +61,7 @@ from app.system.texts import TextLike
 if TYPE_CHECKING:
     from app.cell.history.recording import Recorder, Recordings
     from app.cell.history.trends import TrendRecorder
+    from app.cell.session.maps import MapListener
 
 
 # Replaces a lost Zenoh session, with retries.
@@ -376,6 +377,7 @@ def wire_session(
             log_lines,
             published_alarms,
             *recorders,
+            *_map_listeners(context),
         ],
     )
     own_line = partial(_show_own_line, robot, refresher)
@@ -475,6 +477,14 @@ def _recorder(
     recordings.add_listener(context.signals.changed.emit)
     name = entry.id if entry else ""
     return Recorder(panel, panel.record, context.interfaces, context.robot, name, recordings)
+
+
+def _map_listeners(context: RobotContext) -> "Iterator[MapListener]":
+    """What reads maps and transforms, if the panel shows a map."""
+    if context.robot.maps:
+        from app.cell.session.maps import MapListener
+
+        yield MapListener(context, context.signals.entries_decoded.emit)
 
 
 def _trend_recorders(context: RobotContext) -> "Iterator[TrendRecorder]":

@@ -24,6 +24,7 @@ from app.cell.view.displays import (
     value,
 )
 from app.cell.view.gauges import figure, gauge, joints
+from app.cell.view.map_values import map_view
 from app.cell.view.parameter_values import parameter
 from app.cell.view.stop_brief import stop_brief
 from app.cell.view.table_values import table
@@ -47,6 +48,7 @@ from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress, Step
@@ -213,6 +215,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     SequenceWidget: lambda widget, robot, verdict, now: sequence(widget, robot, now),
     Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
     Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
+    MapView: lambda widget, robot, verdict, now: map_view(widget, robot, now),
     Table: lambda widget, robot, verdict, now: table(widget, robot, now),
     AlarmListView: lambda widget, robot, verdict, now: alarm_list(widget, robot),
     AlarmLineView: lambda widget, robot, verdict, now: alarm_line(widget, robot),

@@ -36,6 +36,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     "parameter": "is not the name of a parameter: it has no spaces",
     "name": "is not a name that a message can have: it has control characters",
     "names": 'is not the name of a field: it has a-z, 0-9 and "_"',
+    "base_frame": "is not the name of a frame: it must be like base_link, without a slash before it",
     "default": "has a NUL character, at which a ROS string ends",
 }
 # The elements of a list, by its key.

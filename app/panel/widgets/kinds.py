@@ -27,6 +27,7 @@ from app.panel.widgets.gauge import Figure, Gauge
 from app.panel.widgets.hold import Hold, Joystick
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.widgets.joints import Joints
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish, Step
@@ -82,6 +83,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "joints": WidgetKind(Joints, tiles.JOINTS, styles=("marks", "own"), script=True),
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),
     "camera": WidgetKind(Camera, tiles.CAMERA, styles=("own",), script=True),
+    "map": WidgetKind(MapView, tiles.MAP, styles=("own",), script=True),
     "log": WidgetKind(LogView, tiles.LOG, styles=("own",), script=True),
     "trend": WidgetKind(Trend, tiles.TREND, styles=("own",), script=True),
     "alarm_list": WidgetKind(

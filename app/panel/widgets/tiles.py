@@ -34,6 +34,7 @@ FIGURE_HEIGHTS: Final = (
     (0, 46.0, 20.0),
 )  # above, number, bar
 FIGURE_WIDTH: Final = 190.0
+MAP_WIDTH: Final = 320.0  # its four keys
 PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
 CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
 CONDITION, LOW_CONDITION = 42.0, 36.0
@@ -230,6 +231,9 @@ ALARM_LIST: Final = Tile(_alarm_list_height, lambda widget, screen: ALARMS_WIDTH
 ALARM_LINE: Final = Tile(lambda widget, screen: screen.header, lambda widget, screen: ALARMS_WIDTH)
 CAMERA: Final = Tile(
     lambda widget, screen: PICTURE_HEIGHT, lambda widget, screen: PICTURE_WIDTH, grows=True
+)
+MAP: Final = Tile(
+    lambda widget, screen: 2 * screen.touch(KEY_MM), lambda widget, screen: MAP_WIDTH, grows=True
 )
 PALLET: Final = Tile(_plan_height, lambda widget, screen: PLAN_WIDTH, grows=True)
 CONDITIONS: Final = Tile(_conditions_height, lambda widget, screen: CONDITIONS_WIDTH)

@@ -27,6 +27,7 @@ from app.panel.widgets.hold import Joystick
 from app.panel.widgets.inputs import SelectInput, ToggleInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import Numeric, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Step
@@ -302,6 +303,7 @@ TEXTS: Final[Mapping[type[BaseWidget], Texts]] = {
     Camera: _nothing,
     Conditions: _nothing,
     LogView: _nothing,
+    MapView: _nothing,
     Pallet: _pallet,
     Parameter: _parameter,
     PageLink: _link,

@@ -28,6 +28,7 @@ from app.panel.widgets.gauge import Figure, Gauge, SetpointField, TargetField
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import Parameter, listed_parameter
 from app.panel.widgets.publish import PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
@@ -269,6 +270,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Joints: _joints,
     Table: None,
     LogView: None,
+    MapView: None,
     AlarmView: None,
     Camera: _camera,
     Trend: _trend,

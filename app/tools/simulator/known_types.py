@@ -268,6 +268,31 @@ def _map(moment: Moment, _: Collection[str]) -> Fields:
     }
 
 
+def _pose(moment: Moment, wanted: Collection[str]) -> Fields:
+    return {"position": _point(moment, wanted), "orientation": _quaternion(moment, wanted)}
+
+
+def _on_map(moment: Moment, pose: Fields) -> Fields:
+    """A pose in the frame of the map."""
+    return {"header": {**header(moment), "frame_id": "map"}, "pose": pose}
+
+
+def _transforms(moment: Moment, wanted: Collection[str]) -> Fields:
+    """From the map to the robot, as its localization and its wheels have it."""
+    moved = {"translation": _point(moment, wanted), "rotation": _quaternion(moment, wanted)}
+    parents = (("map", "odom", {"rotation": {"w": 1.0}}), ("odom", "base_link", moved))
+    return {
+        "transforms": [
+            {
+                "header": {**header(moment), "frame_id": parent},
+                "child_frame_id": child,
+                "transform": way,
+            }
+            for parent, child, way in parents
+        ]
+    }
+
+
 def _diagnostic(name: str, moment: Moment) -> Fields:
     bad = (moment.t / 30 + phase_of(name)) % 1 > 0.85
     return {
@@ -299,6 +324,11 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "geometry_msgs/msg/Quaternion": _quaternion,
     "geometry_msgs/msg/Twist": _twist,
     "geometry_msgs/msg/Wrench": _wrench,
+    "geometry_msgs/msg/PoseStamped": lambda moment, wanted: _on_map(moment, _pose(moment, wanted)),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda moment, wanted: _on_map(
+        moment, {"pose": _pose(moment, wanted)}
+    ),
+    "tf2_msgs/msg/TFMessage": _transforms,
     "sensor_msgs/msg/JointState": _joints,
     "sensor_msgs/msg/BatteryState": _battery,
     "sensor_msgs/msg/Imu": _imu,

@@ -1,0 +1,72 @@
+"""The pictures of a map: its tiles, and the whole map with the robot for a page without scripts."""
+
+import asyncio
+from typing import Annotated, Final, Literal
+
+from fastapi import APIRouter, Path, Query
+from fastapi.responses import Response
+
+from app.cell.robot.maps import Grid, overview, tile
+from app.cell.session.session import RobotSession
+from app.cell.view.map_values import locate
+from app.panel.widgets.map_view import MapView
+from app.system.errors import NotFound
+from app.system.texts import say
+from app.web.app_state import CurrentSession
+from app.web.requests import Described, errors
+
+router = APIRouter()
+
+Theme = Annotated[Literal["light", "dark", "contrast"], Query(description="whose colours it has")]
+Place = Annotated[int, Path(ge=0)]
+PNG: Final[Described] = {
+    200: {"content": {"image/png": {"schema": {"type": "string", "format": "binary"}}}}
+}
+KEPT: Final = "private, max-age=31536000, immutable"  # another map has another path
+
+
+@router.get(
+    "/widgets/{widget}/map/{version}/{column}-{row}.png",
+    response_class=Response,
+    summary="A tile of a map: 512 cells a side, from the upper left; unknown cells are transparent",
+    responses=errors(403, 404, 422) | PNG,
+)
+async def map_tile(
+    widget: str,
+    version: str,
+    column: Place,
+    row: Place,
+    session: CurrentSession,
+    theme: Theme = "light",
+) -> Response:
+    _, grid = _grid(session, widget)
+    if grid.version != version or column >= grid.columns or row >= grid.rows:
+        raise NotFound(say("map_changed"))
+    picture = await asyncio.to_thread(tile, grid, column, row, theme)
+    return _picture(picture, KEPT)
+
+
+@router.get(
+    "/widgets/{widget}/map.png",
+    response_class=Response,
+    summary="The whole map with the robot, at most 1000 pixels a side",
+    responses=errors(403, 404, 422) | PNG,
+)
+async def map_picture(widget: str, session: CurrentSession, theme: Theme = "light") -> Response:
+    view, grid = _grid(session, widget)
+    shown = locate(view, session.robot, grid.geometry, asyncio.get_running_loop().time())
+    pose = None if shown.note else shown.pose
+    return _picture(await asyncio.to_thread(overview, grid, theme, pose, view.radius), "no-store")
+
+
+def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:
+    view = session.panel.widget(widget, MapView)
+    grid = session.robot.maps[session.robot.key(view.topic)].grid
+    if grid is None:
+        raise NotFound(say("map_waiting", topic=view.topic))
+    return view, grid
+
+
+def _picture(data: bytes, cache_control: str) -> Response:
+    headers = {"cache-control": cache_control, "content-encoding": "identity"}  # it is packed already
+    return Response(data, media_type="image/png", headers=headers)

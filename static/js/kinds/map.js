@@ -1,0 +1,254 @@
+// A map: tiles of its picture in one transform, the robot over them. Fingers, the wheel and keys move and enlarge it.
+import { closest, find } from "../show.js";
+
+/** @typedef {{ version: string, width: number, height: number, resolution: number, x: number, y: number, yaw: number }} Grid */
+/** @typedef {{ x: number, y: number }} Point */
+
+const TILE = 512; // cells a side, as the server cuts them
+const LEAST_ROBOT_PX = 12; // its radius, however small the map
+const STEP = 1.5; // of the size, by a key
+const PAN = 0.2; // of the view, by an arrow key
+const MARGIN = 0.04; // of the view, around the whole map
+const MOST_PX_PER_CELL = 24;
+const SCALE_PX = 140; // at most
+
+/** @type {WeakMap<HTMLElement, MapView>} */
+const views = new WeakMap();
+
+// Called for each widget of this kind.
+/** @param {HTMLElement} root */
+export const equip = (root) => views.set(root, new MapView(root));
+
+/** @type {Record<string, Show>} */
+export const show = {
+  grid: (root, grid) => views.get(root)?.showGrid(grid),
+  pose: (root, pose) => views.get(root)?.showPose(pose),
+};
+
+class MapView {
+  /** @type {HTMLElement} */
+  #root;
+  /** @type {HTMLElement} */
+  #view;
+  /** @type {HTMLElement} */
+  #tiles;
+  /** @type {HTMLElement | null} */
+  #layer = null;
+  /** @type {Grid | null} */
+  #grid = null;
+  /** @type {number[] | null} */
+  #pose = null;
+  #perMetre = 0; // pixels
+  /** @type {Point} */
+  #centre = { x: 0, y: 0 }; // of the view, in metres
+  #isWhole = true; // the whole map is shown, whatever the size of the view
+  #follows = false;
+  /** @type {Map<number, Point>} */
+  #fingers = new Map();
+  #frame = 0;
+
+  /** @param {HTMLElement} root */
+  constructor(root) {
+    this.#root = root;
+    this.#view = find(root, ".map-view");
+    this.#tiles = find(root, ".map-tiles");
+    const view = this.#view;
+    new ResizeObserver(() => this.#draw()).observe(view);
+    view.addEventListener("pointerdown", (event) => this.#down(event));
+    view.addEventListener("pointermove", (event) => this.#move(event));
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
+      view.addEventListener(name, (event) => this.#fingers.delete(/** @type {PointerEvent} */ (event).pointerId));
+    view.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    view.addEventListener("keydown", (event) => this.#key(event));
+    find(root, ".map-keys").addEventListener("click", ({ target }) => this.#do(closest(target, "button")?.dataset.do));
+    new MutationObserver(() => this.#load()).observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  }
+
+  /** @param {Grid | null} grid */
+  showGrid(grid) {
+    const before = this.#grid?.version;
+    this.#grid = grid;
+    for (const key of this.#root.querySelectorAll("button")) key.disabled = !grid;
+    find(this.#root, ".map-scale").hidden = !grid;
+    if (grid?.version !== before) this.#load();
+    this.#draw();
+  }
+
+  /** @param {number[] | null} pose */
+  showPose(pose) {
+    this.#pose = pose;
+    this.#draw();
+  }
+
+  // All tiles of a map are shown at once, in place of those before.
+  async #load() {
+    const grid = this.#grid;
+    if (!grid) {
+      this.#layer = null;
+      return this.#tiles.replaceChildren();
+    }
+    const layer = document.createElement("div");
+    const theme = document.documentElement.dataset.theme;
+    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/map/${grid.version}`;
+    for (let row = 0; row * TILE < grid.height; row++)
+      for (let column = 0; column * TILE < grid.width; column++) {
+        const image = Object.assign(new Image(), { src: `${path}/${column}-${row}.png?theme=${theme}`, alt: "" });
+        image.style.left = `${column * TILE}px`;
+        image.style.top = `${row * TILE - grid.height}px`;
+        layer.append(image);
+      }
+    await Promise.allSettled([...layer.querySelectorAll("img")].map((image) => image.decode()));
+    if (grid.version !== this.#grid?.version) return;
+    this.#layer = layer;
+    this.#tiles.replaceChildren(layer);
+    this.#root.dataset.version = grid.version;
+    this.#draw();
+  }
+
+  #draw() {
+    cancelAnimationFrame(this.#frame);
+    this.#frame = requestAnimationFrame(() => this.#drawNow());
+  }
+
+  #drawNow() {
+    const grid = this.#grid;
+    const robot = find(this.#root, ".map-robot");
+    const unsure = find(this.#root, ".map-unsure");
+    for (const mark of [robot, unsure]) mark.toggleAttribute("hidden", !grid || !this.#pose);
+    if (!grid || !this.#view.clientWidth) return;
+    if (this.#isWhole) this.#fit(grid);
+    if (this.#follows && this.#pose) this.#centre = { x: this.#pose[0], y: this.#pose[1] };
+    const { x, y } = this.#at(grid.x, grid.y);
+    const perCell = this.#perMetre * grid.resolution;
+    if (this.#layer)
+      this.#layer.style.transform = `translate(${x}px, ${y}px) rotate(${-grid.yaw}rad) scale(${perCell})`;
+    this.#tiles.toggleAttribute("data-large", perCell > 1);
+    if (this.#pose) {
+      const place = this.#at(this.#pose[0], this.#pose[1]);
+      const radius = Math.max(Number(this.#root.dataset.radius) * this.#perMetre, LEAST_ROBOT_PX);
+      const turn = (-this.#pose[2] * 180) / Math.PI;
+      robot.setAttribute("transform", `translate(${place.x} ${place.y}) rotate(${turn}) scale(${radius})`);
+      unsure.setAttribute("transform", `translate(${place.x} ${place.y})`);
+    }
+    this.#drawScale();
+    find(this.#root, '[data-do="follow"]').setAttribute("aria-pressed", String(this.#follows));
+  }
+
+  #drawScale() {
+    const scale = find(this.#root, ".map-scale");
+    const texts = [...scale.querySelectorAll("span")];
+    const fitting = texts.filter(({ dataset }) => Number(dataset.metres) * this.#perMetre <= SCALE_PX);
+    const shown = fitting[fitting.length - 1] ?? texts[0];
+    for (const text of texts) text.hidden = text !== shown;
+    scale.style.width = `${Number(shown.dataset.metres) * this.#perMetre}px`;
+  }
+
+  // Where a point of the map's frame is in the view.
+  /** @param {number} x @param {number} y @returns {Point} */
+  #at(x, y) {
+    const { clientWidth, clientHeight } = this.#view;
+    return {
+      x: clientWidth / 2 + this.#perMetre * (x - this.#centre.x),
+      y: clientHeight / 2 - this.#perMetre * (y - this.#centre.y),
+    };
+  }
+
+  // The whole map, with a margin.
+  /** @param {Grid} grid */
+  #fit({ width, height, resolution, x, y, yaw }) {
+    const [sin, cos] = [Math.sin(yaw), Math.cos(yaw)];
+    const [w, h] = [width * resolution, height * resolution];
+    this.#centre = { x: x + (cos * w - sin * h) / 2, y: y + (sin * w + cos * h) / 2 };
+    const [across, up] = [Math.abs(cos) * w + Math.abs(sin) * h, Math.abs(sin) * w + Math.abs(cos) * h];
+    const { clientWidth, clientHeight } = this.#view;
+    this.#perMetre = Math.min(clientWidth / across, clientHeight / up) * (1 - MARGIN);
+  }
+
+  // Enlarges it around a point of the view.
+  /** @param {number} factor @param {Point} [around] */
+  #zoom(factor, around) {
+    if (!this.#grid) return;
+    const { clientWidth, clientHeight } = this.#view;
+    const point = this.#follows || !around ? { x: clientWidth / 2, y: clientHeight / 2 } : around;
+    const most = MOST_PX_PER_CELL / this.#grid.resolution;
+    const least = 8 / (Math.max(this.#grid.width, this.#grid.height) * this.#grid.resolution);
+    const next = Math.min(Math.max(this.#perMetre * factor, least), most);
+    const change = 1 / this.#perMetre - 1 / next;
+    this.#centre.x += (point.x - clientWidth / 2) * change;
+    this.#centre.y -= (point.y - clientHeight / 2) * change;
+    this.#perMetre = next;
+    this.#isWhole = false;
+    this.#draw();
+  }
+
+  /** @param {number} x @param {number} y */
+  #pan(x, y) {
+    this.#centre.x -= x / this.#perMetre;
+    this.#centre.y += y / this.#perMetre;
+    this.#isWhole = this.#follows = false;
+    this.#draw();
+  }
+
+  /** @param {PointerEvent} event @returns {Point} */
+  #point({ clientX, clientY }) {
+    const { left, top } = this.#view.getBoundingClientRect();
+    return { x: clientX - left, y: clientY - top };
+  }
+
+  /** @param {PointerEvent} event */
+  #down(event) {
+    this.#fingers.set(event.pointerId, this.#point(event));
+    this.#view.setPointerCapture(event.pointerId);
+  }
+
+  // One finger moves the map, two enlarge and move it.
+  /** @param {PointerEvent} event */
+  #move(event) {
+    const before = this.#fingers.get(event.pointerId);
+    if (!before || !this.#grid) return;
+    const now = this.#point(event);
+    this.#fingers.set(event.pointerId, now);
+    const other = [...this.#fingers].find(([id]) => id !== event.pointerId)?.[1];
+    if (!other) return this.#pan(now.x - before.x, now.y - before.y);
+    const [was, is] = [before, now].map((point) => Math.hypot(point.x - other.x, point.y - other.y));
+    if (was > 1) this.#zoom(is / was, { x: (now.x + other.x) / 2, y: (now.y + other.y) / 2 });
+    if (!this.#follows) this.#pan((now.x - before.x) / 2, (now.y - before.y) / 2);
+  }
+
+  /** @param {WheelEvent} event */
+  #wheel(event) {
+    event.preventDefault();
+    const { left, top } = this.#view.getBoundingClientRect();
+    this.#zoom(2 ** (-event.deltaY / 400), { x: event.clientX - left, y: event.clientY - top });
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const { clientWidth, clientHeight } = this.#view;
+    const [x, y] = [PAN * clientWidth, PAN * clientHeight];
+    /** @type {Record<string, () => void>} */
+    const keys = {
+      ArrowLeft: () => this.#pan(x, 0),
+      ArrowRight: () => this.#pan(-x, 0),
+      ArrowUp: () => this.#pan(0, y),
+      ArrowDown: () => this.#pan(0, -y),
+      "+": () => this.#zoom(STEP),
+      "-": () => this.#zoom(1 / STEP),
+    };
+    if (!this.#grid || !keys[event.key]) return;
+    event.preventDefault();
+    keys[event.key]();
+  }
+
+  /** @param {string | undefined} what */
+  #do(what) {
+    if (what === "in") this.#zoom(STEP);
+    else if (what === "out") this.#zoom(1 / STEP);
+    else if (what === "whole") [this.#isWhole, this.#follows] = [true, false];
+    else if (what === "follow") {
+      this.#follows = !this.#follows;
+      this.#isWhole = false;
+    }
+    this.#draw();
+  }
+}

@@ -1,0 +1,130 @@
+"""A map as an operator uses it: fingers, the wheel and keys move it; an old pose looks old."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import DRAWN, HIDE, middle, place, widget
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+from tests.web.test_map import PANEL, SILENT
+
+pytestmark = pytest.mark.promise("values")
+
+VERSION: Final = re.compile("[0-9a-f]{16}")
+# Where the map's first tile and the robot are, in pixels of the view, and how large a cell is.
+STATE: Final = """(root) => {
+  const view = root.querySelector(".map-view").getBoundingClientRect();
+  const [tile, robot] = [".map-tiles img", ".map-robot circle"].map((part) =>
+    root.querySelector(part).getBoundingClientRect());
+  return {
+    left: tile.left - view.left, right: tile.right - view.left, width: tile.width, view: view.width,
+    x: robot.left + robot.width / 2 - view.left, robot: robot.width,
+  };
+}"""
+
+
+@pytest.fixture(scope="module")
+def shuttle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with demo_server(tmp_path_factory.mktemp("shuttle"), PANEL) as server:
+        yield server
+
+
+def opened(page: Page, server: Server) -> Page:
+    page.goto(server.url)
+    expect(widget(page, "hall")).to_have_attribute("data-version", VERSION)
+    page.evaluate(DRAWN)
+    return page
+
+
+def state(page: Page) -> dict[str, float]:
+    page.evaluate(DRAWN)
+    return dict(widget(page, "hall").evaluate(STATE))
+
+
+def key(page: Page, name: str) -> None:
+    widget(page, "hall").get_by_role("button", name=name).tap()
+
+
+def test_the_whole_map_is_shown_at_first_and_again(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    first = state(page)
+    assert 0 < first["left"] < first["right"] < first["view"]
+    key(page, "Enlarge")
+    assert state(page)["width"] == pytest.approx(1.5 * first["width"], rel=0.01)
+    page.set_viewport_size({"width": 800, "height": 480})
+    key(page, "Show the whole map")
+    small = state(page)
+    assert 0 < small["left"] < small["right"] < small["view"]
+
+
+def test_it_follows_the_robot_until_a_finger_moves_it(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    key(page, "Follow the robot")
+    follow = widget(page, "hall").get_by_role("button", name="Follow the robot")
+    expect(follow).to_have_attribute("aria-pressed", "true")
+    for _ in range(3):
+        now = state(page)
+        assert now["x"] == pytest.approx(now["view"] / 2, abs=1)
+    x, y = middle(page.locator(".map-view"))
+    touch = Touch(page)
+    touch.send("touchStart", (x, y))
+    touch.send("touchMove", (x + 60, y))
+    touch.send("touchEnd")
+    expect(follow).to_have_attribute("aria-pressed", "false")
+
+
+def test_one_finger_moves_it_and_two_enlarge_it(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    first, (x, y) = state(page), middle(page.locator(".map-view"))
+    touch = Touch(page)
+    touch.send("touchStart", (x, y))
+    touch.send("touchMove", (x + 80, y))
+    touch.send("touchEnd")
+    until(
+        lambda: state(page)["left"] == pytest.approx(first["left"] + 80, abs=1),
+        "it moves by the finger",
+    )
+    moved = state(page)
+    touch.send("touchStart", (x - 50, y), (x + 50, y))
+    touch.send("touchMove", (x - 100, y), (x + 100, y))
+    touch.send("touchEnd")
+    until(
+        lambda: state(page)["width"] == pytest.approx(2 * moved["width"], rel=0.03),
+        "two fingers enlarge it",
+    )
+
+
+def test_the_wheel_enlarges_at_the_pointer_and_arrow_keys_move_it(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    first, (_, y) = state(page), middle(page.locator(".map-view"))
+    box = place(page.locator(".map-view"))
+    page.mouse.move(box["x"] + first["left"], y)
+    page.mouse.wheel(0, -200)
+    until(lambda: state(page)["width"] > 1.3 * first["width"], "the wheel enlarges it")
+    assert state(page)["left"] == pytest.approx(first["left"], abs=2)
+    before = state(page)["left"]
+    page.locator(".map-view").focus()
+    page.keyboard.press("ArrowRight")
+    until(lambda: state(page)["left"] < before, "an arrow moves it")
+
+
+def test_a_map_without_a_connection_is_old(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    expect(widget(page, "hall")).to_have_attribute("data-state", "live")
+    page.evaluate(HIDE)
+    expect(widget(page, "hall")).to_have_attribute("data-state", "old")
+
+
+def test_a_robot_that_is_not_known_is_not_drawn(tmp_path: Path, page: Page) -> None:
+    with demo_server(tmp_path, PANEL + SILENT) as server:
+        opened(page, server)
+        expect(page.locator(".map-robot")).to_be_hidden()
+        expect(widget(page, "hall").locator(".note")).to_contain_text(
+            "No transform from map to base_link"
+        )

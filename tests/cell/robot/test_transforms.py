@@ -1,0 +1,136 @@
+"""The transforms of a robot: looked up, interpolated, bounded, and named where they are missing."""
+
+import math
+from types import SimpleNamespace as Message
+from typing import Any, Final
+
+import pytest
+
+from app.cell.robot.transforms import MAX_FRAMES, LocatedFrame, TransformTree
+from app.system.texts import Text
+
+EVERY_S: Final = 0.02
+
+
+def transform(
+    parent: str,
+    child: str,
+    stamp: float = 0.0,
+    *,
+    x: float = 0.0,
+    y: float = 0.0,
+    yaw: float = 0.0,
+    **turn: float,
+) -> Any:
+    rotation = {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)} | turn
+    stamped = Message(sec=int(stamp), nanosec=round(stamp % 1 * 1e9))
+    place = Message(x=x, y=y, z=0.0)
+    return Message(
+        header=Message(frame_id=parent, stamp=stamped),
+        child_frame_id=child,
+        transform=Message(translation=place, rotation=Message(**rotation)),
+    )
+
+
+def tree_with(*moving: Any, static: tuple[Any, ...] = (), at: float = 100.0) -> TransformTree:
+    tree = TransformTree()
+    tree.record(Message(transforms=static), at, is_static=True)
+    for message in moving:
+        tree.record(Message(transforms=[message]), at, is_static=False)
+    return tree
+
+
+def located(tree: TransformTree, base: str = "base_link", fixed: str = "map") -> LocatedFrame:
+    result = tree.locate(base, fixed)
+    assert isinstance(result, LocatedFrame), result
+    return result
+
+
+def code(tree: TransformTree, base: str = "base_link", fixed: str = "map") -> str:
+    missing = tree.locate(base, fixed)
+    assert isinstance(missing, Text)
+    return missing.code
+
+
+def test_a_pose_goes_over_all_frames_between_the_two() -> None:
+    tree = tree_with(
+        transform("map", "odom", 1.0, x=1.0, yaw=math.pi / 2),
+        transform("odom", "base_link", 1.0, x=2.0),
+        static=(transform("base_link", "laser", x=0.5, yaw=math.pi),),
+    )
+    assert located(tree).pose == pytest.approx((1.0, 2.0, math.pi / 2))
+    assert located(tree, "laser").pose == pytest.approx((1.0, 2.5, -math.pi / 2))
+    assert located(tree, "map", "base_link").pose == pytest.approx((-2.0, 1.0, -math.pi / 2))
+    mounted = located(tree, "laser", "base_link")
+    assert mounted.pose == pytest.approx((0.5, 0.0, math.pi))
+    assert (mounted.at, mounted.stamp) == (math.inf, None)
+
+
+def test_a_pose_is_that_of_the_newest_time_at_which_all_are_known() -> None:
+    tree = tree_with(
+        transform("map", "odom", 10.0),
+        transform("odom", "base_link", 9.0, x=0.0),
+        transform("odom", "base_link", 11.0, x=2.0, yaw=1.0),
+    )
+    result = located(tree)
+    assert result.pose == pytest.approx((1.0, 0.0, 0.5), abs=0.01)
+    assert result.stamp == 10.0
+
+
+def test_its_age_is_that_of_the_oldest_transform_that_moves() -> None:
+    tree = tree_with(transform("map", "odom", 1.0), at=100.0)
+    tree.record(Message(transforms=[transform("odom", "base_link", 1.0)]), 105.0, is_static=False)
+    assert located(tree).at == 100.0
+
+
+def test_a_jump_back_of_the_robots_clock_begins_again() -> None:
+    tree = tree_with(
+        transform("map", "base_link", 1000.0, x=1.0), transform("map", "base_link", 3.0, x=7.0)
+    )
+    assert located(tree).pose.x == 7.0
+    late = tree_with(
+        transform("map", "base_link", 1000.0, x=1.0), transform("map", "base_link", 999.0, x=7.0)
+    )
+    assert located(late).pose.x == 1.0
+
+
+def test_what_is_missing_is_named() -> None:
+    assert code(TransformTree()) == "transform_unknown"
+    assert code(tree_with(transform("map", "odom"))) == "transform_unknown"
+    assert (
+        code(tree_with(transform("map", "odom"), transform("world", "base_link")))
+        == "transform_unconnected"
+    )
+    loop = tree_with(transform("b", "base_link"), transform("base_link", "b"), transform("map", "odom"))
+    assert code(loop) == "transform_loop"
+
+
+@pytest.mark.parametrize(
+    ("bad", "expected"),
+    [
+        (transform("odom", "base_link", w=0.0), "transform_no_rotation"),
+        (transform("odom", "base_link", w=math.nan), "transform_no_rotation"),
+        (transform("odom", "base_link", x=math.inf), "transform_no_rotation"),
+        (transform("", "base_link"), "transform_no_frame"),
+        (transform("base_link", "base_link"), "transform_no_frame"),
+    ],
+)
+def test_a_transform_that_is_none_is_not_taken_and_named(bad: Any, expected: str) -> None:
+    assert code(tree_with(transform("map", "odom"), bad)) == expected
+
+
+def test_a_second_parent_is_named_where_the_way_is_lost() -> None:
+    tree = tree_with(
+        transform("map", "odom"), transform("odom", "base_link"), transform("other", "base_link")
+    )
+    assert code(tree) == "transform_two_parents"
+    tree.record(Message(transforms=[transform("odom", "base_link", 2.0, x=3.0)]), 1.0, is_static=False)
+    assert located(tree).pose.x == 3.0
+
+
+def test_frames_and_times_are_bounded() -> None:
+    tree = tree_with(*(transform("map", f"frame_{number}") for number in range(MAX_FRAMES + 50)))
+    assert len(tree) == MAX_FRAMES
+    assert code(tree) == "transforms_full"
+    long = tree_with(*(transform("map", "base_link", number * EVERY_S) for number in range(10_000)))
+    assert sum(len(frame.stamps) for frame in long._frames.values()) <= 100

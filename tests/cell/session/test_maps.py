@@ -1,0 +1,136 @@
+"""Maps of a robot are read beside the event loop: the newest counts, and nothing piles up."""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from functools import wraps
+from types import SimpleNamespace as Context
+from typing import Any, Final
+
+import pytest
+
+from app.cell.robot.maps import GRID_TYPE
+from app.cell.session import maps
+from app.cell.session.maps import MapListener
+from app.ros.zenoh.sample import Sample
+from app.system.texts import Text
+from tests.support.builders import BRIDGE, INTERFACES, NOW, panel_of, robot_there
+
+MAP: Final = {"id": "hall", "kind": "map", "label": "Hall"}
+TF: Final = "tf2_msgs/msg/TFMessage"
+SIDE: Final = 4000
+MOST_HELD_S: Final = 0.05  # the event loop, by a map of 4000 x 4000
+
+
+def payload(value: int, side: int = 1) -> bytes:
+    info = {"width": side, "height": side, "resolution": 1.0, "origin": {"orientation": {"w": 1.0}}}
+    cells = [value] * (side * side)
+    return INTERFACES.encode(GRID_TYPE, {"header": {"frame_id": "map"}, "info": info, "data": cells})
+
+
+def sample(data: bytes, seq: int = 1) -> Sample:
+    return Sample(data, seq, NOW, NOW, BRIDGE)
+
+
+def in_a_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    @wraps(test)
+    def run(**fixtures: Any) -> None:
+        asyncio.run(test(**fixtures))
+
+    return run
+
+
+class Listening:
+    """A listener, and the keys that it reported."""
+
+    def __init__(self, **keys: Any) -> None:
+        panel = panel_of(MAP | keys)
+        self.robot = robot_there(panel)
+        self.changed: list[str] = []
+        context: Any = Context(robot=self.robot, panel=panel, interfaces=INTERFACES)
+        self.listener = MapListener(context, self.changed.append)
+
+    async def reported(self, times: int) -> None:
+        async with asyncio.timeout(20):
+            while len(self.changed) < times:
+                await asyncio.sleep(0.005)
+
+
+@in_a_loop
+async def test_of_many_maps_the_first_and_the_newest_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.05)
+    listening = Listening()
+    for value in range(50):
+        listening.listener.record_sample("map", sample(payload(value), value))
+    await listening.reported(1)
+    first = listening.robot.maps["map"].grid
+    for value in range(50, 101):
+        listening.listener.record_sample("map", sample(payload(value), value))
+    await listening.reported(2)
+    await asyncio.sleep(0.2)
+    newest = listening.robot.maps["map"].grid
+    assert first is not None
+    assert newest is not None
+    assert (bytes(first.cells), bytes(newest.cells)) == (b"\x31", b"\x64")
+    assert len(listening.changed) == 2
+
+
+@in_a_loop
+async def test_the_same_map_again_is_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.0)
+    listening = Listening()
+    listening.listener.record_sample("map", sample(payload(5)))
+    await listening.reported(1)
+    first = listening.robot.maps["map"].grid
+    listening.listener.record_sample("map", sample(payload(5), 2))
+    await listening.reported(2)
+    assert listening.robot.maps["map"].grid is first
+
+
+@in_a_loop
+async def test_a_map_that_can_not_be_read_replaces_the_one_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.0)
+    listening = Listening()
+    for number, data in enumerate((payload(5), b"\0\1\0\0", payload(6)), start=1):
+        listening.listener.record_sample("map", sample(data, number))
+        await listening.reported(number)
+        state = listening.robot.maps["map"]
+        if number == 2:
+            assert state.grid is None
+            assert isinstance(state.problem, Text)
+            assert state.problem.code == "map_incomplete"
+    assert (state.grid is not None, state.problem) == (True, "")
+
+
+@in_a_loop
+async def test_a_large_map_does_not_hold_the_event_loop() -> None:
+    listening, data = Listening(), payload(0, SIDE)
+    longest = 0.0
+    listening.listener.record_sample("map", sample(data))
+    while not listening.changed:
+        began = time.monotonic()
+        await asyncio.sleep(0.001)
+        longest = max(longest, time.monotonic() - began)
+    print(f"the event loop was held for {1000 * longest:.1f} ms")
+    assert longest < MOST_HELD_S
+
+
+def test_transforms_are_those_of_all_messages_and_a_broken_one_is_counted() -> None:
+    listening = Listening()
+    turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    for key, parent, child in (("tf_static", "map", "odom"), ("tf", "odom", "base_link")):
+        way = {"translation": {"x": 1.0, "y": 0.0, "z": 0.0}, "rotation": turn}
+        stamped = {"header": {"frame_id": parent}, "child_frame_id": child, "transform": way}
+        data = INTERFACES.encode(TF, {"transforms": [stamped]})
+        listening.listener.record_sample(key, sample(data))
+    listening.listener.record_sample("tf", sample(b"\0\1\0\0\xff\xff\xff\xff"))
+    located = listening.robot.transforms.locate("base_link", "map")
+    assert getattr(located, "pose", None) == (2.0, 0.0, 0.0)
+    assert listening.robot.traffic.undecodable["tf"] == 1
+
+
+def test_a_map_with_a_pose_topic_does_not_read_transforms() -> None:
+    assert Listening(pose={"topic": "/pose"}).listener.keys == {"map"}
+    assert Listening().listener.keys == {"map", "tf", "tf_static"}
