@@ -28,7 +28,8 @@ ROOMS: Final = {
     "app/cell/permission/*.py": (
         "tests/cell/permission/", "tests/cell/robot/test_definitions.py",
         "tests/cell/commands/test_control_acts.py", "tests/cell/commands/test_steps.py",
-        "tests/cell/commands/test_parameters.py",
+        "tests/cell/commands/test_parameters.py", "tests/cell/commands/test_option_lists.py",
+        "tests/cell/session/test_robots_on_one_page.py",
     ),
     "app/cell/commands/holds.py": (
         "tests/cell/commands/test_holds.py", "tests/cell/commands/test_joysticks.py",
@@ -48,7 +49,8 @@ ROOMS: Final = {
         "tests/cell/commands/test_presses.py", "tests/cell/commands/test_press_limits.py",
         "tests/cell/commands/test_control_acts.py", "tests/cell/commands/test_acts.py",
     ),
-    "app/records/verify.py": ("tests/records/test_store.py", "tests/records/test_files_removed.py"),
+    "app/records/verify.py": ("tests/records/test_store.py", "tests/records/test_files_removed.py",
+        "tests/records/test_signed.py",),
     "app/cell/robot/topics.py": ("tests/cell/robot/", "tests/cell/permission/test_interlocks.py"),
 }  # fmt: skip
 # Fixtures with a process of their own, which reads the files.

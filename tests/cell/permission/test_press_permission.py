@@ -1,7 +1,8 @@
 """The table of checks: its order, its causes, and that one more row locks everything."""
 
 import math
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
 
 import pytest
 
@@ -19,10 +20,12 @@ from app.cell.permission.press_permission import (
     permission,
     permissions,
 )
+from app.cell.permission.roles import ConfirmedBy, ConfirmLocks
 from app.cell.permission.verdict import PERMITTED, WITHOUT_CONTROL, Verdict
 from app.cell.robot.state import RobotState
 from app.cell.view.view import build_view
 from app.panel.model import Panel
+from app.records.principal import Principal, anonymous
 from tests.cell.commands.test_calls_and_goals import CALL
 from tests.cell.commands.test_holds import JOG, SPEED
 from tests.cell.commands.test_holds import Bench as HoldBench
@@ -72,6 +75,40 @@ def test_the_first_that_locks_is_reported() -> None:
     both = permission(question(interlocks=[locked("one"), PERMITTED, locked("two")]))
     assert both.reasons == ["locked by one", "locked by two"]
     assert permission(question(interlocks=[PERMITTED])) is PERMITTED
+
+
+SATO: Final = Principal(anonymous("127.0.0.1"), "M. Sato")
+
+
+@pytest.mark.parametrize(
+    ("confirmation", "pressed", "who", "confirmed", "code"),
+    [
+        (False, True, SATO, None, ""),
+        ("pin", True, SATO, None, "confirm_needed_pin"),
+        ("two_persons", True, SATO, None, "confirm_needed_two"),
+        ("pin", True, SATO, ConfirmedBy("M. Sato", "", "pin"), ""),
+        ("pin", True, replace(SATO, user=""), None, "confirm_sign_in"),
+        ("pin", True, replace(SATO, program=True), None, "confirm_by_program"),
+        ("pin", False, SATO, None, ""),  # a page shows the button: it is asked for at the press
+    ],
+)
+def test_what_a_person_confirms_is_refused_unless_a_person_has(
+    confirmation: str | bool, pressed: bool, who: Principal, confirmed: ConfirmedBy | None, code: str
+) -> None:
+    panel = panel_of({**FREE, "confirm_press": confirmation})
+    grounds = ServerConditions(
+        who=who, pressed=pressed, confirmed=confirmed, confirm_locks=ConfirmLocks({})
+    )
+    command = next(iter(panel.commands))
+    asked = PermissionRequest(command, robot_there(panel), NOW, PERMITTED, (), grounds)
+    assert permission(asked).code == code
+
+
+def test_what_a_person_confirms_is_locked_until_the_users_are_known() -> None:
+    panel = panel_of({**FREE, "confirm_press": "pin"})
+    command = next(iter(panel.commands))
+    asked = PermissionRequest(command, robot_there(panel), NOW, PERMITTED, ())
+    assert not permission(asked).permitted
 
 
 def test_verdict_changes_at_the_soonest_deadline_of_all_interlocks() -> None:
