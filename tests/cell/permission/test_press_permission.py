@@ -83,13 +83,19 @@ SATO: Final = Principal(anonymous("127.0.0.1"), "M. Sato")
 @pytest.mark.parametrize(
     ("confirmation", "pressed", "who", "confirmed", "code"),
     [
-        (False, True, SATO, None, ""),
+        (False, True, SATO, None, "permitted"),
         ("pin", True, SATO, None, "confirm_needed_pin"),
         ("two_persons", True, SATO, None, "confirm_needed_two"),
-        ("pin", True, SATO, ConfirmedBy("M. Sato", "", "pin"), ""),
+        ("pin", True, SATO, ConfirmedBy("M. Sato", "", "pin"), "permitted"),
         ("pin", True, replace(SATO, user=""), None, "confirm_sign_in"),
         ("pin", True, replace(SATO, program=True), None, "confirm_by_program"),
-        ("pin", False, SATO, None, ""),  # a page shows the button: it is asked for at the press
+        (
+            "pin",
+            False,
+            SATO,
+            None,
+            "permitted",
+        ),  # a page shows the button: it is asked for at the press
     ],
 )
 def test_what_a_person_confirms_is_refused_unless_a_person_has(
