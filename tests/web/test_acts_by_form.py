@@ -42,7 +42,7 @@ SECRET: Final = "7391"
 RECIPE: Final = {**CARTON, "speed": 82.5}
 CSV: Final = "name,length,speed,gripper,fast,note\nTray,600,80,fork,true,x\n"
 COMPARED: Final = ("kind", "who", "action", "values", "outcome", "reason", "text")
-BY_TIME: Final = {action for action, _ in HAND_OVERS.values()}  # entries of no act
+BY_TIME: Final = {action for action, *_ in HAND_OVERS.values()}  # entries of no act
 A_TIME: Final = r"\d{4}-\d\d-\d\d[T ][\d:.+]+|\d\d:\d\d(:\d\d)?"
 Fields = Mapping[str, Any]
 

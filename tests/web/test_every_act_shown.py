@@ -44,7 +44,7 @@ LANGUAGES: Final = ("en", "de", "ja")
 TABLES: Final[dict[Kind, tuple[str, ...]]] = {
     "control": (
         *(f"control_{act}" for act in CONTROL_ACTS),
-        *(action for action, _ in HAND_OVERS.values()),
+        *(action for action, *_ in HAND_OVERS.values()),
     ),
     "alarm": (*(f"alarm_{act}" for act in ALARM_ACTS), *(f"alarm_{act}" for act in SHIFT_ACTS)),
     "diagnostics": tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS),

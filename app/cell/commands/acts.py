@@ -121,15 +121,18 @@ Result = TypeVar("Result", bound=Applied)
 class Act(Generic[Subject, Result]):
     """A row of a table of acts on a subject.
 
-    `permission` returns whether the server permits it now. `apply` does it; done twice, it changes
-    nothing more. `entry` is the sentence of the log for what was done. `needs` is the role that it
-    needs; an object may need a further one.
+    `word` is the code of its word on the page of the operator's log. `permission` returns whether the
+    server permits it now. `apply` does it; done twice, it changes nothing more. `entry` is the sentence
+    of the log for what was done. `needs` is the role that it needs; an object may need a further one.
+    `confirmable`: an object may say that a person confirms it.
     """
 
+    word: str
     permission: Callable[[ActGuard, ActRequest], Verdict]
     apply: Callable[[Subject, ActRequest], Result]
     entry: Callable[[Result], TextLike]
     needs: str = OPERATOR
+    confirmable: bool = False
 
 
 def server_permits(guard: ActGuard, request: ActRequest) -> Verdict:

@@ -30,15 +30,13 @@ from app.cell.commands.press import Press
 from app.cell.commands.receipts import GOOD_OUTCOMES, Receipt
 from app.cell.permission.roles import ConfirmLocks, unconfirmed
 from app.cell.permission.verdict import Verdict
-from app.panel.roles import MAINTENANCE
+from app.panel.roles import MAINTENANCE, OPERATOR
 from app.panel.widgets.families import PressCommand
 from app.records.principal import Principal
 from app.system.errors import InputError
 from app.system.texts import Text, TextLike, say
 
 LONGEST_REASON: Final = 200
-# What a person confirms by `confirm_act`. The other acts bring an alarm back.
-CONFIRMED: Final = frozenset({"acknowledge", "shelve", "out_of_service", "reset"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,10 +99,6 @@ def _until(request: ActRequest) -> float:
     return until.timestamp()
 
 
-def _entry(code: str) -> Callable[[AlarmChange], Text]:
-    return lambda change: say(code, name=change.name)
-
-
 def needs_of_alarm(engine: AlarmEngine, alarm_id: str) -> tuple[str, ...]:
     """The roles and groups that acts on this alarm need beside those of the act."""
     alarm = engine.alarms.get(alarm_id)
@@ -131,32 +125,50 @@ def confirm_key(alarm: str) -> str:
     return f"alarm {alarm}"
 
 
+def _row(
+    word: str, change: StatusChange, code: str, needs: str = OPERATOR, *, confirmable: bool = False
+) -> Act[AlarmEngine, AlarmChange]:
+    """`code` is that of the sentence in the log."""
+
+    def entry(done: AlarmChange) -> Text:
+        return say(code, name=done.name)
+
+    return Act(word, server_and_control_permit, _changes(change), entry, needs, confirmable)
+
+
 ALARM_ACTS: Final[Mapping[str, Act[AlarmEngine, AlarmChange]]] = {
-    "acknowledge": Act(
-        server_and_control_permit, _changes(_acknowledge), _entry("log_done_acknowledge")
+    "acknowledge": _row(
+        "log_page_alarm_acknowledge", _acknowledge, "log_done_acknowledge", confirmable=True
     ),
-    "shelve": Act(server_and_control_permit, _changes(_shelve), _entry("log_done_shelve"), MAINTENANCE),
-    "unshelve": Act(
-        server_and_control_permit,
-        _changes(lambda status, definition, _, now: unshelve(status, definition.rules, now)),
-        _entry("log_done_unshelve"),
+    "shelve": _row("log_page_alarm_shelve", _shelve, "log_done_shelve", MAINTENANCE, confirmable=True),
+    "unshelve": _row(
+        "log_page_alarm_unshelve",
+        lambda status, definition, _, now: unshelve(status, definition.rules, now),
+        "log_done_unshelve",
         MAINTENANCE,
     ),
-    "out_of_service": Act(
-        server_and_control_permit, _changes(_remove), _entry("log_done_out_of_service"), MAINTENANCE
+    "out_of_service": _row(
+        "log_page_alarm_out_of_service",
+        _remove,
+        "log_done_out_of_service",
+        MAINTENANCE,
+        confirmable=True,
     ),
-    "in_service": Act(
-        server_and_control_permit,
-        _changes(lambda status, definition, _, now: return_to_service(status, definition.rules, now)),
-        _entry("log_done_in_service"),
+    "in_service": _row(
+        "log_page_alarm_in_service",
+        lambda status, definition, _, now: return_to_service(status, definition.rules, now),
+        "log_done_in_service",
         MAINTENANCE,
     ),
-    "reset": Act(
-        server_and_control_permit,
-        _changes(lambda status, definition, _, __: reset(status, definition.rules)),
-        _entry("log_done_reset"),
+    "reset": _row(
+        "log_page_alarm_reset",
+        lambda status, definition, _, __: reset(status, definition.rules),
+        "log_done_reset",
+        confirmable=True,
     ),
 }
+# The other acts bring an alarm back.
+CONFIRMED: Final = frozenset(name for name, act in ALARM_ACTS.items() if act.confirmable)
 
 
 # The command that is sent when an alarm is acknowledged: a press of a control of the panel, with all

@@ -77,31 +77,45 @@ def _released(change: ControlChange) -> Text:
     return say("log_done_release" if had_it else "log_done_withdraw")
 
 
+def _row(
+    word: str,
+    apply: Callable[[ControlAuthority, ActRequest], ControlRefusal],
+    entry: Callable[[ControlChange], Text],
+) -> Act[ControlAuthority, ControlChange]:
+    return Act(word, server_permits, _changes(apply), entry)
+
+
 CONTROL_ACTS: Final[Mapping[str, Act[ControlAuthority, ControlChange]]] = {
-    "take": Act(server_permits, _changes(lambda c, r: c.take(r.who, _life_s(r))), _took),
-    "ask": Act(server_permits, _changes(lambda c, r: c.ask(r.who, _life_s(r))), _asked),
-    "give": Act(
-        server_permits, _changes(lambda c, r: c.give(r.who, r.object)), _answered("log_done_give")
+    "take": _row("log_page_control_take", lambda c, r: c.take(r.who, _life_s(r)), _took),
+    "ask": _row("log_page_control_ask", lambda c, r: c.ask(r.who, _life_s(r)), _asked),
+    "give": _row(
+        "log_page_control_give", lambda c, r: c.give(r.who, r.object), _answered("log_done_give")
     ),
-    "keep": Act(
-        server_permits, _changes(lambda c, r: c.keep(r.who, r.object)), _answered("log_done_keep")
+    "keep": _row(
+        "log_page_control_keep", lambda c, r: c.keep(r.who, r.object), _answered("log_done_keep")
     ),
-    "release": Act(always, _changes(lambda c, r: c.release(r.who)), _released, ANYBODY),
+    "release": Act(
+        "log_page_control_release", always, _changes(lambda c, r: c.release(r.who)), _released, ANYBODY
+    ),
 }
 
 
-# The action of a change of control without an act, and its sentence, by how it came about.
+# The action of a change of control without an act, its sentence and its word, by how it came about.
 HAND_OVERS: Final = {
-    "lost": ("control_lost", "log_control_lost"),
-    "idle": ("control_idle", "log_control_idle"),
-    "first_page": ("control_first_page", "log_control_first_page"),
-    "request_lost": ("control_request_lost", "log_control_request_lost"),
+    "lost": ("control_lost", "log_control_lost", "log_page_control_lost"),
+    "idle": ("control_idle", "log_control_idle", "log_page_control_idle"),
+    "first_page": ("control_first_page", "log_control_first_page", "log_page_control_first_page"),
+    "request_lost": (
+        "control_request_lost",
+        "log_control_request_lost",
+        "log_page_control_request_lost",
+    ),
 }
 
 
 def log_hand_over(press_log: PressLog, hand_over: HandOver) -> None:
     """Logs a change of control without an act, such as a timeout. Does not wait for the disk."""
     who, other = hand_over.who, hand_over.other.title if hand_over.other else say("control_no_one")
-    action, sentence = HAND_OVERS[hand_over.how]
+    action, sentence, _ = HAND_OVERS[hand_over.how]
     reason = say(sentence, name=who.title, other=other)
     press_log.note(action, origin_of(who), reason)

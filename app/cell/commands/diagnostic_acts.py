@@ -6,7 +6,7 @@ from typing import Final, Protocol
 
 from app.cell.commands.acts import Act, ActRequest, Applied, server_permits
 from app.panel.roles import MAINTENANCE
-from app.system.texts import Text, say
+from app.system.texts import say
 
 
 class Doctor(Protocol):
@@ -45,12 +45,12 @@ def _share(_: Doctor, __: ActRequest) -> Applied:
     return Applied()
 
 
-def _entry(code: str) -> Callable[[Applied], Text]:
-    return lambda _: say(code)
+def _row(word: str, apply: Callable[[Doctor, ActRequest], Applied], code: str) -> Act[Doctor, Applied]:
+    return Act(word, server_permits, apply, lambda _: say(code), MAINTENANCE)
 
 
 DIAGNOSTIC_ACTS: Final[Mapping[str, Act[Doctor, Applied]]] = {
-    "check": Act(server_permits, _check, _entry("log_done_check"), MAINTENANCE),
-    "bundle": Act(server_permits, _bundle, _entry("log_done_bundle"), MAINTENANCE),
-    "foxglove": Act(server_permits, _share, _entry("log_done_foxglove"), MAINTENANCE),
+    "check": _row("log_page_diagnostics_check", _check, "log_done_check"),
+    "bundle": _row("log_page_diagnostics_bundle", _bundle, "log_done_bundle"),
+    "foxglove": _row("log_page_diagnostics_foxglove", _share, "log_done_foxglove"),
 }

@@ -146,40 +146,46 @@ def _entry(code: str) -> Callable[[RecipeChange], Text]:
     return lambda change: say(code, set=change.set, name=change.name, changes=change.changes)
 
 
-def _row(plan: Plan, code: str) -> Act[RecipeBooks, RecipeChange]:
-    return Act(server_and_control_permit, _changes(plan), _entry(code), MAINTENANCE)
+def _row(word: str, plan: Plan, code: str) -> Act[RecipeBooks, RecipeChange]:
+    return Act(word, server_and_control_permit, _changes(plan), _entry(code), MAINTENANCE)
 
 
 RECIPE_ACTS: Final[Mapping[str, Act[RecipeBooks, RecipeChange]]] = {
     "create": _row(
+        "log_page_recipe_create",
         lambda book, author, _, values: book.create(author, _name(values), _values(values)),
         "log_done_recipe_create",
     ),
     "copy": _row(
+        "log_page_recipe_copy",
         lambda book, author, recipe, values: book.copy(author, recipe, _version(values), _name(values)),
         "log_done_recipe_create",
     ),
     "save": _row(
+        "log_page_recipe_save",
         lambda book, author, recipe, values: book.save(
             author, recipe, _version(values), _values(values)
         ),
         "log_done_recipe_save",
     ),
     "rename": _row(
+        "log_page_recipe_rename",
         lambda book, author, recipe, values: book.rename(
             author, recipe, _version(values), _name(values)
         ),
         "log_done_recipe_rename",
     ),
     "restore": _row(
+        "log_page_recipe_restore",
         lambda book, author, recipe, values: book.restore(
             author, recipe, _version(values), _version(values, "to")
         ),
         "log_done_recipe_restore",
     ),
     "delete": _row(
+        "log_page_recipe_delete",
         lambda book, author, recipe, values: book.delete(author, recipe, _version(values)),
         "log_done_recipe_delete",
     ),
-    "import": _row(_import, "log_done_recipe_import"),
+    "import": _row("log_page_recipe_import", _import, "log_done_recipe_import"),
 }

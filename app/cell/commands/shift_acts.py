@@ -20,5 +20,5 @@ def _leave(_: None, request: ActRequest) -> Applied:
 
 
 SHIFT_ACTS: Final[Mapping[str, Act[None, Applied]]] = {
-    "message": Act(server_permits, _leave, lambda _: say("log_done_message")),
+    "message": Act("log_page_alarm_message", server_permits, _leave, lambda _: say("log_done_message")),
 }

@@ -141,7 +141,8 @@ def _secret_of(request: ActRequest) -> str:
 
 def _row(plan: Plan, detail: Callable[[ActRequest], str], code: str) -> Act[Access, Applied]:
     # A change that was made has its entry by the file, which also has those of the command line.
-    return Act(server_permits, _changes(plan, detail, code), lambda applied: applied.note, ENGINEER)
+    # The word of such an act is that of its change, in `app/cell/people/access_log.py`.
+    return Act("", server_permits, _changes(plan, detail, code), lambda applied: applied.note, ENGINEER)
 
 
 SECRET_DONE: Final[Mapping[Way, str]] = {

@@ -2,46 +2,35 @@
 
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, datetime, timedelta
 from functools import cache
 from itertools import groupby
 from typing import Any, Final
 
+from app.cell.commands.acts import Act
+from app.cell.commands.alarm_acts import ALARM_ACTS
+from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
+from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.recipe_acts import RECIPE_ACTS
+from app.cell.commands.shift_acts import SHIFT_ACTS
 from app.records import LogRow
+from app.records.entry import Kind
 from app.system.clock import offset_if_twice
 from app.system.printable import printable
 from app.system.texts import Param, Text, TextLike, named_day, render, say
 from app.system.texts.locales import number_in, time_in
 
+TABLES: Final[Sequence[tuple[Kind, Mapping[str, Act[Any, Any]]]]] = (
+    ("control", CONTROL_ACTS),
+    ("alarm", {**ALARM_ACTS, **SHIFT_ACTS}),
+    ("diagnostics", DIAGNOSTIC_ACTS),
+    ("recipe", RECIPE_ACTS),
+)
 # Acts, and changes of control without an act, by the action of their entries.
 ACTION_WORDS: Final = {
-    "control_take": "log_page_control_take",
-    "control_ask": "log_page_control_ask",
-    "control_give": "log_page_control_give",
-    "control_keep": "log_page_control_keep",
-    "control_release": "log_page_control_release",
-    "control_lost": "log_page_control_lost",
-    "control_idle": "log_page_control_idle",
-    "control_first_page": "log_page_control_first_page",
-    "control_request_lost": "log_page_control_request_lost",
-    "alarm_acknowledge": "log_page_alarm_acknowledge",
-    "alarm_shelve": "log_page_alarm_shelve",
-    "alarm_unshelve": "log_page_alarm_unshelve",
-    "alarm_out_of_service": "log_page_alarm_out_of_service",
-    "alarm_in_service": "log_page_alarm_in_service",
-    "alarm_reset": "log_page_alarm_reset",
-    "alarm_message": "log_page_alarm_message",
-    "diagnostics_check": "log_page_diagnostics_check",
-    "diagnostics_bundle": "log_page_diagnostics_bundle",
-    "diagnostics_foxglove": "log_page_diagnostics_foxglove",
-    "recipe_create": "log_page_recipe_create",
-    "recipe_copy": "log_page_recipe_copy",
-    "recipe_save": "log_page_recipe_save",
-    "recipe_rename": "log_page_recipe_rename",
-    "recipe_restore": "log_page_recipe_restore",
-    "recipe_delete": "log_page_recipe_delete",
-    "recipe_import": "log_page_recipe_import",
+    **{f"{kind}_{name}": act.word for kind, acts in TABLES for name, act in acts.items()},
+    **{action: word for action, _, word in HAND_OVERS.values()},
 }
 OUTCOME_WORDS: Final = {
     "published": "log_outcome_published",

@@ -1,8 +1,8 @@
 """The runner of acts, with a table that has nothing to do with control."""
 
 import asyncio
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import pytest
@@ -18,12 +18,17 @@ from app.cell.commands.acts import (
     always,
     server_permits,
 )
+from app.cell.commands.user_acts import USER_ACTS
+from app.cell.people.access_log import CHANGES
 from app.cell.permission.verdict import PERMITTED, Verdict, locked
+from app.panel.roles import ANYBODY, ENGINEER, VIEWER
 from app.records import Entry, NullLog
+from app.records.entry import Kind
 from app.records.press_record import PressLog
 from app.records.principal import Clients, Principal
 from app.system.errors import NotFound
-from app.system.texts import Text, say
+from app.system.texts import Text, say, sentences
+from app.web.pages.log_words import ACTION_WORDS, TABLES
 
 _KNOWN = Clients()
 ANN, BOB = (Principal(_KNOWN.identify(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2))
@@ -59,8 +64,8 @@ def entry(count: Count) -> Text:
 
 
 ACTS: Final[Mapping[str, Act[Counters, Count]]] = {
-    "increase": Act(only_ann, Counters.increase, entry),
-    "reset": Act(always, Counters.reset, entry),
+    "increase": Act("log_page_control_take", only_ann, Counters.increase, entry),
+    "reset": Act("log_page_control_release", always, Counters.reset, entry),
 }
 
 
@@ -162,3 +167,35 @@ def test_refusal_of_an_act_is_answered_and_logged_with_its_sentence(bench: Bench
 def test_an_act_that_is_not_in_the_table_is_not_found(bench: Bench) -> None:
     with pytest.raises(NotFound, match='no act "steal": there is increase, reset'):
         bench.run(ActRequest("steal", ANN), "a1")
+
+
+# Every row of every table.
+
+EVERY: Final[Sequence[tuple[Kind, Mapping[str, Act[Any, Any]]]]] = (*TABLES, ("access", USER_ACTS))
+ROWS: Final = [(kind, acts, name) for kind, acts in EVERY for name in acts]
+
+
+@pytest.mark.parametrize(("kind", "acts", "name"), ROWS, ids=[f"{kind} {n}" for kind, _, n in ROWS])
+def test_every_act_has_its_role_its_receipt_its_entry_and_its_word(
+    kind: Kind, acts: Mapping[str, Act[Any, Any]], name: str
+) -> None:
+    act, log, guard = acts[name], Log(), Guard()
+    runner = ActRunner(kind, acts, None, ActContext(guard, PressLog(log, "r1"), "", lambda: None))
+    guard.verdict = locked("server_shutting_down")
+
+    def refused(role: str) -> ActReceipt:
+        return asyncio.run(runner.act(ActRequest(name, replace(ANN, role=role)), f"{role} {name}"))
+
+    if act.needs != ANYBODY:
+        receipt = refused(VIEWER)
+        assert (receipt.outcome, receipt.code, receipt.cause) == ("refused", "role_needed", "role")
+    if act.permission is not always:
+        receipt = refused(ENGINEER)
+        assert (receipt.outcome, receipt.code) == ("refused", "server_shutting_down")
+    for entry in log.entries:
+        assert (entry.kind, entry.action, entry.robot) == (kind, f"{kind}_{name}", "r1")
+    if kind == "access":
+        assert name in CHANGES
+    else:
+        assert ACTION_WORDS[f"{kind}_{name}"] == act.word
+        assert act.word in sentences("en")
