@@ -15,7 +15,7 @@ from app.system.texts.catalogue import files as files_of_languages
 from app.web.language import COOKIE as LANGUAGE
 from app.web.pages.display_choice import CHOICES, COOKIE
 from tests.cell.session.test_robots_on_one_page import panel_file
-from tests.support.browser.browsers import ReusedPage
+from tests.support.browser.browsers import HAS_FONTS, ReusedPage
 from tests.support.browser.line import Line
 from tests.support.browser.pages import DRAWN, place
 from tests.support.parts import ROOT, Server, until
@@ -345,6 +345,7 @@ def test_layout_does_not_shift_after_load(
     with ExitStack() as stack:
         pages = [stack.enter_context(chromium.new_page(viewport=size)) for size in sizes]
         for page in pages:
+            page.context.add_cookies([HAS_FONTS])  # a browser's first page gets its fonts late
             page.add_init_script(SHIFTS)
         url = example.url + path
         moved = until(lambda: shifts(pages, url, states), "pages keep their server", within_s=200)

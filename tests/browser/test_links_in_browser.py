@@ -101,7 +101,7 @@ def test_hung_node_is_silent_and_killed_node_is_lost(
     own_node.freeze()
     expect(said(page, "node", "text")).to_have_text("silent")
     expect(said(page, "node", "locks")).to_have_text("Locks Publish1, Publish2.")
-    expect(said(page, "node", "reason")).to_contain_text("No new data on /operation_enabled for 1.5 s")
+    expect(said(page, "node", "reason")).to_contain_text("No new data on operation for 1.5 s")
     expect(said(page, "node", "since")).to_have_text(MOMENT)
     expect(said(page, "bridge", "locks")).to_have_text("Locks nothing.")
     expect(lamp(page, "node")).to_have_attribute("data-state", "bad")
