@@ -5,7 +5,7 @@ from jinja2 import Environment, FileSystemLoader
 
 from app.cell.commands.dispatch import Dispatcher
 from app.cell.permission.interlocks import COMMAND_CHECKS
-from app.cell.view.kinds import ATTRIBUTES
+from app.cell.view.kinds import ATTRIBUTES, COMMANDS
 from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCommand
 from app.panel.widgets.kinds import KINDS, find_row, require_rows
 from app.panel.widgets.publish import Publish
@@ -36,7 +36,7 @@ def dispatcher() -> Dispatcher:
 def test_each_part_of_a_kind_is_required(dispatcher: Dispatcher) -> None:
     """Without the rows of a family, the first kind of the family is named."""
     for rows, family in (
-        (ATTRIBUTES, BaseWidget),
+        ({**ATTRIBUTES, **COMMANDS}, BaseWidget),
         (COMMAND_CHECKS, Command),
         (SIMULATED, BaseWidget),
         (dispatcher.dispatches, PressCommand),
@@ -48,9 +48,9 @@ def test_each_part_of_a_kind_is_required(dispatcher: Dispatcher) -> None:
 
 
 def test_the_kind_and_the_missing_part_are_named() -> None:
-    rows = {family: row for family, row in ATTRIBUTES.items() if not issubclass(Publish, family)}
+    rows = {family: row for family, row in COMMANDS.items() if not issubclass(Publish, family)}
     with pytest.raises(KindError) as caught:
-        require_rows("attributes", rows, BaseWidget)
+        require_rows("attributes", rows, Command)
     assert str(caught.value) == (
         'the widget kind "publish" has no attributes: add a row for Publish or its family'
     )

@@ -71,7 +71,7 @@ UNDER_WAY: Final[Mapping[str, str]] = {
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
 AttributesUntil = tuple[Attributes, float]
-AttributesOf = Callable[[Any, RobotState, Verdict, float], AttributesUntil]
+AttributesOf = Callable[[Any, RobotState, float], AttributesUntil]
 
 
 class Enabled(TypedDict):
@@ -85,7 +85,10 @@ def attributes_of(
     """The attributes of a widget at `now` (monotonic seconds), and when time alone changes them;
     `verdict` is that of a command, whose own deadline is not counted here. A value that alarms are
     about has `alarmed`, the priority of the most urgent active one, "" for none."""
-    attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, verdict, now)
+    if isinstance(widget, Command):
+        attributes, until = find_row(COMMANDS, widget)(widget, robot, verdict, now)
+    else:
+        attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, now)
     if isinstance(widget, Display):
         priority = robot.alarmed.priorities.get((widget.topic, widget.field))
         if priority is not None:
@@ -191,11 +194,38 @@ def _recipe(widget: RecipeLoad, robot: RobotState, verdict: Verdict, now: float)
     return pressed | reported, min(ages, until)
 
 
+def _fixed(widget: BaseWidget, robot: RobotState, now: float) -> AttributesUntil:
+    return {}, math.inf
+
+
+# Of widgets that send nothing.
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
-    Static: lambda widget, robot, verdict, now: ({}, math.inf),
-    Input: lambda widget, robot, verdict, now: ({}, math.inf),
-    SelectInput: lambda widget, robot, verdict, now: select(widget, robot, now),
-    Numeric: lambda widget, robot, verdict, now: ({"limits": widget.limits_text}, math.inf),
+    Static: _fixed,
+    Input: _fixed,
+    SelectInput: select,
+    Numeric: lambda widget, robot, now: ({"limits": widget.limits_text}, math.inf),
+    Display: value,
+    Readout: readout,
+    Camera: camera,
+    LogView: lambda widget, robot, now: log(widget, robot),
+    Indicator: indicator,
+    MachineState: machine_state,
+    Figure: figure,
+    Pallet: pallet,
+    Conditions: conditions,
+    SequenceWidget: sequence,
+    Gauge: gauge,
+    Joints: joints,
+    MapView: map_view,
+    Table: table,
+    AlarmListView: lambda widget, robot, now: alarm_list(widget, robot),
+    AlarmLineView: lambda widget, robot, now: alarm_line(widget, robot),
+    Trend: trend,
+}
+# Of commands, with their verdict.
+COMMANDS: Final[
+    Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], AttributesUntil]]
+] = {
     PressCommand: _pressed,
     PublishPress: _published,
     Step: _stepped,
@@ -203,22 +233,5 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     RecipeLoad: _recipe,
     HoldCommand: _held,
     Parameter: _parameter,
-    Display: lambda widget, robot, verdict, now: value(widget, robot, now),
-    Readout: lambda widget, robot, verdict, now: readout(widget, robot, now),
-    Camera: lambda widget, robot, verdict, now: camera(widget, robot, now),
-    LogView: lambda widget, robot, verdict, now: log(widget, robot),
-    Indicator: lambda widget, robot, verdict, now: indicator(widget, robot, now),
-    MachineState: lambda widget, robot, verdict, now: machine_state(widget, robot, now),
-    Figure: lambda widget, robot, verdict, now: figure(widget, robot, now),
-    Pallet: lambda widget, robot, verdict, now: pallet(widget, robot, now),
-    Conditions: lambda widget, robot, verdict, now: conditions(widget, robot, now),
-    SequenceWidget: lambda widget, robot, verdict, now: sequence(widget, robot, now),
-    Gauge: lambda widget, robot, verdict, now: gauge(widget, robot, now),
-    Joints: lambda widget, robot, verdict, now: joints(widget, robot, now),
-    MapView: lambda widget, robot, verdict, now: map_view(widget, robot, now),
-    Table: lambda widget, robot, verdict, now: table(widget, robot, now),
-    AlarmListView: lambda widget, robot, verdict, now: alarm_list(widget, robot),
-    AlarmLineView: lambda widget, robot, verdict, now: alarm_line(widget, robot),
-    Trend: lambda widget, robot, verdict, now: trend(widget, robot, now),
 }
-require_rows("attributes", ATTRIBUTES, BaseWidget)
+require_rows("attributes", {**ATTRIBUTES, **COMMANDS}, BaseWidget)

@@ -55,27 +55,27 @@ class WidgetKind(NamedTuple):
 
     model: type[BaseWidget]
     tile: Tile
-    styles: tuple[Stylesheet, ...]
-    script: bool | Script
+    styles: tuple[Stylesheet, ...] = ()
+    script: bool | Script = False
 
 
 KINDS: Final[Mapping[str, WidgetKind]] = {
-    "text": WidgetKind(TextInput, tiles.ENTRY, styles=("entries",), script=False),
-    "number": WidgetKind(NumberInput, tiles.NUMBER, styles=("entries",), script=False),
-    "slider": WidgetKind(SliderInput, tiles.SLIDER, styles=("entries",), script=False),
+    "text": WidgetKind(TextInput, tiles.ENTRY, styles=("entries",)),
+    "number": WidgetKind(NumberInput, tiles.NUMBER, styles=("entries",)),
+    "slider": WidgetKind(SliderInput, tiles.SLIDER, styles=("entries",)),
     "select": WidgetKind(SelectInput, tiles.ENTRY, styles=("entries",), script="entries"),
-    "toggle": WidgetKind(ToggleInput, tiles.ENTRY, styles=("entries",), script=False),
-    "publish": WidgetKind(Publish, tiles.KEY, styles=(), script=False),
-    "hold": WidgetKind(Hold, tiles.KEY, styles=(), script="holds"),
+    "toggle": WidgetKind(ToggleInput, tiles.ENTRY, styles=("entries",)),
+    "publish": WidgetKind(Publish, tiles.KEY),
+    "hold": WidgetKind(Hold, tiles.KEY, script="holds"),
     "step": WidgetKind(Step, tiles.STEP, styles=("own",), script=True),
     "switch": WidgetKind(Switch, tiles.ENTRY, styles=("entries",), script="entries"),
     "joystick": WidgetKind(Joystick, tiles.JOYSTICK, styles=("own",), script="holds"),
-    "call": WidgetKind(Call, tiles.KEY, styles=(), script=False),
-    "action": WidgetKind(Action, tiles.ACTION, styles=(), script=False),
+    "call": WidgetKind(Call, tiles.KEY),
+    "action": WidgetKind(Action, tiles.ACTION),
     "parameter": WidgetKind(Parameter, tiles.PARAMETER, styles=("entries", "own"), script="entries"),
-    "readout": WidgetKind(Readout, tiles.DISPLAY, styles=(), script=False),
-    "indicator": WidgetKind(Indicator, tiles.DISPLAY, styles=(), script=False),
-    "figure": WidgetKind(Figure, tiles.FIGURE, styles=("facts",), script=False),
+    "readout": WidgetKind(Readout, tiles.DISPLAY),
+    "indicator": WidgetKind(Indicator, tiles.DISPLAY),
+    "figure": WidgetKind(Figure, tiles.FIGURE, styles=("facts",)),
     "pallet": WidgetKind(Pallet, tiles.PALLET, styles=("facts",), script="facts"),
     "conditions": WidgetKind(Conditions, tiles.CONDITIONS, styles=("facts",), script="facts"),
     "sequence": WidgetKind(Sequence, tiles.SEQUENCE, styles=("facts",), script="facts"),
@@ -90,9 +90,9 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
         AlarmListView, tiles.ALARM_LIST, styles=("alarm-rows", "own"), script=True
     ),
     "alarm_line": WidgetKind(AlarmLineView, tiles.ALARM_LINE, styles=("own",), script=True),
-    "label": WidgetKind(TextLabel, tiles.LABEL, styles=(), script=False),
-    "image": WidgetKind(Picture, tiles.DISPLAY, styles=(), script=False),
-    "link": WidgetKind(PageLink, tiles.KEY, styles=(), script=False),
+    "label": WidgetKind(TextLabel, tiles.LABEL),
+    "image": WidgetKind(Picture, tiles.DISPLAY),
+    "link": WidgetKind(PageLink, tiles.KEY),
 }
 
 
