@@ -695,14 +695,6 @@ def test_file_that_exhausts_the_parser_is_unreadable(tmp_path: Path, content: st
     assert error.value.unreadable
 
 
-@pytest.mark.parametrize("field", ["header", "ranges"])
-def test_a_readout_is_of_one_value(load: Load, field: str) -> None:
-    content = with_widget(3, topic="/scan", type="sensor_msgs/msg/LaserScan", field=field)
-    reported = faults(load, content)
-    assert list(reported) == [f"{READOUT}.field"]
-    assert "a readout takes one value" in reported[f"{READOUT}.field"]
-
-
 def interface(tmp_path: Path, text: str = "bool[2] closed\nfloat32 kelvin\n") -> None:
     folder = tmp_path / "msgs/cell_msgs/msg"
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,21 +7,14 @@ from typing import Any, Final
 import pytest
 from pydantic import BaseModel
 
-from app.cell.alarms.sources import read_source, read_suppression
-from app.cell.permission.conditions import condition_state
-from app.cell.permission.interlocks import link_verdict
-from app.cell.robot.state import RobotState
 from app.panel import Panel, load_panel
 from app.panel.file.keys import inner_model, known_keys
 from app.panel.file.load import check_panel, faults_of_text
 from app.panel.source import NAME, reads_source
 from app.panel.widgets.kinds import KINDS
-from app.system.texts import render
-from tests.support.builders import NOW, robot_there, says
 
 pytestmark = pytest.mark.promise("values")
 
-SENT: Final = 300_000.0  # pascal: 3 bar, which is 2 bar above the atmosphere
 TOPICS: Final = """title = "Cell"
 [[source]]
 id = "air"
@@ -176,39 +169,6 @@ def test_where_a_number_counts_as_it_is_sent_a_scale_is_an_error(tmp_path: Path,
     messages = [fault.message for fault in faults if fault.place.endswith(NAME)]
     assert len(messages) == 1
     assert "counts as the robot sends it" in messages[0]
-
-
-def robot_of(panel: Panel, sent: float = SENT) -> RobotState:
-    robot = robot_there(panel)
-    says(robot, "/air", sent, "std_msgs/msg/Float64")
-    return robot
-
-
-@pytest.mark.parametrize("place", ["interlock", "condition"])
-def test_a_limit_is_in_the_unit_that_is_shown(load: Any, place: str) -> None:
-    panel = load(SCALED[place])
-    condition = described(panel, place)
-    for sent, shown, is_met in [(SENT, "2 bar", False), (600_000.0, "5 bar", True)]:
-        robot = robot_of(panel, sent)
-        state = condition_state(condition, robot, NOW, link_verdict(robot, NOW))
-        assert (render(state.value), state.verdict.permitted) == (shown, is_met)
-        assert render(state.need) == "5 bar or more"
-
-
-def test_alarms_are_raised_and_suppressed_in_the_unit_that_is_shown(load: Any) -> None:
-    panel = load(SCALED["alarm"])
-    assert read_source(panel.alarms[0], robot_of(panel), NOW, NOW).value == 2.0
-    for place, sent, is_met in [
-        ("alarm.when", SENT, True),
-        ("alarm.when", 700_000.0, False),
-        ("alarm.while", SENT, True),
-        ("alarm.while", 700_000.0, False),
-    ]:
-        panel = load(SCALED[place])
-        alarm, robot = panel.alarms[0], robot_of(panel, sent)
-        of_when = place == "alarm.when"
-        met = read_source(alarm, robot, NOW, NOW) if of_when else read_suppression(alarm, robot, NOW)
-        assert met.met is is_met
 
 
 @pytest.mark.parametrize(

@@ -152,13 +152,6 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
             {**SELECT, "options": [{"value": 1, "label": "a"}, {"value": 2, "label": "a"}]},
             'options[1].label: "a" is already the label of options[0]',
         ),
-        ({**HEARD, "format": ".1f"}, 'format: is for numbers; "data" is string'),
-        ({**HEARD, "unit": "m"}, 'unit: is for numbers; "data" is string'),
-        ({**HEARD, "scale": 2}, 'scale: is for numbers; "data" is string'),
-        (
-            {**HEARD, "type": "std_msgs/msg/Float32", "format": "d"},
-            'format: "d" is for whole numbers; this is float32',
-        ),
         (
             {**HEARD, "type": "std_msgs/msg/Int8", "format": "d", "scale": 0.5},
             'format: "d" is for whole numbers; this is a scaled number',
@@ -176,10 +169,6 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
             {**HEARD, "type": IMAGE_FORMATS, "field": "datatype", "constants": "INT", "unit": "x"},
             "unit: is for numbers; constants are shown by their names",
         ),
-        ({**HEARD, "type": "sensor_msgs/msg/JointState", "field": "position"},
-         'field: "position" is float64[]: a readout takes one value of it, not all'),
-        ({**LAMP, "type": "sensor_msgs/msg/JointState", "field": "position"},
-         'field: "position" is float64[]: an indicator takes one value of it, not all'),
         (
             {**LAMP, "type": "std_msgs/msg/Float64"},
             'field: "data" is float64: an indicator is for whole numbers, bools and texts',
@@ -433,9 +422,3 @@ def test_time_has_its_own_formats(kind: str, more: dict[str, Any], key: str) -> 
     assert [text.partition(": ")[0] for text in reported] == (
         [f"page[0].widget[0].{key}"] if key else []
     )
-
-
-def test_a_lamp_of_a_time_is_refused() -> None:
-    states = [{"value": 0, "text": "Zero", "shape": "circle"}]
-    lamp = {**HEARD, "kind": "indicator", "type": "std_msgs/msg/Header", "field": "stamp"}
-    assert "takes one value of it, not all" in faults({**lamp, "states": states})[0]
