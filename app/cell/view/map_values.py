@@ -8,6 +8,7 @@ from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.maps import Geometry, Grid
 from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import LocatedFrame, Pose
+from app.panel.shared_keys import stale_at
 from app.panel.widgets.map_view import MapView, PoseTopic
 from app.system.clock import age_changes_at, format_age, format_time
 from app.system.texts import TextLike, say
@@ -79,8 +80,8 @@ def _by_topic(
 
 
 def _dated(pose: Pose, at: float, max_age_s: float, now: float) -> ShownPose:
-    if now < at + max_age_s:
-        return ShownPose(pose, until=at + max_age_s)
+    if now < (until := stale_at(at, max_age_s)):
+        return ShownPose(pose, until=until)
     return ShownPose(pose, say("map_pose_old", age=format_age(now - at)), age_changes_at(at, now))
 
 

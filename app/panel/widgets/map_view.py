@@ -5,7 +5,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from app.panel.base import Description, Seconds, Span, TopicName, TopicQos
+from app.panel.base import Rows, Seconds, Span, TopicName, TopicQos
+from app.panel.shared_keys import AgeKey, TopicKeys
 from app.panel.widgets.families import DisplayWidget, TopicSource, TopicWidget
 
 POSE_PATHS: Final = {
@@ -17,16 +18,14 @@ TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 FrameName = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^/\s][^\s]*$")]
 
 
-class PoseTopic(Description):
+class PoseTopic(TopicKeys):
     """A topic with the robot's pose in the map's frame, in place of its transforms."""
 
-    topic: TopicName
     type: Literal[
         "geometry_msgs/msg/PoseStamped",
         "geometry_msgs/msg/PoseWithCovarianceStamped",
         "nav_msgs/msg/Odometry",
     ] = "geometry_msgs/msg/PoseWithCovarianceStamped"
-    qos: TopicQos = TopicQos()
 
     @property
     def paths(self) -> tuple[str, str, str, str]:
@@ -36,7 +35,7 @@ class PoseTopic(Description):
         return f"{place}.x", f"{place}.y", f"yaw({pose}.orientation)", "header.frame_id"
 
 
-class MapView(TopicWidget, DisplayWidget):
+class MapView(AgeKey, TopicWidget, DisplayWidget):
     """Shows a map (`nav_msgs/msg/OccupancyGrid`) with the robot: by its transforms from the map's frame
     to `base_frame`, or by a topic with its pose. A pose older than `max_age_s` is drawn as old, where
     the robot was last seen."""
@@ -49,7 +48,7 @@ class MapView(TopicWidget, DisplayWidget):
     radius: Annotated[float, Field(gt=0, le=100)] = 0.3
     max_age_s: Seconds = 2.0
     span: Span = 8
-    rows: Annotated[int, Field(ge=1, le=8)] = 4
+    rows: Rows = 4
 
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, ())
