@@ -96,6 +96,15 @@ class SignedPart:
 NONE_SIGNED: Final = Signed()
 
 
+# Called with the entries that are verified so far, and all of them.
+Progress = Callable[[int, int], None]
+REPORTED_EVERY: Final = 10_000  # entries
+
+
+def no_progress(count: int, total: int) -> None:
+    """For those that show none."""
+
+
 @dataclass(frozen=True, slots=True)
 class Verified:
     """The result: `fault` names the first entry that was changed, "" if there is none."""
@@ -111,18 +120,32 @@ def verify(
     known_head: str = "",
     keys: Collection[str] = (),
     against: Callable[[Entry], str] | None = None,
+    progress: Progress = no_progress,
 ) -> Verified:
     """Verifies the whole log at this moment, that `known_head`, if given, is in it, and that only
     `keys` signed it, if given. `against` returns the fault of an entry by a copy, "" if there is none.
-    LogError if the log can't be read."""
+    `progress` is called now and then. LogError if the log can't be read."""
     db = open_read_only(folder)
     try:
         with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            return _Chain(genesis, known_head, SignedPart(keys), against).check(_entries(db))
+            entries = _reported(_entries(db), _count(db), progress)
+            return _Chain(genesis, known_head, SignedPart(keys), against).check(entries)
     finally:
         db.close()
+
+
+def _count(db: sqlite3.Connection) -> int:
+    (first, last) = db.execute("SELECT min(seq), max(seq) FROM entry").fetchone()
+    return last - first + 1 if isinstance(first, int) and isinstance(last, int) else 0
+
+
+def _reported(entries: Iterator[Entry], total: int, progress: Progress) -> Iterator[Entry]:
+    for number, entry in enumerate(entries):
+        if number % REPORTED_EVERY == 0 and number:
+            progress(number, max(number, total))
+        yield entry
 
 
 def _entries(db: sqlite3.Connection) -> Iterator[Entry]:

@@ -89,10 +89,14 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
 async def route_guard(connection: HTTPConnection) -> None:
     """RoleNeeded for a client without what the route needs, or that does not see the widget of the
     path. A route that is not in the table needs an engineer."""
+    if site_of(connection).access.has_roles:
+        check_route(connection, getattr(connection.scope.get("route"), "path", ""))
+
+
+def check_route(connection: HTTPConnection, route: str) -> None:
+    """RoleNeeded as by `route_guard`, for the template of a path."""
     state = site_of(connection)
-    if not state.access.has_roles:
-        return
-    path = getattr(connection.scope.get("route"), "path", "").removeprefix(ROBOT) or "/"
+    path = route.removeprefix(ROBOT) or "/"
     need = ROUTE_NEEDS.get(path, ENGINEER)
     widget = connection.path_params.get("widget", "")
     if not need and not widget:

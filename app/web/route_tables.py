@@ -75,7 +75,10 @@ class Routes:
             if name in self._added:
                 continue
             self._added.add(name)
-            router = _module(name).router
+            module = _module(name)
+            router = module.router
+            for prefix in ("", ROBOT) if hasattr(module, "direct_routes") else ():
+                self._app.router.routes[:0] = module.direct_routes(prefix)
             described = errors(403, 404, 422, 503) if name == "audit_log" else None
             self._app.include_router(router, responses=described)
             self.methods.add(router.routes)

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from app.records import verify as verification
 from app.records.data_dir import LOCK, DataDir
 from app.records.database import NAME, Filter, Head, log_query, rows, set_aside
 from app.records.entry import LONGEST_VALUES, Entry, Origin, as_json, clean_text, new_entry
@@ -310,6 +311,22 @@ def test_a_log_can_be_verified_with_a_fault_in_the_panel(
     monkeypatch.setenv("KIOSK_PANEL", str(tmp_path / "bad.toml"))
     monkeypatch.setenv("KIOSK_DATA", str(tmp_path))
     assert main(["verify"]) == 0
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_verification_shows_its_progress_on_a_terminal_only(
+    store: Store,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    is_terminal: bool,
+) -> None:
+    fill(store, 3)
+    monkeypatch.setattr(verification, "REPORTED_EVERY", 2)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal)
+    assert main(["verify", "--data", str(tmp_path)]) == 0
+    shown = "\r2 of 6 entries verified\r4 of 6 entries verified\r\x1b[K"
+    assert shown in capsys.readouterr().err if is_terminal else not capsys.readouterr().err
 
 
 def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:

@@ -54,3 +54,25 @@ def test_all_paths_are_described(tmp_path: Path) -> None:
         paths = server.http.get("/openapi.json").json()["paths"]
     described = {path.replace(":path", "") for module in MODULES for path in paths_of(module)}
     assert described <= paths.keys()
+
+
+def test_a_press_passes_by_the_solving_of_dependencies(tmp_path: Path) -> None:
+    with demo_server(tmp_path, THREE) as server:
+        pressed = server.http.post("/widgets/start", json={"inputs": {}})
+        too_long = server.http.post(f"/widgets/start?robots={'r' * 4001}", json={"inputs": {}})
+        others = [
+            server.http.request(method, "/widgets/start").status_code for method in ("GET", "PUT")
+        ]
+    assert (pressed.status_code, pressed.json()["widget"]) == (200, "start")
+    assert (too_long.status_code, "4000" in too_long.json()["error"]) == (422, True)
+    assert others == [405, 405]
+
+
+def test_the_routes_of_presses_stand_first() -> None:
+    app = FastAPI()
+    asyncio.run(Routes(app).load("presses"))
+    first = app.routes[:2]
+    assert {route.path for route in first if isinstance(route, Route)} == {
+        "/widgets/{widget}",
+        "/robots/{robot}/widgets/{widget}",
+    }

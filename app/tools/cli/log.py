@@ -16,6 +16,7 @@ from app.records.copy import Comparison, read_copy
 from app.records.verify import Signed, verify
 from app.system.errors import KioskError, LogError
 from app.tools.cli.arguments import add_data_folder, data_folder
+from app.tools.cli.output import terminal_progress
 from app.tools.cli.parser import Parser
 
 if TYPE_CHECKING:
@@ -38,7 +39,9 @@ def _verify(options: Namespace) -> int:
     folder = data_folder(options)
     comparison = Comparison(read_copy(options.against)) if options.against else None
     against = comparison.fault if comparison else None
-    verification = verify(folder, options.head, options.key or _own_key(folder), against)
+    keys = options.key or _own_key(folder)
+    with terminal_progress("entries verified") as progress:
+        verification = verify(folder, options.head, keys, against, progress)
     fault = verification.fault or (comparison.end_fault() if comparison else "")
     if fault:
         print(f"the log was changed: {fault} ({verification.count} entries verified)")

@@ -1,6 +1,8 @@
-"""Files that commands write. A file that exists is kept unless --force is given."""
+"""Files that commands write, and the progress that they show. A file that exists is kept unless --force
+is given."""
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
@@ -53,3 +55,22 @@ def draft_of(file: Path, force: bool) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def terminal_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Shows "30,000 of 100,000 entries verified" on one line of a terminal, gone after the block.
+    Elsewhere, as in a file or a pipe, nothing is written."""
+    shown = False
+
+    def show(count: int, total: int) -> None:
+        nonlocal shown
+        if sys.stderr.isatty():
+            shown = True
+            print(f"\r{count:,} of {total:,} {what}", end="", file=sys.stderr, flush=True)
+
+    try:
+        yield show
+    finally:
+        if shown:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
