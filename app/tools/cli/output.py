@@ -58,7 +58,7 @@ def draft_of(file: Path, force: bool) -> Iterator[Path]:
 
 
 @contextmanager
-def terminal_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+def terminal_progress(noun: str) -> Iterator[Callable[[int, int], None]]:
     """Shows "30,000 of 100,000 entries verified" on one line of a terminal, gone after the block.
     Elsewhere, as in a file or a pipe, nothing is written."""
     shown = False
@@ -67,7 +67,7 @@ def terminal_progress(what: str) -> Iterator[Callable[[int, int], None]]:
         nonlocal shown
         if sys.stderr.isatty():
             shown = True
-            print(f"\r{count:,} of {total:,} {what}", end="", file=sys.stderr, flush=True)
+            print(f"\r{count:,} of {total:,} {noun}", end="", file=sys.stderr, flush=True)
 
     try:
         yield show
