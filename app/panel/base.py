@@ -35,6 +35,7 @@ from app.ros.messages.validation import format_value
 from app.system.errors import InterfaceError
 from app.system.icons import icons
 from app.system.pictures import picture_files
+from app.system.public import PUBLIC, PUBLIC_ENDPOINT, PUBLIC_FIELD
 from app.system.texts import ENGLISH, PanelText, TextLike, render, say
 
 
@@ -254,8 +255,8 @@ ENDPOINT: Final = re.compile(
 )
 MAX_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
-Id = Annotated[str, Field(pattern=ID)]
-Interlocks = Annotated[tuple[str, ...], BeforeValidator(_parse_interlocks)]
+Id = Annotated[str, Field(pattern=ID), PUBLIC]
+Interlocks = Annotated[tuple[str, ...], BeforeValidator(_parse_interlocks), PUBLIC]
 # Texts that an operator reads. A `SaidLabel` may be left to the catalogue: Pydantic knows only of what
 # a file gives.
 if TYPE_CHECKING:
@@ -267,16 +268,16 @@ else:
     Label = SaidLabel = panel_text(120)
     Note = panel_text(40)
     AnyText = panel_text(least=0)
-Span = Annotated[int, Field(ge=1, le=12)]
-Rows = Annotated[int, Field(ge=1, le=8)]
-TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
-Type = Annotated[str, AfterValidator(_check_message_type)]
-ServiceType = Annotated[str, AfterValidator(_check_service_type)]
-MessageOrServiceType = Annotated[str, AfterValidator(_check_message_or_service_type)]
-NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
+Span = Annotated[int, Field(ge=1, le=12), PUBLIC]
+Rows = Annotated[int, Field(ge=1, le=8), PUBLIC]
+TopicName = Annotated[str, AfterValidator(_check_topic), Field(max_length=255), PUBLIC]
+Type = Annotated[str, AfterValidator(_check_message_type), PUBLIC]
+ServiceType = Annotated[str, AfterValidator(_check_service_type), PUBLIC]
+MessageOrServiceType = Annotated[str, AfterValidator(_check_message_or_service_type), PUBLIC]
+NodeName = Annotated[str, AfterValidator(_check_node), Field(max_length=200), PUBLIC]
 ParameterName = Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
-ActionType = Annotated[str, AfterValidator(_check_action_type)]
-Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
+ActionType = Annotated[str, AfterValidator(_check_action_type), PUBLIC]
+Endpoint = Annotated[str, AfterValidator(_check_endpoint), PUBLIC_ENDPOINT]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
 PictureFolder = Annotated[Folder, AfterValidator(_check_pictures)]
 File = Annotated[Path, BeforeValidator(_resolve_file)]
@@ -284,7 +285,7 @@ FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 # Where a secret is: never in the panel file itself.
 SecretVariable = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)]
 SecretFile = Annotated[str, AfterValidator(_check_whole_path)]
-Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False), PUBLIC]
 
 
 class Description(BaseModel):
@@ -305,7 +306,7 @@ class TopicQos(Description):
 
     reliability: Literal["reliable", "best_effort"] | None = None
     durability: Literal["volatile", "transient_local"] | None = None
-    depth: Annotated[int, Field(ge=1, le=10_000)] = 10
+    depth: Annotated[int, Field(ge=1, le=10_000), PUBLIC] = 10
 
     @cached_property
     def wire_qos(self) -> Qos:
@@ -358,6 +359,6 @@ def _check_written_field(path: str) -> str:
     return path
 
 
-FieldPath = Annotated[str, AfterValidator(_check_field_path)]  # or a function of fields
-MessageField = Annotated[str, AfterValidator(_check_message_field)]
+FieldPath = Annotated[str, AfterValidator(_check_field_path), PUBLIC_FIELD]  # or a function of fields
+MessageField = Annotated[str, AfterValidator(_check_message_field), PUBLIC_FIELD]
 WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys

@@ -45,6 +45,7 @@ from app.panel.source import Source
 from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import TopicField
 from app.ros.dialects.dialect import DEFAULT_DIALECT, DOMAIN_MOST, DialectName
+from app.system.public import PUBLIC
 from app.system.texts import ENGLISH
 from app.system.texts.catalogue import files
 
@@ -64,14 +65,14 @@ def _check_languages(tags: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Language = Annotated[
-    str, AfterValidator(_check_language), WithJsonSchema({"type": "string", "enum": [*files()]})
+    str, AfterValidator(_check_language), WithJsonSchema({"type": "string", "enum": [*files()]}), PUBLIC
 ]
 Languages = Annotated[tuple[Language, ...], Field(strict=False), AfterValidator(_check_languages)]
 
 
 # The description of one of several robots: `[[robot]]`.
 
-Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST)]
+Domain = Annotated[int, Field(ge=0, le=DOMAIN_MOST), PUBLIC]
 TILE: Final = "-tile-"  # no widget has an id that begins like this
 SUMS: Final = "-sums"  # the line of sums of an overview
 
@@ -88,7 +89,7 @@ class RobotEntry(Description):
 
     id: Id
     name: Label
-    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace), PUBLIC] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
     dialect: DialectName = DEFAULT_DIALECT
     domain: Domain = 0
@@ -167,7 +168,7 @@ class PanelKeys(Description):
     languages: Languages = ()
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
-    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace), PUBLIC] = ""
     dialect: DialectName = DEFAULT_DIALECT
     domain: Domain = 0
     stop_hint: SaidLabel = catalogue_default("stop_hint")

@@ -12,6 +12,7 @@ from app.panel.widgets.families import BaseWidget, EntryWidget
 from app.panel.widgets.kinds import KINDS, Widget
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.tiles import BUTTONS
+from app.system.public import PUBLIC
 
 COLUMNS: Final = 12  # of a page, and of a group that does not say
 SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
@@ -24,7 +25,7 @@ Placed = Iterator[tuple[str, BaseWidget]]
 Theme = Literal["light", "dark", "contrast"]
 TextSize = Literal["normal", "large"]
 Hand = Literal["right", "left"]
-Screen = Annotated[str, Field(pattern=SCREEN)]
+Screen = Annotated[str, Field(pattern=SCREEN), PUBLIC]
 
 
 Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(each_once)]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, NamedTuple, Self
 
+from app.system.public import PublicCode, PublicHash, PublicNumber
 from app.system.texts import ENGLISH, TextLike, render, rendered_if_known, text_in
 
 # One entry of the operator's log, with the hash chain.
@@ -59,28 +60,28 @@ class Entry(NamedTuple):
     written.
     """
 
-    seq: int
-    at: int
-    boot: str
-    monotonic: int
+    seq: PublicNumber
+    at: PublicNumber
+    boot: PublicHash
+    monotonic: PublicNumber
     kind: Kind
-    of: int | None = None
+    of: PublicNumber | None = None
     address: str = ""
     browser: str = ""
     who: str = ""
-    robot: str = ""
-    press: str = ""
-    widget: str = ""
-    action: str = ""
+    robot: PublicCode = ""
+    press: PublicHash = ""
+    widget: PublicCode = ""
+    action: PublicCode = ""
     values: str = "{}"
-    seen: str = ""
-    verdict: str = ""
-    board: str = ""
-    outcome: str = ""
+    seen: PublicHash = ""
+    verdict: PublicCode = ""
+    board: PublicHash = ""
+    outcome: PublicCode = ""
     reason: str = ""
     text: str = ""
-    prev: str = ""
-    hash: str = ""
+    prev: PublicHash = ""
+    hash: PublicHash = ""
 
     def sealed(self, seq: int, boot: str, prev: str) -> "Entry":
         """The entry as written, after the entry with the hash `prev`."""

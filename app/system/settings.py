@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Literal, overload
+from typing import Annotated, Literal, overload
 
 from app.system.errors import SettingsError
+from app.system.public import PUBLIC
 
 Mode = Literal["demo", "live"]
 
@@ -53,16 +54,16 @@ class Settings:
     panel: Path
     zenoh: Path
     mode: Mode | None = None
-    hosts: tuple[str, ...] = LOOPBACK_HOSTS
-    proxies: tuple[str, ...] = ()
+    hosts: Annotated[tuple[str, ...], PUBLIC] = LOOPBACK_HOSTS
+    proxies: Annotated[tuple[str, ...], PUBLIC] = ()
     root_path: str = ""
-    log_level: str = "info"
+    log_level: Annotated[str, PUBLIC] = "info"
     dev: bool = False
     data: Path | None = None
     log_copy: Path | None = None
     syslog: tuple[str, int] | None = None
     syslog_ca: Path | None = None
-    without: tuple[str, ...] = ()
+    without: Annotated[tuple[str, ...], PUBLIC] = ()
 
     def data_folder(self, mode: Mode) -> Path:
         """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""

@@ -252,9 +252,9 @@ def test_bundle_is_the_commands_and_logged(cell: Server) -> None:
     with zipfile.ZipFile(io.BytesIO(answer.content)) as bundle:
         assert bundle.testzip() is None
         names = set(bundle.namelist())
-        assert {"doctor.json", "panel.toml", "state/snapshot.json", "state/metrics.txt"} <= names
+        assert {"doctor.json", "panel.json", "logs/journal.json", "state/metrics.txt"} <= names
         assert json.loads(bundle.read("state/readyz.json"))["ready"]
-        assert '"Air"' not in bundle.read("panel.toml").decode()
+        assert '"Air"' not in bundle.read("panel.json").decode()
     entries = cell.http.get("/log", headers=HTML).text
     assert "Support bundle" in entries
 

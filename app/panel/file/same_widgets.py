@@ -3,11 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
-from pydantic import Field
-
-from app.panel.base import Description, Id, Span
+from app.panel.base import Description, Id, Rows, Span
 from app.panel.file.wording import closest_name, list_names
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
@@ -20,7 +18,7 @@ class SameWidget(Description):
 
     same: Id
     span: Span | None = None
-    rows: Annotated[int, Field(ge=1, le=8)] | None = None
+    rows: Rows | None = None
     grow: bool | None = None
 
 

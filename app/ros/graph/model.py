@@ -10,15 +10,23 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any, Final, Literal, Protocol, TypeVar
+from typing import Annotated, Any, Final, Literal, Protocol, TypeVar
 
 from app.ros.messages.names import MAX_NAME, key_of
 from app.system.printable import one_line
+from app.system.public import Public, PublicHash, PublicName, PublicNumber, PublicType
 
 CYCLONE_DDS: Final = "Cyclone DDS"
 CALLABLE: Final = ("", CYCLONE_DDS)  # of a server; "": its DDS is not known
 NEAR_MOST: Final = 3
 COMPARED_MOST: Final = 1000  # names whose spelling is compared with one
+
+# What other programs announce is public in the form of what it should be.
+PublicVersion = Annotated[str, Public(r"(?a:v?\d[\w.+\-]{0,60})?")]
+PublicTypeHash = Annotated[str, Public(r"(?:RIHS01_[0-9a-f]{64})?")]
+PublicVendor = Annotated[
+    str, Public(rf"|{CYCLONE_DDS}|Fast DDS|Connext|OpenSplice|OpenDDS|GurumDDS|CoreDX DDS")
+]
 
 RouteKind = Literal["topic", "service", "action"]
 # pub and srv: from the robot's nodes to Zenoh; sub and cli: from Zenoh to the robot's nodes.
@@ -30,8 +38,8 @@ class Bridge:
     """A bridge that announced itself. `version` is "" if it did not answer. `config` is the
     configuration of its ROS plugin, empty if it did not answer."""
 
-    zid: str
-    version: str = ""
+    zid: PublicHash
+    version: PublicVersion = ""
     config: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -64,7 +72,7 @@ class EndpointQos:
     reliable: bool | None = None
     transient_local: bool = False
     keep_all: bool = False
-    depth: int | None = None
+    depth: PublicNumber | None = None
 
     def __str__(self) -> str:
         known = {True: "reliable", False: "best effort", None: "reliability unknown"}
@@ -85,12 +93,12 @@ class TopicEndpoint:
     `dds` is the vendor of its DDS ("Fast DDS", "Cyclone DDS", another, or "" if unknown).
     """
 
-    type: str
+    type: PublicType
     qos: EndpointQos
-    bridge: str = ""
-    nodes: tuple[str, ...] = ()
-    dds: str = ""
-    type_hash: str = ""
+    bridge: PublicHash = ""
+    nodes: tuple[PublicName, ...] = ()
+    dds: PublicVendor = ""
+    type_hash: PublicTypeHash = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +106,8 @@ class SurveyedTopic:
     """A topic of a robot. `announced`: its bridge passes it on; else the bridge's `allow` or `deny`
     holds it back."""
 
-    name: str
-    key: str
+    name: PublicName
+    key: PublicName
     publishers: tuple[TopicEndpoint, ...] = ()
     subscribers: tuple[TopicEndpoint, ...] = ()
     announced: bool = True
@@ -130,12 +138,12 @@ class Server:
     the bridge only servers on Cyclone DDS can be called. `hashes` are (message type, type hash) of its
     requests and responses, as far as known."""
 
-    name: str
-    key: str
-    type: str
-    bridge: str = ""
-    nodes: tuple[str, ...] = ()
-    dds: str = ""
+    name: PublicName
+    key: PublicName
+    type: PublicType
+    bridge: PublicHash = ""
+    nodes: tuple[PublicName, ...] = ()
+    dds: PublicVendor = ""
     hashes: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -148,15 +156,15 @@ class Server:
 class Node:
     """A node; the names of what it publishes, subscribes to, serves and uses."""
 
-    name: str
-    bridge: str = ""
-    dds: str = ""
-    publishers: tuple[str, ...] = ()
-    subscribers: tuple[str, ...] = ()
-    services: tuple[str, ...] = ()
-    clients: tuple[str, ...] = ()
-    actions: tuple[str, ...] = ()
-    action_clients: tuple[str, ...] = ()
+    name: PublicName
+    bridge: PublicHash = ""
+    dds: PublicVendor = ""
+    publishers: tuple[PublicName, ...] = ()
+    subscribers: tuple[PublicName, ...] = ()
+    services: tuple[PublicName, ...] = ()
+    clients: tuple[PublicName, ...] = ()
+    actions: tuple[PublicName, ...] = ()
+    action_clients: tuple[PublicName, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,26 +173,26 @@ class BridgeRoute:
     that use it. `active`: None if the bridge does not report it. `endpoint` is the bridge's own DDS
     reader or writer for it, "" for none."""
 
-    bridge: str
+    bridge: PublicHash
     kind: RouteKind
     direction: RouteDirection
-    name: str
-    key: str
-    type: str
+    name: PublicName
+    key: PublicName
+    type: PublicType
     active: bool | None = None
-    local_nodes: tuple[str, ...] = ()
+    local_nodes: tuple[PublicName, ...] = ()
     remote: tuple[str, ...] = ()
-    endpoint: str = ""
+    endpoint: PublicHash = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeerEndpoint:
     """A publisher (role "MP") or subscriber ("MS") of a peer that is no bridge, such as a panel."""
 
-    zid: str
+    zid: PublicHash
     role: str
-    key: str
-    type: str
+    key: PublicName
+    type: PublicType
     qos: EndpointQos
 
 
@@ -201,7 +209,7 @@ class RobotGraph:
     """What is on one robot: all that is behind the bridges of one namespace, or that is reached without
     a bridge. `bridges` and `routes` are empty for a robot without one. Each list is sorted by name."""
 
-    namespace: str = ""
+    namespace: PublicName = ""
     bridges: tuple[Bridge, ...] = ()
     nodes: tuple[Node, ...] = ()
     topics: tuple[SurveyedTopic, ...] = ()

@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import Final, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback
 
 from app.system.errors import LinkError, SettingsError
+from app.system.public import PUBLIC_ENDPOINT, Public
 
 # Zenoh configurations: a file's, or of one endpoint, with the settings that the panel server needs.
 
@@ -123,6 +124,9 @@ def _apply_required_settings(config: zenoh.Config) -> zenoh.Config:
     return config
 
 
+End = Literal["connect", "listen"]
+
+
 def error_text(error: zenoh.ZError) -> str:
     """The message of a Zenoh error, with the line of the file if it has one; without the names of its
     types and the places in its source."""
@@ -135,12 +139,42 @@ def error_text(error: zenoh.ZError) -> str:
     return STRING.sub(r"\1", text)
 
 
-def endpoints_of(config: zenoh.Config) -> tuple[str, ...]:
-    """The endpoints that a session connects to; empty if it only scouts."""
-    endpoints = json.loads(config.get_json("connect/endpoints"))
+def endpoints_of(
+    config: zenoh.Config, end: Literal["connect", "listen"] = "connect"
+) -> tuple[str, ...]:
+    """The endpoints that a session connects to, empty if it only scouts; or those where it listens."""
+    endpoints = json.loads(config.get_json(f"{end}/endpoints"))
     if isinstance(endpoints, dict):  # for each mode
         endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
     return tuple(map(str, endpoints))
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigSummary:
+    """What a support bundle has of a Zenoh configuration file. `is_multicast`, `is_gossip`: by which
+    ways it scouts."""
+
+    mode: Annotated[str, Public("peer|client|router")]
+    connect: Annotated[tuple[str, ...], PUBLIC_ENDPOINT]
+    listen: Annotated[tuple[str, ...], PUBLIC_ENDPOINT]
+    is_multicast: bool
+    is_gossip: bool
+
+
+def summary(path: Path) -> ConfigSummary:
+    """SettingsError for a file that is not usable."""
+    config = config_from(path)
+
+    def value(key: str) -> Any:
+        return json.loads(config.get_json(key))
+
+    return ConfigSummary(
+        value("mode") or "peer",
+        endpoints_of(config),
+        endpoints_of(config, "listen"),
+        value("scouting/multicast/enabled") is not False,
+        value("scouting/gossip/enabled") is not False,
+    )
 
 
 @contextmanager

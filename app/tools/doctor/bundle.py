@@ -16,37 +16,16 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.records.database import Filter, LogRow, rows
-from app.system.errors import LogError
-from app.system.settings import APP, PACKAGE, PREFIX, VARIABLES, Settings, shipped_path
+from app.ros.zenoh.config import summary
+from app.system.errors import LogError, SettingsError
+from app.system.public import public_part
+from app.system.settings import APP, PREFIX, VARIABLES, Settings
 from app.system.version import installed_version
 from app.tools.doctor.doctor import Diagnosis, Options
-from app.tools.doctor.journal import LAST_S, redact_journal
+from app.tools.doctor.journal import LAST_S, journal_counts
 from app.tools.doctor.machine import MB, ask_server, displays
-from app.tools.doctor.redaction import (
-    GRAPH,
-    ID,
-    LINK,
-    MOST_CHARS,
-    PANEL,
-    PLACE,
-    SETTINGS,
-    SNAPSHOT,
-    VERSIONS,
-    WIDGET,
-    ZENOH,
-    Rule,
-    Rules,
-    redact,
-    redact_entry,
-    redact_report,
-    redact_text,
-    redact_value,
-)
+from app.tools.doctor.redaction import public_code, public_entry, public_report
 
-# What a running server says of itself, for a support bundle: states, codes, counts and times, without
-# the texts and values that its pages show.
-
-DATA: Final = "data: "
 # A sample of Prometheus's text format, or the type of one.
 _METRIC: Final = re.compile(
     r"# TYPE \w{1,80} \w{1,20}|"
@@ -55,39 +34,7 @@ _METRIC: Final = re.compile(
 )
 
 
-def redact_snapshot(events: str) -> Any:
-    """Of the first event of `/events`, which has everything that the pages show; None if it has not."""
-    line = next((line for line in events.split("\n") if line.startswith(DATA)), "")
-    try:
-        snapshot = json.loads(line.removeprefix(DATA))
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(snapshot, Mapping):
-        return None
-    return {
-        **redact_value(snapshot, SNAPSHOT),
-        **{name: by_id(snapshot.get(name), WIDGET) for name in ("interlocks", "widgets")},
-        "link": by_id(snapshot.get("link"), LINK),
-        "state": redact_value(snapshot.get("state"), WIDGET),
-    }
-
-
-def by_id(value: Any, keys: Rules, rule: Rule = None) -> dict[str, Any]:
-    """Of a table by ids, such as those of widgets."""
-    table = value if isinstance(value, Mapping) else {}
-    return {key: redact_value(row, keys, rule) for key, row in table.items() if ID.fullmatch(key)}
-
-
-def redact_ready(answer: Any) -> Any:
-    """Of the response of `/readyz`."""
-    if not isinstance(answer, Mapping):
-        return None
-    codes = {key: redact(str(answer[key]), ID) for key in ("code",) if key in answer}
-    robots = by_id(answer.get("robots"), {}, ID)
-    return {"ready": answer.get("status") == "ready", **codes, "robots": robots}
-
-
-def redact_metrics(text: str) -> str:
+def public_metrics(text: str) -> str:
     return "".join(f"{line}\n" for line in text.split("\n") if _METRIC.fullmatch(line))
 
 
@@ -148,18 +95,19 @@ class Sources:
 
 def parts(settings: Settings, options: Options, diagnosis: Diagnosis, sources: Sources) -> list[Part]:
     """The files, without what may be a secret; what is not there is left out."""
-    report = redact_report(diagnosis, installed_version())
+    journal = journal_counts(sources.journal())
+    report = public_report(diagnosis, installed_version())
     made = [
         _json("doctor.json", "findings of `operator-panel doctor`", report),
-        _json("versions.json", "versions of the panel, its libraries and the system", _versions()),
+        _json("versions.json", "versions of the panel, its libraries and the system", versions()),
         _json("settings.json", "KIOSK_ variables", _settings(settings, sources.environment)),
         _json("machine.json", "load, memory, disk and screens", _machine(settings, diagnosis)),
-        *_files(settings),
-        text_part("logs/journal.txt", "the units' log", redact_journal(sources.journal())),
+        *_configuration(settings, diagnosis),
+        _json("logs/journal.json", "lines of the units' log, counted", journal),
         *_operators_log(_data_folder(settings, diagnosis)),
         *_of_server(options, diagnosis),
         *(
-            _json(f"graph{f'-{name}' if name else ''}.json", "ROS graph", _graph(graph))
+            _json(f"graph{f'-{name}' if name else ''}.json", "ROS graph", public_part(graph))
             for name, graph in diagnosis.graphs.items()
         ),
     ]
@@ -178,25 +126,11 @@ def text_part(name: str, about: str, text: str) -> Part:
     return Part(name, about, text)
 
 
-def _graph(graph: Any) -> Any:
-    return redact_value(asdict(graph), GRAPH)
-
-
-def _versions() -> dict[str, str]:
-    return {name: redact(version, VERSIONS) for name, version in versions().items()}
-
-
 def _settings(settings: Settings, environment: Mapping[str, str]) -> dict[str, Any]:
     """Which variables are set, and the settings in use. Nothing else of the environment."""
-    shipped = {PACKAGE / "panel.toml", shipped_path("zenoh.json5")}
-    files = {
-        name: "shipped" if path in shipped else redact(str(path), PLACE)
-        for name in ("panel", "zenoh", "data")
-        if (path := getattr(settings, name)) is not None
-    }
     return {
         "set": [PREFIX + name for name in VARIABLES if PREFIX + name in environment],
-        "in use": redact_value(asdict(settings), SETTINGS) | files,
+        "in use": public_part(settings),
     }
 
 
@@ -223,21 +157,20 @@ def _machine(settings: Settings, diagnosis: Diagnosis) -> dict[str, Any]:
     return facts
 
 
-def _files(settings: Settings) -> Iterator[Part]:
-    files: tuple[tuple[str, Path, str, Rules], ...] = (
-        ("panel.toml", settings.panel, "the panel file, without its texts", PANEL),
-        ("zenoh.json5", settings.zenoh, "Zenoh configuration, known keys only", ZENOH),
-    )
-    for name, path, about, rules in files:
-        with suppress(OSError), path.open(encoding="utf-8", errors="replace") as file:
-            is_toml = path == settings.panel
-            yield text_part(name, about, redact_text(file.read(MOST_CHARS), rules, is_toml))
+def _configuration(settings: Settings, diagnosis: Diagnosis) -> Iterator[Part]:
+    """A file that can't be read is a finding."""
+    if diagnosis.panel is not None:
+        keys = public_part(diagnosis.panel)
+        yield _json("panel.json", "the panel file: ids, names and types of ROS", keys)
+    with suppress(SettingsError):
+        about = "Zenoh configuration: its endpoints"
+        yield _json("zenoh.json", about, public_part(summary(settings.zenoh)))
 
 
 def _operators_log(folder: Path) -> Iterator[Part]:
     with suppress(LogError, OSError):
         about = "operator's log, without values and texts"
-        lines = (json.dumps(redact_entry(row)) for row in _presses(folder))
+        lines = (json.dumps(public_entry(row)) for row in _presses(folder))
         yield text_part("logs/operators-log.jsonl", about, "".join(f"{line}\n" for line in lines))
 
 
@@ -262,13 +195,11 @@ def _of_server(options: Options, diagnosis: Diagnosis) -> Iterator[Part]:
         answer = ask_server(options.host, options.port, path)
         return None if answer is None else answer[1]
 
-    ready = redact_ready(ask("/readyz"))
-    yield _json("state/readyz.json", "whether the server reaches the robot", ready)
-    robots = [f"/robots/{robot.id}" for robot in diagnosis.panel.robots] if diagnosis.panel else []
-    for base in robots or [""]:
-        state = redact_snapshot(str(ask(f"{base}/events?once=1")))
-        yield _json(f"state/snapshot{base.replace('/', '-')}.json", "states of widgets", state)
-    yield text_part("state/metrics.txt", "metrics", redact_metrics(str(ask("/metrics"))))
+    ready = ask("/readyz")
+    if isinstance(ready, Mapping):
+        told = {"ready": ready.get("status") == "ready", "code": public_code(ready.get("code", ""))}
+        yield _json("state/readyz.json", "whether the server reaches the robot", told)
+    yield text_part("state/metrics.txt", "metrics", public_metrics(str(ask("/metrics"))))
 
 
 def packed(made: Sequence[Part]) -> bytes:

@@ -11,29 +11,31 @@ from pathlib import Path
 
 import pytest
 
+from app.system.public import LEFT_OUT
 from app.system.settings import Settings
 from app.tools.cli.command import main
 from app.tools.doctor.bundle import CUT, Part, Sources, parts, text_part, write
 from app.tools.doctor.doctor import Diagnosis, Options
 from app.tools.doctor.findings import Report
 from app.tools.doctor.journal import MOST_BYTES as JOURNAL_BYTES
-from app.tools.doctor.journal import journal, redact_journal
+from app.tools.doctor.journal import journal, journal_counts
 from tests.support.parts import ROOT, Bridge, Server, until, zenoh_file
 from tests.tools.doctor.secrets import FORMS, SECRET, secrets_in
 from tests.tools.doctor.setups import Setup, button, call, panel_of
 
 TEXT = '[[page.widget]]\nid = "words"\nkind = "text"\nlabel = "Words"\nmax_length = 200\n'
 COUNT = '[[page.widget]]\nid = "amount"\nkind = "number"\nlabel = "Count"\nmin = 0\nmax = 9\n'
+ENDPOINT = "tcp/127.0.0.1:7447"
 NEEDED = {
     "doctor.json",
     "versions.json",
     "settings.json",
     "machine.json",
-    "panel.toml",
-    "zenoh.json5",
+    "panel.json",
+    "zenoh.json",
+    "logs/journal.json",
     "logs/operators-log.jsonl",
     "state/readyz.json",
-    "state/snapshot.json",
     "state/metrics.txt",
 }
 
@@ -102,16 +104,15 @@ def test_support_bundle_has_no_secret_in_any_form(
         monkeypatch.setenv(name, SECRET)
     shipped = (ROOT / "zenoh.json5").read_text()
     login = f'auth: {{ usrpwd: {{ user: "{SECRET}", password: "{SECRET}" }} }},'
-    listed = "".join(
-        f"{json.dumps(form)}, [{json.dumps(form)}, [{json.dumps(form)}]], " for form in FORMS
-    )
+    settings = (f"tls/robot:7447#password={SECRET}", f"tcp/robot:7447?token={SECRET}")
+    listed = "".join(f'"{endpoint}", ' for endpoint in settings)
     comments = "".join(f"// {form}\n" for form in FORMS)
     zenoh = setup.folder / "zenoh.json5"
     zenoh.write_text(
         comments
         + shipped.replace("transport: {", f"transport: {{\n{login}", 1)
         .replace("endpoints: [", f"endpoints: [{listed}", 1)
-        .replace("scouting: {", f"secrets: [{listed}], scouting: {{", 1)
+        .replace("scouting: {", f'metadata: {{ name: "{SECRET}" }}, scouting: {{', 1)
     )
     path = setup.folder / "bundle.zip"
     logged = demo.process.text.splitlines()
@@ -123,7 +124,7 @@ def test_support_bundle_has_no_secret_in_any_form(
     files = files_of(path)
     assert secrets_in(files | {"output": output}) == []
     assert {line.split()[0] for line in output.splitlines() if line.startswith("  ")} == set(files)
-    assert set(files) == NEEDED | {"logs/journal.txt"}
+    assert set(files) == NEEDED
     assert path.stat().st_mode & 0o777 == 0o600
 
     # What helps is there.
@@ -138,21 +139,18 @@ def test_support_bundle_has_no_secret_in_any_form(
     outcomes = {(entry.get("widget"), entry.get("outcome")) for entry in entries}
     assert {("say", "published"), ("count", "refused")} <= outcomes
     sent = next(entry for entry in entries if entry.get("outcome") == "published")
-    assert (sent["codes"], sent["parameters"]["topic"]) == (["published"], "/say")
+    assert sent["codes"] == ["published"]
     refused = next(entry for entry in entries if entry.get("outcome") == "refused")
     assert "input_not_a_number" in refused["codes"]
-    assert json.loads(files["state/snapshot.json"])["widgets"]["say"]["enabled"] is True
-    assert json.loads(files["state/readyz.json"]) == {"ready": True, "robots": {}}
+    assert json.loads(files["state/readyz.json"]) == {"ready": True, "code": ""}
     assert 'kiosk_presses_total{outcome="published"}' in files["state/metrics.txt"]
-    lines = files["logs/journal.txt"].splitlines()
-    assert len(lines) == len(logged) + 2 * len(FORMS)
-    assert lines[0].startswith("2026-11-25T18:24:50.000+00:00 operator-panel.service INFO ")
-    press = entries[-1]["press"]
-    assert any(f"INFO press {press} of " in line or f"WARN press {press} of " in line for line in lines)
-    assert 'topic = "/say"' in files["panel.toml"]
-    assert 'label = "(left out)"' in files["panel.toml"]
-    assert "lease: 2000, keep_alive: 4" in files["zenoh.json5"]
-    assert '"tcp/127.0.0.1:7447"' in files["zenoh.json5"]
+    counts = json.loads(files["logs/journal.json"])["operator-panel.service"]
+    assert sum(counts.values()) == len(logged) + 2 * len(FORMS)
+    assert counts["WARN"] >= len(FORMS)
+    widgets = json.loads(files["panel.json"])["pages"][0]["own"]
+    said = next(widget for widget in widgets if widget["id"] == "say")
+    assert (said["topic"], said["label"]) == ("/say", LEFT_OUT)
+    assert json.loads(files["zenoh.json"])["connect"] == [LEFT_OUT, LEFT_OUT, ENDPOINT]
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -257,13 +255,13 @@ def test_a_journal_without_end_is_cut(tmp_path: Path, monkeypatch: pytest.Monkey
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     assert len(journal()) == JOURNAL_BYTES
-    assert redact_journal(journal()) == ""
+    assert journal_counts(journal()) == {}
 
 
 def test_of_a_long_log_the_end_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     most, line = 4_000, "x" * 99 + "\n"
     monkeypatch.setattr("app.tools.doctor.bundle.MOST_BYTES", most)
-    part = text_part("logs/journal.txt", "", line * (2 * most // len(line)))
+    part = text_part("logs/operators-log.jsonl", "", line * (2 * most // len(line)))
     assert part.text.startswith(CUT + line)
     assert part.text.endswith(line)
     assert most - len(line) <= part.size - len(CUT) <= most
