@@ -361,7 +361,7 @@ def fonts() -> str:
 
 
 @pytest.fixture(scope="session")
-def browsers() -> Iterator[Browsers]:
+def browser_sets() -> Iterator[Browsers]:
     from playwright.sync_api import expect
 
     from tests.support.browser.browsers import BROWSERS
@@ -387,8 +387,8 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 
 @pytest.fixture(scope="module")
-def chromium(fonts: str, browsers: Browsers, tmp_path_factory: pytest.TempPathFactory) -> Browser:
-    return browsers.browser(fonts, tmp_path_factory)
+def chromium(fonts: str, browser_sets: Browsers, tmp_path_factory: pytest.TempPathFactory) -> Browser:
+    return browser_sets.browser(fonts, tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

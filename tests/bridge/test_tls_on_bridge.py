@@ -12,6 +12,7 @@ import zenoh
 
 from app.tools.cli.command import main
 from tests.support import cyclone
+from tests.support.certificates import tls_session
 from tests.support.cyclone import CycloneRobot, encoded
 from tests.support.panel_text import ADD, CELL, COUNT, LOCKED_START, SPEED
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until
@@ -77,25 +78,6 @@ def kiosk(bridge: Bridge, panel: Path, tmp_path: Path, servers: Callable[[Server
     return servers(Server(ROOT, 0, KIOSK_MODE="live", KIOSK_ZENOH=zenoh_file, KIOSK_PANEL=str(panel)))
 
 
-def session(endpoint: str, folder: Path, name: str = "") -> zenoh.Session:
-    """A client that has the certificate `name`, or none."""
-    config = zenoh.Config()
-    tls: dict[str, Any] = {"root_ca_certificate": str(folder / "ca.pem")}
-    if name:
-        tls["connect_certificate"] = str(folder / f"{name}.pem")
-        tls["connect_private_key"] = str(folder / f"{name}.key")
-        tls["enable_mtls"] = True
-    for place, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": 3_000,
-        "scouting/multicast/enabled": False,
-        "transport/link/tls": tls,
-    }.items():
-        config.insert_json5(place, json.dumps(value))
-    return zenoh.open(config)
-
-
 def test_the_panel_works_over_tls(
     bridge: Bridge, kiosk: Server, cyclone_robots: Callable[..., CycloneRobot]
 ) -> None:
@@ -125,8 +107,8 @@ def test_who_has_no_certificate_of_the_cell_does_not_get_in(bridge: Bridge, tmp_
     (elsewhere / "ca.pem").write_bytes((tmp_path / "pki/ca.pem").read_bytes())
     for folder, name in ((tmp_path / "pki", ""), (elsewhere, "kiosk")):
         with pytest.raises(zenoh.ZError):
-            session(bridge.endpoint, folder, name).close()
-    with closing(session(bridge.endpoint, tmp_path / "pki", "kiosk")) as mine:
+            tls_session(bridge.endpoint, folder, name).close()
+    with closing(tls_session(bridge.endpoint, tmp_path / "pki", "kiosk")) as mine:
         assert list(mine.info.routers_zid()) != []
 
 
@@ -149,7 +131,7 @@ def test_another_certificate_forges_neither_a_permission_nor_a_press(
         node.subscribe("/start", "std_msgs/msg/Bool")
         until(lambda: "operation" in str(kiosk.widget("start")), "the panel shows the robot's state")
         until(lambda: not kiosk.widget("start")["enabled"], "it is locked")
-        with closing(session(bridge.endpoint, folder, "other")) as other:
+        with closing(tls_session(bridge.endpoint, folder, "other")) as other:
             starts: Any = other.declare_publisher("cell9/start")
             until(lambda: starts.matching_status.matching, "it sees who reads the command")
             held = other.declare_subscriber("**", hear, allowed_origin=zenoh.Locality.REMOTE)
@@ -160,7 +142,7 @@ def test_another_certificate_forges_neither_a_permission_nor_a_press(
                 enables.put(true)
                 assert not kiosk.widget("start")["enabled"]
             del held
-        with closing(session(bridge.endpoint, folder, "kiosk")) as stolen:
+        with closing(tls_session(bridge.endpoint, folder, "kiosk")) as stolen:
             read = stolen.declare_subscriber("**", hear, allowed_origin=zenoh.Locality.REMOTE)
             values = stolen.declare_subscriber("cell9/pressure", lambda sample: heard.append("value"))
             permission: Any = stolen.declare_publisher("cell9/operation_enabled")

@@ -1,4 +1,4 @@
-"""Fixtures of touched screens."""
+"""Fixtures of touched screens, of pages for axe, and the shipped panel."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,8 @@ from playwright.sync_api import Browser, Page
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.finger import Finger
 from tests.support.browser.touch import permit, touched, touched_server
-from tests.support.parts import Server
+from tests.support.parts import ROOT, SHIPPED, Server
+from tests.support.servers import ready
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +52,19 @@ def touch_page(chromium: Browser) -> Iterator[Page]:
 def finger(touch_page: Page, kiosk: Server) -> Finger:
     """A finger on the page of a kiosk that can be jogged."""
     return Finger(touch_page, kiosk)
+
+
+@pytest.fixture
+def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+    """A page to which axe may be added."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    with mine.taken(request.node) as page:
+        yield page
+    mine.close()
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Iterator[Server]:
+    """The shipped panel."""
+    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
+        yield mine

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.cell.alarms.history import HistoryRow
 from app.cell.alarms.store import NAME, AlarmStore
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, follow, place
 from tests.support.parts import Server
 from tests.web.test_alarms import HEALTHY, server_with
@@ -62,15 +62,6 @@ def cell(tmp_path: Path) -> Iterator[Server]:
     written(data, time.time())
     with server_with(tmp_path, HEALTHY, data=data) as server:
         yield server
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def shown(page: Page) -> list[str | None]:

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, FloatRect, Page, expect
+from playwright.sync_api import FloatRect, Page, expect
 
 from app.panel import load_panel
 from app.panel.checks.fit import page_height
 from app.panel.widgets.tiles import Screen
 from tests.browser.test_accessibility import violations
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, middle, place, widget
 from tests.support.parts import ROOT, Server, until
@@ -60,15 +60,6 @@ def cell(tmp_path: Path) -> Iterator[Server]:
     with server_with(tmp_path) as server:
         until(lambda: len(listed(server)) == 2, "the alarms are raised")
         yield server
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def started(page: Page, url: str) -> Page:

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.cell.alarms.report import NAME as STATES
 from app.cell.alarms.report import StateRow, write_states
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_history import written
 from tests.browser.test_alarm_line import SIZES, started
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
@@ -55,15 +55,6 @@ def cell(tmp_path: Path) -> Iterator[Server]:
     with demo_server(tmp_path, panel, KIOSK_DATA=str(data)) as server:
         until(lambda: len(listed(server)) == 2, "the alarms are raised")
         yield server
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def test_the_report_has_alarms_presses_and_states_without_scripts(

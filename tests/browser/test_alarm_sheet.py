@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.test_accessibility import violations
-from tests.browser.test_alarm_line import SIZES, axe_page, started
+from tests.browser.test_alarm_line import SIZES, started
 from tests.browser.test_alarm_widgets import AIR_LIST, WIDGETS
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, place
@@ -19,7 +19,6 @@ from tests.web.test_alarms import LOW, PANEL, act, listed
 
 pytestmark = pytest.mark.long("detail")
 
-__all__ = ["axe_page"]
 
 SECOND_TAP_MS: Final = 800  # sooner a form without scripts counts as a second tap
 WITH_LISTS: Final = PANEL.replace("[demo]\n", WIDGETS)

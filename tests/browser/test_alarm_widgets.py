@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.test_accessibility import violations
-from tests.browser.test_alarm_line import CONTROL, SIZES, axe_page, started
+from tests.browser.test_alarm_line import CONTROL, SIZES, started
 from tests.support.browser.browsers import sized
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, follow, middle, place
@@ -18,7 +18,6 @@ from tests.web.test_alarms import LOW, PANEL, act, listed
 
 pytestmark = pytest.mark.long("detail")
 
-__all__ = ["axe_page"]
 
 WIDGETS: Final = """
 [[page.widget]]

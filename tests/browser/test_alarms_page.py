@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, follow
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
@@ -59,15 +59,6 @@ def cell(tmp_path: Path) -> Iterator[Server]:
     with server_with(tmp_path) as server:
         until(lambda: len(listed(server)) == 2, "the alarms are raised")
         yield server
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def ids(page: Page) -> list[str | None]:

@@ -1,7 +1,6 @@
 """The contrast of every text with what is behind it, as the browser draws it: 7:1 (WCAG 2.2 AAA), of
 large texts and those in an alarm's colour 4.5:1."""
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
@@ -9,8 +8,7 @@ from playwright.sync_api import Page, expect
 
 from app.web.pages.display_choice import CHOICES, COOKIE
 from tests.support.browser.browsers import sized
-from tests.support.parts import ROOT, SHIPPED, Server
-from tests.support.servers import ready
+from tests.support.parts import Server
 
 pytestmark = pytest.mark.long("every screen")
 
@@ -70,12 +68,6 @@ POOR: Final = """() => {
   }
   return poor;
 }"""
-
-
-@pytest.fixture(scope="module")
-def shipped() -> Iterator[Server]:
-    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
-        yield mine
 
 
 @pytest.mark.parametrize("theme", CHOICES["theme"])

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from app.cell.session.looks import LINGER_S
 from tests.browser.test_accessibility import violations
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, SHIPPED, Server, until
 from tests.support.servers import demo_server, ready
@@ -35,15 +35,6 @@ FITS: Final = """() => [
 def cell() -> Iterator[Server]:
     with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED))) as mine:
         yield mine
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def looks(server: Server) -> list[str]:

@@ -6,8 +6,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 
-from tests.support.parts import ROOT, SHIPPED, Server, until
-from tests.support.servers import ready
+from tests.support.parts import Server, until
 
 FONTS: Final = "/fonts/"
 LOADED: Final = """() => [...document.fonts]
@@ -18,12 +17,6 @@ PLACES: Final = f"""() => [...document.querySelectorAll("{PRESSED}")].map((butto
   const {{ left, top, right, bottom }} = button.getBoundingClientRect();
   return [left, top, right, bottom];
 }})"""
-
-
-@pytest.fixture(scope="module")
-def shipped() -> Iterator[Server]:
-    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
-        yield mine
 
 
 @pytest.fixture

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
 from tests.cell.recipes.panels import CARTON, TRAY
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import Server
 from tests.web.test_recipes import act, exported, load, make, server_with
@@ -33,15 +33,6 @@ def cell(tmp_path: Path) -> Iterator[Server]:
         make(server, "Carton 400 × 300", CARTON)
         make(server, "Tray", TRAY)
         yield server
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def started(page: Page, url: str) -> Page:

@@ -1,6 +1,5 @@
 """A short cut of the link to the server: the page locks and says so, and nothing on it moves."""
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
@@ -10,8 +9,7 @@ from app.system.texts.catalogue import files as languages
 from app.web.language import COOKIE as LANGUAGE
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, HIDE
-from tests.support.parts import ROOT, SHIPPED, Server
-from tests.support.servers import ready
+from tests.support.parts import Server
 
 pytestmark = pytest.mark.long("every screen")
 
@@ -31,12 +29,6 @@ PLACES: Final = """() => {
     return [[`${number} ${part.className || part.tagName}`, place]];
   }));
 }"""
-
-
-@pytest.fixture(scope="module")
-def shipped() -> Iterator[Server]:
-    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
-        yield mine
 
 
 @pytest.mark.parametrize("language", sorted(languages()))

@@ -1,13 +1,11 @@
 """Parts of the frame and of widgets look alike on every page: style sheets reach no other's parts."""
 
-from collections.abc import Iterator
 from typing import Final
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.support.parts import ROOT, SHIPPED, Server
-from tests.support.servers import ready
+from tests.support.parts import Server
 
 PAGES: Final = ("/", "/log", "/alarms", "/diagnostics")
 STOP_WITHIN: Final = 6  # presses of Tab: what the header and the line of alarms have comes before it
@@ -23,12 +21,6 @@ MESSAGE_INSET: Final = """(text) => {
   range.selectNodeContents(text);
   return range.getBoundingClientRect().x - text.getBoundingClientRect().x;
 }"""
-
-
-@pytest.fixture(scope="module")
-def shipped() -> Iterator[Server]:
-    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
-        yield mine
 
 
 def test_the_state_has_one_shape_and_stop_is_early_on_every_page(shipped: Server, page: Page) -> None:

@@ -10,7 +10,7 @@ from app.cell.people.secrets_hash import matches
 from app.cell.people.users_file import UsersFile
 from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
-from tests.support.browser.browsers import ReusedPage, sized
+from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
@@ -46,15 +46,6 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel.write_text((ROOT / "tests/reference.toml").read_text() + groups)
     with ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_MODE="demo", KIOSK_PANEL=str(panel))) as mine:
         yield mine
-
-
-@pytest.fixture
-def axe_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page to which axe may be added."""
-    mine = ReusedPage(chromium, bypass_csp=True)
-    with mine.taken(request.node) as page:
-        yield page
-    mine.close()
 
 
 def signed_in(page: Page, kiosk: Server) -> None:

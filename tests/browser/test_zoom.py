@@ -10,8 +10,7 @@ from app.system.texts.catalogue import files as languages
 from app.web.language import COOKIE as LANGUAGE
 from tests.support.browser.browsers import ReusedPage
 from tests.support.browser.pages import DRAWN, place
-from tests.support.parts import ROOT, SHIPPED, Server
-from tests.support.servers import ready
+from tests.support.parts import Server
 
 pytestmark = pytest.mark.long("every screen")
 
@@ -23,12 +22,6 @@ ON_TOP: Final = """(button) => {
   const there = document.elementFromPoint(x + width / 2, y + height / 2);
   return there?.closest("[data-widget]") === button.closest("[data-widget]");
 }"""
-
-
-@pytest.fixture(scope="module")
-def shipped() -> Iterator[Server]:
-    with ready(Server(ROOT, KIOSK_PANEL=str(SHIPPED), KIOSK_MODE="demo")) as mine:
-        yield mine
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,12 @@
-"""A small certificate authority, for one server on this machine."""
+"""A small certificate authority, for one server on this machine; a Zenoh session with a certificate."""
 
 import ipaddress
+import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import zenoh
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
@@ -53,3 +55,22 @@ def make_certificates(folder: Path, address: str = "127.0.0.1") -> Certificates:
         )
     )
     return files
+
+
+def tls_session(endpoint: str, folder: Path, name: str = "") -> zenoh.Session:
+    """A client that has the certificate `name` of the folder, or none."""
+    config = zenoh.Config()
+    tls: dict[str, Any] = {"root_ca_certificate": str(folder / "ca.pem")}
+    if name:
+        tls["connect_certificate"] = str(folder / f"{name}.pem")
+        tls["connect_private_key"] = str(folder / f"{name}.key")
+        tls["enable_mtls"] = True
+    for place, value in {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": 3_000,
+        "scouting/multicast/enabled": False,
+        "transport/link/tls": tls,
+    }.items():
+        config.insert_json5(place, json.dumps(value))
+    return zenoh.open(config)

@@ -35,13 +35,6 @@ def kiosk(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serv
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def path(client: httpx.Client, alarm: str, act: str) -> str:
     return f"/alarms/{quote(rows(client)[alarm]['id'], safe='')}/{act}"
 

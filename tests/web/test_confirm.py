@@ -36,13 +36,6 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def confirm(client: httpx.Client, widget: str, **body: Any) -> httpx.Response:
     return client.post(f"/widgets/{widget}/confirm", json=body)
 

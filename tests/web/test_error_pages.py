@@ -27,13 +27,6 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize(("path", "status"), [*NO_WAY.items(), ("/users", 403), ("/broken", 500)])
 def test_an_error_page_stands_in_the_frame(

@@ -33,13 +33,6 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def started(stream: Stream) -> bool:
     """Whether "Heat up" can be pressed by the next snapshot of a stream."""
     enabled: bool = stream.next("snapshot")[1]["widgets"]["start"]["enabled"]

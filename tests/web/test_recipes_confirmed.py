@@ -57,13 +57,6 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     browsers.close()
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def page(client: httpx.Client, set_id: str, recipe: str) -> str:
     return client.get(f"/recipes/{set_id}", params={"recipe": recipe}).text
 

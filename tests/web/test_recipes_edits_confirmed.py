@@ -44,13 +44,6 @@ def cell(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve
         yield server
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def sent(client: httpx.Client, act: str, set_id: str = "boxes", **fields: str) -> httpx.Response:
     return client.post(
         f"/recipes/{set_id}/{act}", data={k.replace("own_", "-"): v for k, v in fields.items()}

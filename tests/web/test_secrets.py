@@ -38,13 +38,6 @@ PAGES = (
 )
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def confirmed_presses(browser: httpx.Client) -> Iterator[httpx.Response]:
     """The answers to confirmations with each secret, right and wrong, and to their presses."""
     inputs = {"heat": 300}

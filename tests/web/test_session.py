@@ -23,13 +23,6 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def logged(browsers: Browsers, server: Server) -> list[dict[str, str]]:
     """The entries of users, the oldest first."""
     client = browsers.signed_in(server.url, "J. Brandt", password="long enough")

@@ -31,13 +31,6 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def share(client: httpx.Client) -> str:
     """The address of a recording that this client shares."""
     receipt = client.post(ACT, json={}).raise_for_status().json()

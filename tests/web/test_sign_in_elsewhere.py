@@ -24,13 +24,6 @@ def own_alarms(server: Server) -> dict[str, Any]:
     return {alarm["id"]: alarm for alarm in server.http.get("/alarms").json()["alarms"]}
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 @pytest.fixture(scope="module")
 def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     data = tmp_path_factory.mktemp("data")

@@ -21,13 +21,6 @@ PASSWORD: Final = "long enough"
 FORM: Final = {"accept": "text/html"}
 
 
-@pytest.fixture
-def browsers() -> Iterator[Browsers]:
-    every = Browsers()
-    yield every
-    every.close()
-
-
 def with_users(folder: Path) -> Server:
     data = folder / "data"
     data.mkdir(mode=0o700)

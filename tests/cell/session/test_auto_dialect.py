@@ -1,10 +1,7 @@
 """A panel file that does not say how its robot is reached: what is there decides."""
 
 import asyncio
-from collections.abc import Iterator
 from functools import partial
-
-import pytest
 
 from app.cell.session.fleet import Fleet
 from app.cell.session.session import RobotSession
@@ -29,14 +26,6 @@ from tests.support.rmw import RmwNode, Router
 from tests.support.waiting import when
 
 PANEL = panel_of(MESSAGE, GO, HEARD, CALL)
-
-
-@pytest.fixture
-def router() -> Iterator[Router]:
-    mine = Router()
-    mine.start()
-    yield mine
-    mine.end()
 
 
 def node_that_permits(router: Router) -> RmwNode:

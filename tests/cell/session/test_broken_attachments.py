@@ -120,14 +120,6 @@ def test_a_response_is_read_with_a_whole_attachment_only(
 
 
 @pytest.fixture
-def router() -> Iterator[Router]:
-    mine = Router()
-    mine.start()
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
 def robot(router: Router) -> Iterator[RmwNode]:
     """It permits, at first."""
     mine = RmwNode(router, "arm")

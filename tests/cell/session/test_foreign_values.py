@@ -33,14 +33,6 @@ PERMIT = {
 
 
 @pytest.fixture
-def router() -> Iterator[Router]:
-    mine = Router()
-    mine.start()
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
 def robot(router: Router) -> Iterator[RmwNode]:
     """It forbids, once."""
     mine = RmwNode(router, "arm")

@@ -29,14 +29,6 @@ type = "{INT}"
 
 
 @pytest.fixture
-def router() -> Iterator[Router]:
-    mine = Router()
-    mine.start()
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
 def robot(router: Router) -> Iterator[RmwNode]:
     """A node with a topic that the panel shows and another one."""
     mine = RmwNode(router, "arm")

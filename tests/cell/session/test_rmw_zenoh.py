@@ -52,14 +52,6 @@ def panel(*widgets: Any, **more: Any) -> Panel:
 
 
 @pytest.fixture
-def router() -> Iterator[Router]:
-    mine = Router()
-    mine.start()
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
 def robot(router: Router) -> Iterator[RmwNode]:
     """A node that listens to /go and permits for good."""
     mine = RmwNode(router, "arm")

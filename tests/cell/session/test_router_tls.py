@@ -20,6 +20,7 @@ from app.tools.cli.command import main
 from tests.cell.session.test_rmw_zenoh import enabled
 from tests.cell.session.test_router_config import ATTACHMENT, PANEL, TEXT, TOLD_OF_ALL
 from tests.support.builders import press_widget
+from tests.support.certificates import tls_session
 from tests.support.parts import Process, free_port, until
 from tests.support.rmw import Router
 from tests.support.waiting import when
@@ -61,25 +62,6 @@ def router(panel: Path, door: str, tmp_path: Path) -> Iterator[Router]:
     mine.end()
 
 
-def session(endpoint: str, folder: Path, name: str = "") -> zenoh.Session:
-    """A client; with a certificate where the endpoint has TLS."""
-    config = zenoh.Config()
-    tls: dict[str, Any] = {"root_ca_certificate": str(folder / "ca.pem")}
-    if name:
-        tls["connect_certificate"] = str(folder / f"{name}.pem")
-        tls["connect_private_key"] = str(folder / f"{name}.key")
-        tls["enable_mtls"] = True
-    for place, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": 3_000,
-        "scouting/multicast/enabled": False,
-        "transport/link/tls": tls,
-    }.items():
-        config.insert_json5(place, json.dumps(value))
-    return zenoh.open(config)
-
-
 def test_the_panel_works_over_tls(hiroz: Path, router: Router, panel: Path, tmp_path: Path) -> None:
     robot = Process([str(hiroz), router.endpoint], {})
 
@@ -107,8 +89,8 @@ def test_the_panel_works_over_tls(hiroz: Path, router: Router, panel: Path, tmp_
 
 def test_who_has_no_certificate_does_not_get_in(router: Router, door: str, tmp_path: Path) -> None:
     with pytest.raises(zenoh.ZError):
-        session(door, tmp_path / "pki").close()
-    with closing(session(door, tmp_path / "pki", "kiosk")) as mine:
+        tls_session(door, tmp_path / "pki").close()
+    with closing(tls_session(door, tmp_path / "pki", "kiosk")) as mine:
         assert list(mine.info.routers_zid()) != []
 
 
@@ -117,7 +99,7 @@ def test_another_certificate_forges_neither_a_permission_nor_a_press(
 ) -> None:
     """In the order of the wire: what the panel's own session sends last arrives, and nothing before."""
     folder = tmp_path / "pki"
-    nodes = session(router.endpoint, folder)
+    nodes = tls_session(router.endpoint, folder)
     permission, command = "0/operation_enabled/std_msgs::msg::dds_::Bool_/H", f"0/operation/{TEXT}/H"
     received: list[tuple[str, bytes]] = []
     heard: list[str] = []
@@ -130,14 +112,14 @@ def test_another_certificate_forges_neither_a_permission_nor_a_press(
 
     held = [nodes.declare_subscriber(key, receive) for key in (permission, command)]
     try:
-        with closing(session(door, folder, "other")) as other:
+        with closing(tls_session(door, folder, "other")) as other:
             read = other.declare_subscriber("**", hear, allowed_origin=zenoh.Locality.REMOTE)
             put(other, permission, b"other")
             put(other, command, b"other")
             nodes.put("0/secret/std_msgs::msg::dds_::String_/H", b"x")
             nodes.put(f"0/last_heard/{TEXT}/H", b"x")
             del read
-        with closing(session(door, folder, "kiosk")) as mine:
+        with closing(tls_session(door, folder, "kiosk")) as mine:
             put(mine, permission, b"kiosk")
             put(mine, command, b"kiosk")
             until(lambda: received, "what the panel may send arrives")

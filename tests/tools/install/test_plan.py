@@ -59,16 +59,6 @@ def make_wheel(folder: Path, version: str = "0.1.0", **changed: str) -> Path:
     return path
 
 
-@pytest.fixture
-def host(tmp_path: Path) -> Host:
-    """A folder with what says that it is Debian 12."""
-    root = tmp_path / "root"
-    (root / "etc").mkdir(parents=True)
-    (root / "etc/os-release").write_text('ID=debian\nVERSION_ID="12"\n')
-    (root / "etc/passwd").write_text("root:x:0:0::/root:/bin/sh\n")
-    return Host(root)
-
-
 def path_on(host: Host, path: str) -> Path:
     """Where an absolute path of the machine is."""
     return host.root / path.lstrip("/")

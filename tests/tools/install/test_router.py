@@ -25,15 +25,6 @@ UNIT: Final = f"/etc/systemd/system/{ROUTER}"
 RMW: Final = 'dialect = "rmw_zenoh"\n'
 
 
-@pytest.fixture
-def host(tmp_path: Path) -> Host:
-    root = tmp_path / "root"
-    (root / "etc").mkdir(parents=True)
-    (root / "etc/os-release").write_text('ID=debian\nVERSION_ID="12"\n')
-    (root / "etc/passwd").write_text("root:x:0:0::/root:/bin/sh\n")
-    return Host(root)
-
-
 def panel_in(folder: Path, text: str) -> Path:
     path = folder / "cell1.toml"
     path.write_text(text)

@@ -1,0 +1,15 @@
+"""Fixtures of robots on rmw_zenoh."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.support.rmw import Router
+
+
+@pytest.fixture
+def router() -> Iterator[Router]:
+    mine = Router()
+    mine.start()
+    yield mine
+    mine.end()
