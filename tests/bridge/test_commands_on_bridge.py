@@ -4,7 +4,6 @@ robot on Cyclone DDS."""
 import json
 import re
 import shlex
-import signal
 import subprocess
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -199,15 +198,6 @@ def test_router_without_a_bridge_is_a_separate_finding(peer: tuple[str, Any]) ->
     done = command.run(COMMAND, "topics", "--connect", endpoint)
     assert (done.returncode, done.stdout) == (1, "")
     assert f"Zenoh answers at {endpoint}, but no bridge to ROS 2 is there" in done.stderr
-
-
-def test_ctrl_c_ends_the_command_silently(cyclone_bridge: Bridge, io: RosNode) -> None:
-    echo = command.start(COMMAND, "echo", "/arm/joint_states", "--connect", cyclone_bridge.endpoint)
-    assert echo.stdout is not None
-    assert echo.stdout.readline() == "header:\n"
-    echo.send_signal(signal.SIGINT)
-    done = command.finished(echo)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_type_is_decoded_by_the_definition_that_its_node_gives(

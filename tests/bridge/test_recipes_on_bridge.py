@@ -102,16 +102,6 @@ def test_a_node_that_refuses_one_value_keeps_all_old_ones(cell: Server, robot: C
     assert not marked(cell)
 
 
-def test_a_value_beyond_the_range_of_the_node_sends_nothing(cell: Server, robot: CycloneRobot) -> None:
-    make(cell, "Slow", {**SLOW, "limit": 150})  # the node takes 100 at most
-    receipt = load(cell, "slow@1")
-    assert receipt["outcome"] == "refused", receipt
-    assert "Limit" in receipt["reason"]
-    assert sets(robot) == (0, 0)
-    assert robot.parameters()["limit"] == 10
-    assert not marked(cell)
-
-
 OF_TOPIC: Final = """
 title = "Cell"
 mode = "live"

@@ -225,16 +225,6 @@ def test_idle_holder_loses_control_on_request_and_active_holder_keeps_it(opens: 
     sends(second)
 
 
-def test_the_panel_at_the_cell_takes_over(opens: Opens) -> None:
-    first = opens(FIRST)
-    take(first)
-    cell = opens()
-    locked_by(cell, "Panel 1 (192.0.2.1)")
-    take(cell)
-    sends(cell)
-    locked_by(first, "The panel at the cell")
-
-
 def processes_of(browser: Browser) -> list[int]:
     session = browser.new_browser_cdp_session()
     return [int(p["id"]) for p in session.send("SystemInfo.getProcessInfo")["processInfo"]]
@@ -281,16 +271,6 @@ def test_closed_page_frees_control_for_the_requester(opens: Opens) -> None:
     has_role(second, "holding")
 
 
-def test_released_control_is_not_taken_again_by_a_page_load(opens: Opens) -> None:
-    cell = opens()
-    has_role(cell, "holding")
-    tap(cell, "Release control")
-    locked_free(cell)
-    cell.reload()
-    locked_free(cell)
-    take(cell)
-
-
 @pytest.mark.long("real time")
 def test_two_taps_take_control_and_do_not_release_control(opens: Opens) -> None:
     first = opens(FIRST)
@@ -300,24 +280,6 @@ def test_two_taps_take_control_and_do_not_release_control(opens: Opens) -> None:
     first.mouse.click(release["x"] + 5, release["y"] + 5)
     first.wait_for_timeout(1000)
     has_role(first, "holding")
-
-
-@pytest.mark.long(None)
-def test_no_client_has_control_after_a_server_restart(
-    kiosk: Server, opens: Opens, tmp_path: Path
-) -> None:
-    first = opens(FIRST)
-    take(first)
-    kiosk.process.kill()
-    expect(bar(first)).to_have_text("unknown")
-    expect(button(first, "Release control")).to_be_disabled()
-    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
-    try:
-        locked_free(first)
-        take(first)
-        sends(first)
-    finally:
-        again.end()
 
 
 def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:

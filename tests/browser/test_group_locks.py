@@ -6,6 +6,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.test_lock_help import says
 from tests.support.browser.browsers import sized
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
@@ -98,12 +99,6 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with demo_server(tmp_path_factory.mktemp("panel"), PANEL % SHORT) as mine:
         until(lambda: mine.widget("halt")["enabled"], "the robot is there")
         yield mine
-
-
-def says(cell: Server, order: str) -> None:
-    cell.http.post(f"/widgets/{order}", json={"inputs": {}})
-    heard = f"{order} (/operation2)"
-    until(lambda: cell.widget("heard")["text"] == heard, f"{order} is heard")
 
 
 def test_one_reason_of_all_buttons_stands_beside_the_title(cell: Server, page: Page) -> None:

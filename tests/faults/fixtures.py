@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults.net import Cable
 from tests.faults.rig import Rig
 from tests.support.parts import Server
 
@@ -23,3 +24,12 @@ def rig(domain: int) -> Iterator[Rig]:
 def server(rig: Rig, tmp_path: Path) -> Iterator[Server]:
     with rig.serving(tmp_path) as mine:
         yield mine
+
+
+@pytest.fixture
+def cable() -> Iterator[Cable]:
+    """A cable; the test itself runs at the kiosk's end."""
+    mine = Cable()
+    with mine.kiosk.inside():
+        yield mine
+    mine.end()

@@ -8,6 +8,7 @@ from typing import Final
 
 import pytest
 
+from tests.faults import fixtures
 from tests.faults.net import ROBOT_IP, Cable
 from tests.faults.results import ms, record
 from tests.faults.rig import limit
@@ -18,6 +19,8 @@ from tests.support.form import LONG, several
 from tests.support.parts import Server
 
 pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("dialects")]
+
+cable = fixtures.cable
 
 NOTICED_S: Final = 1.0
 KILLED_S: Final = 0.05
@@ -35,15 +38,6 @@ def rig(domain: int) -> Iterator[RmwRig]:
 def server(rig: RmwRig, tmp_path: Path) -> Iterator[Server]:
     with rig.serving(tmp_path) as mine:
         yield mine
-
-
-@pytest.fixture
-def cable() -> Iterator[Cable]:
-    """A cable; the test itself runs at the kiosk's end."""
-    mine = Cable()
-    with mine.kiosk.inside():
-        yield mine
-    mine.end()
 
 
 @pytest.fixture

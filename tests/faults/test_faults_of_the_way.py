@@ -22,6 +22,7 @@ pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("offline")]
 
 rig = fixtures.rig
 server = fixtures.server
+cable = fixtures.cable
 
 CUT_OFF = "No connection to the robot"
 DELAY_S = 0.3
@@ -29,15 +30,6 @@ LOSS = 0.1
 NOTICED_S = 1.0
 LATE_IMPAIRED_S = 5.0
 CUTS_S = (1, 5, 30) if LONG else (1, 5)
-
-
-@pytest.fixture
-def cable() -> Iterator[Cable]:
-    """A cable; the test itself runs at the kiosk's end."""
-    mine = Cable()
-    with mine.kiosk.inside():
-        yield mine
-    mine.end()
 
 
 @pytest.fixture

@@ -268,44 +268,6 @@ def test_act_touched_long_ago_is_refused(client: Callable[..., Client]) -> None:
     assert late.control("take", at="yesterday").status_code == 422
 
 
-def test_a_denied_request(client: Callable[..., Client]) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
-    ann.take()
-    of_bob = bob.id
-    bob.control("ask")  # goes through in `FAST_S`
-    assert ann.control("keep", to=of_bob).json()["done"]
-    again = bob.control("ask")
-    assert (again.status_code, again.json()["done"]) == (409, False)
-    assert again.json()["code"] == "control_denied"
-
-
-@pytest.mark.long("detail")
-def test_a_request_goes_through_without_a_touch_of_the_holder(
-    client: Callable[..., Client], kiosk: Server
-) -> None:
-    ann, bob = client("192.0.2.1"), client("192.0.2.2")
-    ann.take()
-    began = time.monotonic()
-    bob.control("ask")
-
-    def bob_has_it(touched: bool = False) -> bool:
-        ann.control("here", touched=touched)
-        bob.control("here")
-        return bool(kiosk.snapshot()["control"]["holder"] == bob.id)
-
-    touched_at = began
-
-    def long_enough() -> bool:
-        nonlocal touched_at
-        before, touched_at = touched_at, time.monotonic()
-        if bob_has_it(touched=True):  # so long Ann touched nothing on a machine that stood still
-            assert time.monotonic() - before > FAST_S
-        return time.monotonic() - began > 2 * FAST_S
-
-    until(long_enough, "Ann has it for twice as long", every_s=0.05)
-    until(bob_has_it, "Bob has it")
-
-
 def test_lost_holder_frees_control(own_client: Callable[..., Client], own_kiosk: Server) -> None:
     ann = own_client("192.0.2.1")
     with own_kiosk.stream() as stream:

@@ -3,17 +3,12 @@
 Exit status: see `peer_config`.
 """
 
-import sys
 from argparse import ArgumentTypeError
 from collections.abc import Sequence
 from typing import Final
 
-from app.panel import load_panel
 from app.ros.dialects.dialect import WITHOUT_BRIDGE
-from app.ros.messages import load_interfaces
 from app.ros.messages.names import TOPIC
-from app.system.errors import KioskError
-from app.system.settings import Settings
 from app.tools.cell_config.bridge_config import LISTEN, BridgeOptions, bridge_config
 from app.tools.cli.parser import Parser
 from app.tools.cli.peer_config import (
@@ -21,8 +16,7 @@ from app.tools.cli.peer_config import (
     add_options,
     listen_of,
     own_domain,
-    robot_entry,
-    tls_of,
+    read_panel,
     write,
 )
 
@@ -36,24 +30,18 @@ NO_BRIDGE: Final = (
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
     options = parser.parse_args(arguments)
-    try:
-        panel = load_panel(options.panel or Settings.from_environment().panel)
-        interfaces = load_interfaces(panel.distro, panel.interfaces)
-        entry = robot_entry(parser, panel, options.robot)
-        tls = tls_of(options, panel, entry)
-    except KioskError as error:
-        print(error, file=sys.stderr)
+    if (cell := read_panel(parser, options)) is None:
         return 2
-    if (entry or panel).dialect in WITHOUT_BRIDGE:
+    if cell.robot.dialect in WITHOUT_BRIDGE:
         parser.error(NO_BRIDGE)
     bridge = BridgeOptions(
         domain=options.domain,
-        listen=listen_of(options, entry, LISTEN),
+        listen=listen_of(options, cell.entry, LISTEN),
         nodename=options.nodename,
         prefixed=options.prefixed,
-        tls=tls,
+        tls=cell.tls,
     )
-    return write(bridge_config(panel, interfaces, entry, bridge), options)
+    return write(bridge_config(cell.panel, cell.interfaces, cell.entry, bridge), options)
 
 
 def _node(text: str) -> str:

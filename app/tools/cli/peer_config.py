@@ -10,13 +10,16 @@ import sys
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from app.panel import Panel
+from app.panel import Panel, load_panel
 from app.panel.base import ENDPOINT
 from app.panel.model import RobotEntry
 from app.ros.dialects.dialect import DOMAIN_MOST, WITHOUT_BRIDGE
+from app.ros.messages import Interfaces, load_interfaces
 from app.system.certificates import AUTHORITY, CertificateError, CertificateFolder, Holder, about
+from app.system.errors import KioskError
+from app.system.settings import Settings
 from app.tools.cell_config.access_rules import TlsFiles, over_tls
 from app.tools.cli.arguments import PANEL_HELP
 from app.tools.cli.output import OutputError, add_force, draft_of
@@ -109,6 +112,32 @@ def robot_entry(parser: Parser, panel: Panel, name: str | None) -> RobotEntry | 
             return entry
     listed = ", ".join(names) or "none: leave --robot out"
     parser.error(f"--robot names one of the panel's robots: there is {listed}")
+
+
+class CellPanel(NamedTuple):
+    """A panel, the robot of which a file is written, and the files of --tls."""
+
+    panel: Panel
+    interfaces: Interfaces
+    entry: RobotEntry | None
+    tls: TlsFiles | None
+
+    @property
+    def robot(self) -> RobotEntry | Panel:
+        """What has the robot's dialect and domain."""
+        return self.entry or self.panel
+
+
+def read_panel(parser: Parser, options: Any) -> CellPanel | None:
+    """None if it can't be used, after the reason was printed."""
+    try:
+        panel = load_panel(options.panel or Settings.from_environment().panel)
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
+        entry = robot_entry(parser, panel, options.robot)
+        return CellPanel(panel, interfaces, entry, tls_of(options, panel, entry))
+    except KioskError as error:
+        print(error, file=sys.stderr)
+        return None
 
 
 def listen_of(options: Any, entry: RobotEntry | None, default: Sequence[str]) -> tuple[str, ...]:

@@ -5,19 +5,14 @@ Exit status: see `peer_config`.
 """
 
 import re
-import sys
 from argparse import ArgumentTypeError
 from collections.abc import Sequence
 from typing import Final
 
-from app.panel import load_panel
 from app.ros.dialects.dialect import WITHOUT_ROUTER
-from app.ros.messages import load_interfaces
-from app.system.errors import KioskError
-from app.system.settings import Settings
 from app.tools.cell_config.rmw_zenoh_router import LISTEN, NODES, RouterOptions, router_config
 from app.tools.cli.parser import Parser
-from app.tools.cli.peer_config import add_domain, add_options, listen_of, robot_entry, tls_of, write
+from app.tools.cli.peer_config import add_domain, add_options, listen_of, read_panel, write
 
 PROG: Final = "python -m app.cli router-config"
 NO_ROUTER: Final = (
@@ -32,25 +27,19 @@ INTERFACE: Final = re.compile(r"[^\s/\"\\]{1,15}")  # as Linux names them
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
     options = parser.parse_args(arguments)
-    try:
-        panel = load_panel(options.panel or Settings.from_environment().panel)
-        interfaces = load_interfaces(panel.distro, panel.interfaces)
-        entry = robot_entry(parser, panel, options.robot)
-        tls = tls_of(options, panel, entry)
-    except KioskError as error:
-        print(error, file=sys.stderr)
+    if (cell := read_panel(parser, options)) is None:
         return 2
-    if (entry or panel).dialect in WITHOUT_ROUTER:
+    if cell.robot.dialect in WITHOUT_ROUTER:
         parser.error(NO_ROUTER)
     router = RouterOptions(
-        domain=(entry or panel).domain if options.domain is None else options.domain,
-        listen=listen_of(options, entry, LISTEN),
+        domain=cell.robot.domain if options.domain is None else options.domain,
+        listen=listen_of(options, cell.entry, LISTEN),
         nodes=tuple(options.nodes or NODES),
-        tls=tls,
+        tls=cell.tls,
     )
-    if tls is not None and not all(end.startswith(OVER_TLS) for end in router.listen):
+    if cell.tls is not None and not all(end.startswith(OVER_TLS) for end in router.listen):
         parser.error(NOT_TLS)
-    return write(router_config(panel, interfaces, entry, router), options)
+    return write(router_config(cell.panel, cell.interfaces, cell.entry, router), options)
 
 
 def _interface(text: str) -> str:
