@@ -1,11 +1,13 @@
-"""A map of a real ROS 2 node through the real bridge: latched, also for a panel that starts later."""
+"""A map of real ROS 2 nodes through the real bridge: latched, also for a panel that starts later,
+with a pose or with transforms."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
 import pytest
 
+from tests.support.cyclone import Client, CycloneRobot
 from tests.support.parts import Bridge, RosNode, until
 from tests.support.servers import live_server
 
@@ -21,8 +23,8 @@ id = "hall"
 kind = "map"
 label = "Hall"
 max_age_s = 1.0
-pose = { topic = "/pose", type = "geometry_msgs/msg/PoseStamped" }
 """
+WITH_TOPIC: Final = 'pose = { topic = "/pose", type = "geometry_msgs/msg/PoseStamped" }\n'
 GRID: Final = "nav_msgs/msg/OccupancyGrid"
 POSE: Final = "geometry_msgs/msg/PoseStamped"
 UPRIGHT: Final = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
@@ -52,7 +54,7 @@ def test_a_map_and_its_robot_are_shown_to_a_panel_that_starts_later(
     robot.advertise("/map", GRID, durability="transient_local", depth=1)
     robot.advertise("/pose", POSE)
     publish_map(robot, [0, 100, -1, 0], 2, 2)
-    with live_server(own_bridge, tmp_path, PANEL) as kiosk:
+    with live_server(own_bridge, tmp_path, PANEL + WITH_TOPIC) as kiosk:
         first = until(lambda: kiosk.widget("hall")["grid"], "the latched map is read")
         assert (first["width"], first["height"], first["x"]) == (2, 2, -1.0)
         assert kiosk.widget("hall")["pose"] is None
@@ -71,3 +73,37 @@ def test_a_map_and_its_robot_are_shown_to_a_panel_that_starts_later(
         until(lambda: kiosk.widget("hall")["grid"]["width"] == 3, "another map is shown")
         path = f"/widgets/hall/map/{first['version']}/0-0.png"
         assert kiosk.http.get(path).status_code == 404
+
+
+TF: Final = "tf2_msgs/msg/TFMessage"
+
+
+def test_transforms_at_50_hz_place_the_robot_until_they_end(
+    own_cyclone_bridge: Bridge,
+    cyclone_robots: Callable[..., CycloneRobot],
+    own_client: Client,
+    tmp_path: Path,
+) -> None:
+    driven = cyclone_robots(own_cyclone_bridge.domain)
+    map_server = RosNode(own_cyclone_bridge.domain, "map_server")
+    try:
+        map_server.advertise("/map", GRID, durability="transient_local", depth=1)
+        publish_map(map_server, [0, 100, -1, 0], 2, 2)
+        driven.advertise(topic="/tf_static", type=TF, durability="transient_local", depth=1)
+        driven.advertise(topic="/tf", type=TF)
+        driven.transform(topic="/tf_static", parent="map", child="odom", x=1.0)
+        driven.transform(topic="/tf", parent="odom", child="base_link", x=2.0, hz=50)
+        with live_server(own_cyclone_bridge, tmp_path, PANEL) as kiosk:
+            until(lambda: kiosk.widget("hall")["grid"], "the map is read")
+            until(lambda: kiosk.widget("hall")["pose"] == [3.0, 0.0, 0.0], "the robot is on the map")
+            assert kiosk.widget("hall")["state"] == "live"
+            driven.transform(topic="/tf", parent="odom", child="base_link", x=4.0)  # and then no more
+            until(lambda: kiosk.widget("hall")["pose"] == [5.0, 0.0, 0.0], "it is where it drove")
+            until(lambda: kiosk.widget("hall")["state"] == "old", "without transforms it is old")
+            assert kiosk.widget("hall")["pose"] == [5.0, 0.0, 0.0]
+            driven.transform(topic="/tf", parent="odom", child="other", x=0.0)
+            driven.transform(topic="/tf", parent="world", child="base_link", x=0.0)
+            until(lambda: kiosk.widget("hall")["pose"] is None, "another tree has no way to the map")
+            assert "base_link" in kiosk.widget("hall")["note"]
+    finally:
+        map_server.end()

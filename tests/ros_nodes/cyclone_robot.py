@@ -9,6 +9,7 @@ type.
 import os
 import sys
 import threading
+import time
 from typing import Any
 
 from commands import obey
@@ -22,12 +23,19 @@ from cyclone_types import (
     GetTypeDescription_Request,
     GetTypeDescription_Response,
     Gripper,
+    Header,
     Jaw,
+    Quaternion,
     SetBool_Request,
     SetBool_Response,
     String,
+    TFMessage,
+    Time,
+    Transform,
+    TransformStamped,
     Trigger_Request,
     Trigger_Response,
+    Vector3,
     described,
     plain,
 )
@@ -37,6 +45,10 @@ TOPIC_TYPES: dict[str, tuple[type, str]] = {
     "std_msgs/msg/String": (
         String,
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    ),
+    "tf2_msgs/msg/TFMessage": (
+        TFMessage,
+        "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
     ),
     "std_msgs/msg/Bool": (
         Bool,
@@ -52,6 +64,7 @@ class Commands:
         self._calls: list[dict[str, Any]] = []
         self._readers: dict[str, Any] = {}
         self._heard_on: dict[str, list[Any]] = {}
+        self._repeated: dict[str, threading.Event] = {}  # topic → set to end it
         self._answer_of_set_enabled = (True, "")
         self._slow_s: float | None = 1.0
         self._node.serve("/set_enabled", SetBool_Request, SetBool_Response, self._on_set_enabled)
@@ -129,6 +142,29 @@ class Commands:
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self._node.published[topic]
         publisher.write(publisher.data_type(**fields))
+
+    def transform(self, topic: str, parent: str, child: str, x: float, hz: float = 0.0) -> None:
+        """Publishes where a frame is in another one: once, or so many times a second with the time of
+        now, until the next call for the topic."""
+        if (before := self._repeated.pop(topic, None)) is not None:
+            before.set()
+
+        def publish() -> None:
+            header = Header(Time.at(time.time_ns()), parent)
+            way = Transform(Vector3(x), Quaternion())
+            message = TFMessage([TransformStamped(header, child, way)])
+            self._node.published[topic].write(message)
+
+        publish()
+        if not hz:
+            return
+        ended = self._repeated[topic] = threading.Event()
+
+        def repeat() -> None:
+            while not ended.wait(1 / hz):
+                publish()
+
+        threading.Thread(target=repeat, daemon=True).start()
 
     def subscribers(self, topic: str) -> int:
         """How many listen to a topic, be it the action's or `/parameter_events`."""

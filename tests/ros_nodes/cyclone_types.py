@@ -81,6 +81,48 @@ class Time(IdlStruct, typename=dds_name("builtin_interfaces/msg/Time")):
         return cls(*divmod(nanoseconds, 10**9))
 
 
+# Transforms.
+
+
+@dataclass
+class Header(IdlStruct, typename=dds_name("std_msgs/msg/Header")):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class Vector3(IdlStruct, typename=dds_name("geometry_msgs/msg/Vector3")):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Quaternion(IdlStruct, typename=dds_name("geometry_msgs/msg/Quaternion")):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class Transform(IdlStruct, typename=dds_name("geometry_msgs/msg/Transform")):
+    translation: Vector3
+    rotation: Quaternion
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename=dds_name("geometry_msgs/msg/TransformStamped")):
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@dataclass
+class TFMessage(IdlStruct, typename=dds_name("tf2_msgs/msg/TFMessage")):
+    transforms: sequence[TransformStamped]
+
+
 # ros_discovery_info: which readers and writers make up a node.
 
 
