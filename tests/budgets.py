@@ -23,6 +23,9 @@ FIGURES: Final[Mapping[str, int]] = {
     "wake-ups for 1,000 messages that no one looks at": 0,
     "wake-ups for 1,000 messages in 20 frames": 20,
     "wake-ups for 1,000 permissions, a turn after each": 1000,
+    "calls of a published press": 685,
+    "calls of a service's press, drawn": 1260,
+    "calls of a sign-in": 370,
 }
 # What a figure must not exceed, however it has grown.
 MOST: Final[Mapping[str, int]] = {
@@ -30,6 +33,8 @@ MOST: Final[Mapping[str, int]] = {
     "first page, shipped panel: bytes": 60_000,
     "first page, three widgets: requests": 12,
     "first page, three widgets: bytes": 45_000,
+    "calls of a service's press, drawn": 1500,
+    "calls of a sign-in": 2500,
 }
 
 
