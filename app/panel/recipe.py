@@ -12,6 +12,7 @@ from app.panel.base import (
     Interlocks,
     Label,
     MessageField,
+    MessageOrServiceType,
     NodeName,
     ParameterName,
     Seconds,
@@ -54,7 +55,7 @@ class RecipeSet(Description):
     topic: TopicName | None = None
     service: TopicName | None = None
     node: NodeName | None = None
-    type: str = ""
+    type: MessageOrServiceType = ""
     qos: TopicQos = TopicQos()
     message: dict[str, Any] | None = None
     request: dict[str, Any] | None = None

@@ -205,7 +205,8 @@ def test_a_wrong_value_has_one_finding_in_each_table(
         panel = copy.deepcopy(EVERYTHING)
         places = {}
         for name, (place, table) in firsts(panel).items():
-            takes = key in MODELS[name].model_fields and name not in OTHERS.get(key, ())
+            others = OTHERS.get(key, frozenset()) - OF_SERVICES
+            takes = key in MODELS[name].model_fields and name not in others
             if takes and (name == "source") == is_source:
                 table[key] = value
                 places[f"{place}.{key}{below}"] = name
@@ -386,6 +387,29 @@ def test_a_field_has_one_finding_in_each_table(tmp_path: Path, name: str) -> Non
     first, _, rest = whole["field"].partition(" takes one value of it, not all; ")
     assert first.startswith('"pose" is geometry_msgs/msg/Pose: a'), whole
     assert rest == "write pose.position or pose.orientation"
+
+
+TOPIC: Final = {"topic": "/air", "type": "std_srvs/srv/Trigger"}
+SERVICE: Final = {"service": "/air", "type": FLOAT}
+LOAD: Final = {"id": "box", "label": "B", "fields": ["length"]}
+
+
+@pytest.mark.parametrize(("keys", "kind"), [(TOPIC, "topic"), (SERVICE, "service")])
+def test_a_type_of_the_other_way_has_one_finding(tmp_path: Path, keys: Keys, kind: str) -> None:
+    sent = "request" if kind == "service" else "message"
+    reported = {"topic": "/b", "type": BOOL}
+    positions = {f"{name}_{sent}": {"data": name == "on"} for name in ("on", "off")}
+    panels = [
+        widget("switch", reported=reported, **positions)(keys),
+        widget("select", options_from=dict(keys))({}),
+        on_page(LENGTH, recipe=[{**LOAD, **keys, sent: {"data": "{length}"}}]),
+    ]
+    for panel in panels:
+        (fault,) = faults_of_text(text_of(panel), tmp_path)
+        assert fault.message.startswith(
+            f'"{keys["type"]}" is no type of a {kind}: it must be like std_'
+        )
+        assert fault.place.endswith(".type")
 
 
 @pytest.mark.parametrize("name", NUMBERS)

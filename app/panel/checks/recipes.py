@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from app.panel.base import Description
-from app.panel.checks.types import field_faults
+from app.panel.checks.types import field_faults, way_faults
 from app.panel.file.wording import list_names, no_such
 from app.panel.numbers import NUMBERS
 from app.panel.recipe import ParameterKind, RecipeReadback, RecipeSet
@@ -45,6 +45,8 @@ def _set_faults(
     yield from _field_faults(table, place, checking)
     yield from load.faults(place, checking)
     ways = list(_way_faults(place, table, WAYS, NEEDED, "it is loaded by"))
+    if not ways and table.node is None:
+        ways += way_faults(place, table.type, of_service=table.service is not None)
     yield from ways
     is_whole = len(load.fields) == len(table.fields) == len({*table.fields})
     if ways or not is_whole or {*table.fields} & {*checking.faulty}:

@@ -19,6 +19,17 @@ def type_fault(place: str, error: InterfaceError) -> Fault:
     return Fault(place, str(error), cause=f"type {error.source or error.package or error}")
 
 
+def way_faults(place: str, type_name: str, *, of_service: bool) -> Iterator[Fault]:
+    """A fault of the type of a topic where a service is named in the table at `place`, or the other way
+    around."""
+    if ("/srv/" in type_name) != of_service:
+        kind, right = (
+            ("service", "std_srvs/srv/Trigger") if of_service else ("topic", "std_msgs/msg/String")
+        )
+        message = f'"{type_name}" is no type of a {kind}: it must be like {right}'
+        yield Fault(f"{place}.type", message)
+
+
 def field_faults(place: str, type_name: str, path: str, interfaces: Interfaces) -> Iterator[Fault]:
     """Faults of a missing type, or of a field that it does not have; `place` contains both keys."""
     try:

@@ -16,7 +16,7 @@ from app.panel.base import (
     TopicName,
     TopicQos,
 )
-from app.panel.checks.types import field_faults, type_fault
+from app.panel.checks.types import field_faults, type_fault, way_faults
 from app.panel.shared_keys import AgeKey
 from app.panel.template import placeholders
 from app.panel.widgets.families import TopicSource
@@ -155,10 +155,8 @@ class RobotOptions(AgeKey):
         if self.type is None:
             yield Fault(f"{place}.type", f"is missing beside {kind}")
             return
-        if ("/srv/" in self.type) != (kind == "service"):
-            right = "std_srvs/srv/Trigger" if kind == "service" else "std_msgs/msg/String"
-            message = f'"{self.type}" is no type of a {kind}: it must be like {right}'
-            yield Fault(f"{place}.type", message)
+        if faults := list(way_faults(place, self.type, of_service=kind == "service")):
+            yield from faults
             return
         for key in ("qos",) if kind == "service" else ("every_s", "request"):
             if key in self.model_fields_set:

@@ -5,8 +5,16 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, ClassVar, Final, Literal, Self
 
-from app.panel.base import SaidLabel, Seconds, Span, TopicName, TopicQos, catalogue_default
-from app.panel.checks.types import value_faults
+from app.panel.base import (
+    MessageOrServiceType,
+    SaidLabel,
+    Seconds,
+    Span,
+    TopicName,
+    TopicQos,
+    catalogue_default,
+)
+from app.panel.checks.types import value_faults, way_faults
 from app.panel.constants import parent_type
 from app.panel.values import same_value
 from app.panel.widgets.displays import StateValue, resolve_state_value
@@ -56,7 +64,7 @@ class Switch(EntryWidget, CompositeCommand):
     off_value: StateValue = False
     topic: TopicName | None = None
     service: TopicName | None = None
-    type: str
+    type: MessageOrServiceType
     qos: TopicQos = TopicQos()
     on_message: dict[str, Any] | None = None
     off_message: dict[str, Any] | None = None
@@ -164,6 +172,7 @@ class Switch(EntryWidget, CompositeCommand):
             yield Fault(f"{place}.{'topic' if self.topic is None else 'service'}", message)
             return
         missing = list(self._missing_faults(place))
+        missing += way_faults(place, self.type, of_service=self.service is not None)
         yield from missing
         source, at = self.reported, f"{place}.reported"
         faults = list(value_faults(at, source.type, source.field, "a report", checking.interfaces))
