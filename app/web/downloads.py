@@ -1,12 +1,13 @@
-"""Downloads: exports as CSV, parts of a file, and recordings that are shared with Foxglove."""
+"""Downloads: exports as CSV, and recordings that are shared with Foxglove."""
 
 import asyncio
 import logging
-import re
+import os
 import secrets
 import time
+import weakref
 from collections import OrderedDict
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,7 +15,8 @@ from typing import Final, NamedTuple
 from urllib.parse import urlencode
 
 from fastapi import Request
-from fastapi.responses import Response, StreamingResponse
+from fastapi.responses import FileResponse, Response
+from starlette.datastructures import MutableHeaders
 from starlette.types import Message, Receive, Scope, Send
 
 from app.system.errors import LogError
@@ -99,56 +101,12 @@ async def _send_in_time(send: Send, message: Message) -> None:
         await send(message)
 
 
-# Ranges of a file in memory (RFC 9110, 14): the answer to a GET with or without a `Range`.
-
-PIECE: Final = 256_000  # bytes sent at once
-RANGE: Final = re.compile(r"bytes=[ \t]*(?P<first>\d{0,18})-(?P<last>\d{0,18})[ \t]*")
-
-
-def ranged(request: Request, content: bytes, etag: str, headers: Mapping[str, str]) -> Response:
-    """200 with the file, 206 with the range that is asked for, 416 where the file has none of it.
-    Several ranges and what is not a range are answered with the whole file, as is a range of another
-    version (`If-Range`)."""
-    size = len(content)
-    headers = {**headers, "accept-ranges": "bytes", "etag": etag}
-    wanted = RANGE.fullmatch(request.headers.get("range", ""))
-    if wanted is None or wanted[0].endswith("=-") or request.headers.get("if-range", etag) != etag:
-        return _streamed(content, 0, size, 200, headers)
-    first, end = _bounds(wanted["first"], wanted["last"], size)
-    if wanted["last"] and wanted["first"] and int(wanted["last"]) < int(wanted["first"]):
-        return _streamed(content, 0, size, 200, headers)
-    if first >= end:
-        return Response(status_code=416, headers={**headers, "content-range": f"bytes */{size}"})
-    headers["content-range"] = f"bytes {first}-{end - 1}/{size}"
-    return _streamed(content, first, end, 206, headers)
-
-
-def _bounds(first: str, last: str, size: int) -> tuple[int, int]:
-    """The first byte and the one after the last; "-500" are the last 500."""
-    if not first:
-        return max(size - int(last), 0), size
-    return int(first), min(int(last) + 1, size) if last else size
-
-
-def _streamed(
-    content: bytes, first: int, end: int, status: int, headers: Mapping[str, str]
-) -> Response:
-    """In pieces: no more is waiting for a slow client than one of them."""
-    view = memoryview(content)
-
-    async def pieces() -> AsyncIterator[memoryview]:
-        for at in range(first, end, PIECE):
-            yield view[at : min(at + PIECE, end)]
-
-    length = {"content-length": str(end - first)}
-    return StreamingResponse(pieces(), status, {**headers, **length})
-
-
 # Recordings that are shared with Foxglove for some minutes, each below an address with a secret token.
 #
 # Foxglove reads a file from another origin, without the panel's cookies: the token in the address is
 # what permits it. Recordings are in memory only and end with the server. Used on the event loop only.
 
+MCAP: Final = "application/octet-stream"  # it has no media type of its own
 VALID_S: Final = 600.0
 COUNT_MOST: Final = 3
 BYTES_MOST: Final = 64_000_000  # of all together; the newest is kept, however large it is
@@ -157,14 +115,25 @@ BROWSER: Final = "https://app.foxglove.dev/~/view"
 DESKTOP: Final = "foxglove://open"
 
 
+class MemoryFile:
+    """A file that is in memory only, as long as someone has this object."""
+
+    def __init__(self, content: bytes) -> None:
+        self._file = os.memfd_create("recording")
+        weakref.finalize(self, os.close, self._file)
+        with open(self._file, "wb", closefd=False) as file:
+            file.write(content)
+        self.path = f"/proc/self/fd/{self._file}"
+        self.size = len(content)
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class SharedRecording:
     """An MCAP file as it was at `at`; `until` is when it ends: both in seconds since the epoch. `robot`
     is the robot's id, "" on a panel with one robot; `act_id` is the act that shared it."""
 
     token: str
-    content: bytes
-    etag: str
+    file: MemoryFile
     robot: str
     act_id: str
     at: float
@@ -183,8 +152,7 @@ class SharedRecordings:
         now = time.time()
         recording = SharedRecording(
             token=secrets.token_urlsafe(TOKEN_BYTES),
-            content=content,
-            etag=f'"{secrets.token_hex(16)}"',
+            file=MemoryFile(content),
             robot=robot,
             act_id=act_id,
             at=now,
@@ -209,11 +177,29 @@ class SharedRecordings:
         return next((s for s in reversed(self._by_token.values()) if s.robot == robot), None)
 
     def _too_many(self) -> bool:
-        size = sum(len(recording.content) for recording in self._by_token.values())
+        size = sum(recording.file.size for recording in self._by_token.values())
         return len(self._by_token) > COUNT_MOST or size > BYTES_MOST
 
     def _end(self, token: str) -> None:
         self._by_token.pop(token, None)
+
+
+class SharedFile(FileResponse):
+    """The response with a recording or with ranges of it. All its answers have these headers, which a
+    page of another origin needs."""
+
+    def __init__(self, recording: SharedRecording, headers: Mapping[str, str]) -> None:
+        self._file = recording.file  # as long as it is sent
+        self._every = headers
+        super().__init__(self._file.path, media_type=MCAP)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == START:
+                MutableHeaders(scope=message).update(self._every)
+            await send(message)
+
+        await super().__call__(scope, receive, send_with_headers)
 
 
 class SharedLinks(NamedTuple):

@@ -9,12 +9,11 @@ from fastapi.responses import Response
 from app.system.errors import NotFound
 from app.system.texts import say
 from app.web.app_state import CurrentState
-from app.web.downloads import ranged
+from app.web.downloads import MCAP, SharedFile
 from app.web.requests import errors
 
 router = APIRouter()
 
-MCAP: Final = "application/octet-stream"  # it has no media type of its own
 FOXGLOVE: Final = "https://app.foxglove.dev"
 CORS: Final = {
     "access-control-allow-origin": FOXGLOVE,
@@ -67,16 +66,17 @@ async def last_minute(
     responses=errors(404)
     | {
         200: {"content": {MCAP: FILE}, "description": "the whole file"},
-        206: {"content": {MCAP: FILE}, "description": "the range of `Range`"},
+        206: {"content": {MCAP: FILE}, "description": "the ranges of `Range`"},
+        400: {"description": "`Range` has none"},
         416: {"description": "the file has nothing of the range"},
     },
 )
-async def shared_recording(request: Request, state: CurrentState, token: Token) -> Response:
+async def shared_recording(state: CurrentState, token: Token) -> Response:
     """The token in the path permits it: Foxglove has no cookie of this panel."""
     recording = state.shared.by_token(token)
     if recording is None:
         raise NotFound(say("shared_recording_ended"))
-    return ranged(request, recording.content, recording.etag, {**CORS, "content-type": MCAP})
+    return SharedFile(recording, CORS)
 
 
 @router.options("/recordings/shared/{token}.mcap", include_in_schema=False)
