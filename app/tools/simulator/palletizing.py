@@ -715,7 +715,8 @@ class PlayedPalletizing:
             case "/cell/belt_jog":
                 self.cell.jog(message.data)
             case "/cell/recipe":
-                self.cell.load_order(message.data.rpartition(" ")[2])
+                *_, order = message.data.split("; ", 4)
+                self.cell.load_order(order)
 
     def serve(self, service: str, request: Any) -> Fields:
         """The response, with a message if it is refused. A panel has words for success."""

@@ -157,10 +157,10 @@ def test_commands_by_topic_and_service_have_their_effects(robot: Stepped) -> Non
     run_until(robot, "/cell/light", True, 1)
     assert answer(robot, "/cell/pause") == (True, "")
     run_until(robot, "/cell/state", "PAUSED", 2 * CYCLE_S)
-    robot.hear("/cell/recipe", data="600 x 400 4712")
+    robot.hear("/cell/recipe", data="600 x 400; 6; true; 210; 4712 B; rush")
     robot.hear("/cell/belt_jog", data=-1.0)
     robot.run(0.2)
-    assert newest(robot, "/cell/next_order") == "4712"
+    assert newest(robot, "/cell/next_order") == "4712 B; rush"
     assert newest(robot, "/cell/mode") == "MANUAL"
     assert newest(robot, "/cell/belt_speed") == -120
     robot.hear("/cell/belt_jog", data=0.0)
