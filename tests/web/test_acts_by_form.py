@@ -37,6 +37,7 @@ required = true
 [record]
 topics = ["/air"]
 """
+PATIENT: Final = "tests.support.apps.patient:app"
 PIN: Final = "2580"
 SECRET: Final = "7391"
 RECIPE: Final = {**CARTON, "speed": 82.5}
@@ -137,7 +138,8 @@ def cell(folder: Path) -> Server:
     add_user(data, "Sato", "engineer", pin=PIN)
     add_user(data, "Mori", "viewer", pin=PIN)
     panel = panel_file(folder, PANEL + ALARM)
-    return ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
+    more: Any = {"KIOSK_DATA": str(data), "KIOSK_PANEL": str(panel), "KIOSK_MODE": "demo"}
+    return ready(Server(ROOT, app=PATIENT, **more))
 
 
 def _is_raised(server: Server) -> bool:
