@@ -6,7 +6,7 @@ docs/reference/sentences.md follow every move.
 
 import ast
 import inspect
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -48,19 +48,30 @@ def paths_table() -> str:
     """Each path of HTTP, with the function that answers."""
     rows = [("Path", "Function", "File"), ("---",) * 3]
     for path, module_nodes in nodes().items():
+        texts = _constants(modules()[path])
         for node in module_nodes:
             if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef):
-                rows += [(f"`{route}`", f"`{node.name}`", place(path)) for route in _routes(node)]
+                routes = _routes(node, texts)
+                rows += [(f"`{route}`", f"`{node.name}`", place(path)) for route in routes]
     return _markdown(sorted(rows[2:]), rows[:2])
 
 
-def _routes(function: ast.AsyncFunctionDef | ast.FunctionDef) -> Iterator[str]:
+def _constants(module: ast.Module) -> dict[str, object]:
+    """The constants of a module by their names."""
+    assigned = (node for node in module.body if isinstance(node, ast.AnnAssign))
+    return {ast.unparse(n.target): n.value.value for n in assigned if isinstance(n.value, ast.Constant)}
+
+
+def _routes(
+    function: ast.AsyncFunctionDef | ast.FunctionDef, texts: Mapping[str, object]
+) -> Iterator[str]:
+    """The paths that a function answers: each is written there, or is one of the module's `texts`."""
     for decorator in function.decorator_list:
         match decorator:
-            case ast.Call(
-                func=ast.Attribute(attr=method), args=[ast.Constant(value=str(route)), *_]
-            ) if method in METHODS and route.startswith("/"):
-                yield f"{'WebSocket' if method == 'websocket' else method.upper()} {route}"
+            case ast.Call(func=ast.Attribute(attr=method), args=[path, *_]) if method in METHODS:
+                route = path.value if isinstance(path, ast.Constant) else texts.get(ast.unparse(path))
+                if isinstance(route, str) and route.startswith("/"):
+                    yield f"{'WebSocket' if method == 'websocket' else method.upper()} {route}"
 
 
 def models_table() -> str:
