@@ -26,7 +26,7 @@ from app.cell.session.session import RobotSession, ServerParts, wire_session
 from app.cell.view.group_stops import StopOfRobot, group_stop
 from app.cell.view.kinds import Attributes
 from app.cell.view.link_status import Lamp
-from app.cell.view.overview import TileFigure, figure_now, most_urgent, sums, tile
+from app.cell.view.overview import TileFigure, Tiles, figure_now, most_urgent
 from app.cell.view.publisher import ViewPublisher
 from app.cell.view.view import NO_SHARED, SharedWidgets
 from app.panel.condition import NamedCondition
@@ -125,6 +125,11 @@ class Fleet:
         self._group_stops = {entry.id: stops_of_several(panel, entry.id) for entry in panel.robots}
         self._shown_stops: dict[str, Sequence[Attributes]] = {}  # by the robot's id
         self._has_total = any(page.total for page in panel.pages)
+        words = [state.text for state in panel.state.states] if panel.state else []
+        readout = next((entry.figure for entry in panel.robots if entry.figure), None)
+        self._overview_tiles = Tiles(words, readout)
+        self._tiles_now: Mapping[str, Attributes] | None = None  # until a robot changes
+        self._sharing = False
         self._alarm_rows: Mapping[str, AlarmRow] = {}
         self._most_urgent: Mapping[str, AlarmRow] = {}
         self.root_path = root_path
@@ -264,13 +269,20 @@ class Fleet:
         return SharedWidgets(widgets, without, controls)
 
     def share(self, robot: RobotState) -> None:
+        self._tiles_now = None
         if not (
             self._has_overview or robot.id in self._widget_robots.values() or self._stops_differ(robot)
         ):
             return
+        if not self._sharing:
+            self._sharing = True
+            asyncio.get_running_loop().call_soon(self._share)
+
+    def _share(self) -> None:
+        """Once for all robots that have changed: each change is on the pages of each robot."""
+        self._sharing = False
         for session in self.sessions:
-            if session.robot is not robot:
-                session.refresher.show_shared()
+            session.refresher.show_shared()
 
     def watched(self, robot: RobotState, widgets: Collection[str]) -> frozenset[str]:
         own = {widget for widget, name in self._widget_robots.items() if name == robot.id}
@@ -309,6 +321,9 @@ class Fleet:
 
     def _tiles(self) -> Mapping[str, Attributes]:
         """The attributes of the tile of each robot and of the line of sums, by their ids."""
+        if self._tiles_now is not None:
+            return self._tiles_now
+        made = self._overview_tiles
         figures: list[TileFigure] = []
         tiles: dict[str, Attributes] = {}
         for entry in self.panel.robots:
@@ -323,12 +338,13 @@ class Fleet:
                 self._most_urgent = most_urgent(self._alarm_rows)
             figure = str(entry.figure.id) if entry.figure else ""
             alarm = self._most_urgent.get(entry.id)
-            tiles[entry.tile_id] = tile(view, session.refresher.lamp, figure, alarm)
-        words = [state.text for state in self.panel.state.states] if self.panel.state else []
-        readout = next((entry.figure for entry in self.panel.robots if entry.figure), None)
-        return tiles | {SUMS: sums(tiles.values(), words, figures, readout)}
+            tiles[entry.tile_id] = made.tile(entry.tile_id, view, session.refresher.lamp, figure, alarm)
+        tiles[SUMS] = made.sums(tiles.values(), figures)
+        if not self._has_total:  # a figure gets old by time alone
+            self._tiles_now = tiles
+        return tiles
 
     def show_but(self, robot: RobotState) -> None:
         for session in self.sessions:
             if session.robot is not robot:
-                session.show()
+                session.refresher.refresh_next_frame()

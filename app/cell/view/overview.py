@@ -113,3 +113,33 @@ def most_urgent(rows: Mapping[str, AlarmRow]) -> dict[str, AlarmRow]:
         if row["state"] not in NOT_RAISED:
             first.setdefault(row["robot"], row)
     return first
+
+
+class Tiles:
+    """The tiles of all robots and their sums, each made again only when what it shows has changed: a
+    change of one robot is shown on the pages of all."""
+
+    def __init__(self, words: Sequence[TextLike], readout: Readout | None) -> None:
+        """`words` and `readout` as in `sums`."""
+        self._words = words
+        self._readout = readout
+        self._parts: dict[str, tuple[Any, ...]] = {}
+        self._tiles: dict[str, Attributes] = {}
+        self._summed: tuple[list[Attributes], list[TileFigure]] | None = None
+        self._sums: Attributes = {}
+
+    def tile(
+        self, name: str, view: View, lamp: Lamp, figure: str, alarm: AlarmRow | None
+    ) -> Attributes:
+        """The tile with this id; the rest as in `tile`."""
+        widgets = view["widgets"]
+        parts = (view["state"], widgets.get(MACHINE_STATE), widgets.get(figure), lamp, alarm)
+        if self._parts.get(name) != parts:
+            self._parts[name], self._tiles[name] = parts, tile(view, lamp, figure, alarm)
+        return self._tiles[name]
+
+    def sums(self, tiles: Iterable[Attributes], figures: Sequence[TileFigure]) -> Attributes:
+        summed = [*tiles], [*figures]
+        if self._summed != summed:
+            self._summed, self._sums = summed, sums(summed[0], self._words, figures, self._readout)
+        return self._sums

@@ -279,8 +279,8 @@ class ViewRefresher:
 
     def _post(self, own: ViewWithDeadlines) -> None:
         self.own = own
-        self.show_shared()
         self._sources.others.share(self._robot)
+        self.show_shared()
 
     def show_shared(self) -> None:
         """Publishes the newest view with the widgets of other robots as they are now."""
