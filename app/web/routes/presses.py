@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, WebSocket, WebSocketDisconnect
@@ -34,8 +34,7 @@ from app.system.printable import printable_texts
 from app.system.texts import TextLike, localized, say
 from app.web.answers import STATUS, ReceiptAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState, PageSession, site_of
-from app.web.caller import LONGEST_TOKEN, caller_of, confirmed
-from app.web.pages.display_choice import DisplaySettings
+from app.web.caller import LONGEST_TOKEN, Caller, caller_of, confirmed
 from app.web.pages.words import ask_of
 from app.web.requests import (
     FORM,
@@ -65,23 +64,15 @@ from app.web.route_needs import check_route
 # What a person confirms with a PIN needs scripts, as recipes do: such a form is refused.
 
 
-class Reader(NamedTuple):
-    """The language and the display choices of a browser."""
-
-    language: str
-    display: DisplaySettings
-
-
 @dataclass(frozen=True, slots=True)
 class PressForm:
     """A form that presses a widget. `fields` are its texts: of inputs, and of the page, whose names
     begin with "_"; the latter are removed as they are read. `stopped` are the robots of a press that
     stops several."""
 
-    principal: Principal
+    caller: Caller
     fields: dict[str, str] = field(repr=False)
     widget: PressCommand
-    reader: Reader
     stopped: Sequence[RobotSession] = ()
 
 
@@ -126,7 +117,7 @@ def _press_of(state: AppState, session: RobotSession, form: PressForm) -> Press[
     seen, until = fields.pop("_seen", ""), _until(fields)
     language = _language(state, form)
     inputs = session.dispatcher.parse_form(fields, language)
-    return Press(f"{page_id}.{widget.id}", widget, inputs, form.principal, seen, until)
+    return Press(f"{page_id}.{widget.id}", widget, inputs, form.caller.principal, seen, until)
 
 
 def _ask(
@@ -136,9 +127,9 @@ def _ask(
     widget = form.widget
     html = state.templates.render(
         "ask.html",
-        form.reader.language,
+        form.caller.language,
         site=state,
-        display=form.reader.display,
+        display=form.caller.display,
         panel=state.fleet.panel,
         banner=session.publisher.view["notice"]["banner"],
         question=ask_of(session, widget),
@@ -199,7 +190,7 @@ def _until(fields: dict[str, str]) -> float | None:
 def _language(state: AppState, form: PressForm) -> str:
     """The language of the page whose form this is: another page of the browser may have changed its
     language since. A program's form has the language of its request."""
-    language = form.fields.pop("_language", form.reader.language)
+    language = form.fields.pop("_language", form.caller.language)
     panel = state.fleet.panel
     if language not in (*panel.readers_languages, panel.language):
         raise InputError(f'_language: "{language:.40}" is not a language of this panel')
@@ -311,10 +302,9 @@ async def press(
         pressed = confirmed(state, caller, posted.press(command, who), posted.confirmation)
         return _answer(request, await receipt_of_press(state, session, pressed, stopped))
     if kind == FORM:
-        reader = Reader(caller.language, caller.display)
         if isinstance(command, RecipeLoad):
             raise InputError(say("recipes_need_javascript"))
-        form = PressForm(who, form_of(body), command, reader, stopped)
+        form = PressForm(caller, form_of(body), command, stopped)
         return await pressed_by_form(state, page, session, form)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
