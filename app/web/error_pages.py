@@ -37,8 +37,8 @@ def error_answer(request: Request, status: int, message: TextLike, sign_in: bool
     page = FramedPage(
         "error.html",
         say("page_failed_title"),
-        robot if robot in {entry.id for entry in site.fleet.panel.robots} else "",
-        own_path="/",
+        "/",
+        robot=robot if robot in {entry.id for entry in site.fleet.panel.robots} else "",
         status=status,
     )
     try:

@@ -125,11 +125,7 @@ class PageContext(TypedDict):
     tabs: Sequence[Page]
     page: Page
     railed: bool
-    is_log: bool
-    is_alarms: bool
-    is_diagnostics: bool
-    is_help: bool
-    is_recipes: bool
+    tab: str
     inside: Markup | None
     base: str
     robot: str
@@ -153,7 +149,6 @@ class PageContext(TypedDict):
     refused: TextLike
     back: str
     alarm_refused: TextLike
-    own_path: str
     me: SignedIn
     confirms: bool
     frame_keys: Sequence[FrameKey]
@@ -168,17 +163,10 @@ def page_context(
     who: Principal,
     refresh_s: int,
     embedded: bool = False,
-    alarms_page: str | None = None,
-    diagnostics_query: str | None = None,
-    is_help: bool = False,
-    recipes_page: str | None = None,
-    own_path: str = "",
+    framed: "FramedPage | None" = None,
 ) -> PageContext:
     """The context of a page for one request, but `inside`, which the page's own template renders.
-    `alarms_page`: the path and query of a page of the alarms, for such a page; `diagnostics_query`: the
-    query of the page of diagnostics, for that page; `is_help`: it is the page of help;
-    `recipes_page` as `alarms_page`, for recipes; `own_path`: the path of a page like that of sign-in.
-    `embedded`: it is for a frame of another page."""
+    `framed`: it is none of the panel's own. `embedded`: it is for a frame of another page."""
     publisher, rules = session.publisher, session.control.rules
     receipt = _faded(state.fleet.receipt(session, request.query_params.get("receipt", "")))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
@@ -198,19 +186,9 @@ def page_context(
         view = locked_without_scripts(publisher.for_audience(of_client), panel, page)
     display = caller_of(request).display
     embed = f"?{EMBED}=1" if embedded else ""
-    is_alarms, is_diagnostics = alarms_page is not None, diagnostics_query is not None
-    is_recipes = recipes_page is not None
-    is_other = is_alarms or is_diagnostics or is_help or is_recipes or bool(own_path)
-    is_log = page.id in FRAMES and not is_other
-    back = f"{state.root}/log" if is_log else f"{session.base}/pages/{page.id}"
-    if is_diagnostics:
-        back = f"{state.root}/diagnostics?{diagnostics_query}"
-    if is_help:
-        back = f"{state.root}/help"
-    if is_recipes:
-        back = f"{session.base}/{recipes_page}"
-    if own_path:
-        back = f"{state.root}{own_path}"
+    back = f"{session.base}/pages/{page.id}"
+    if framed:
+        back = f"{session.base if framed.tab == 'recipes' else state.root}{framed.path}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -228,12 +206,7 @@ def page_context(
         tabs=[other for other in panel.pages if who.meets(other.needs or "")],
         page=page,
         railed=panel.has_rail or page.id in FRAMES,
-        is_log=is_log,
-        is_alarms=is_alarms,
-        is_diagnostics=is_diagnostics,
-        is_help=is_help,
-        is_recipes=is_recipes,
-        own_path=own_path,
+        tab=framed.tab if framed else "",
         me=signed_in(state, who),
         confirms=bool(confirmed_commands(panel, page)),
         frame_keys=[*frame_keys(panel, session.entry.id if session.entry else None, page.id)],
@@ -273,7 +246,7 @@ def page_context(
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
         refused=said_of(request.query_params.get("control", ""), [session.control_acts]),
-        back=f"{state.root}/{alarms_page}" if is_alarms else back,
+        back=back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
 
@@ -302,24 +275,18 @@ REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not b
 
 
 class FramedPage(NamedTuple):
-    """`robot` is the id of the robot whose frame is around the page, "" for that of all, which has the
-    state of the first. `alarms_page` is
-    the path and query of a page of the alarms, `diagnostics_query` the query of the diagnostics; None
-    for another page. `is_help`: it is the page of help. `vary` names the request header by which the
-    address has another content. `recipes_page` is the path and query of the page of recipes, `entries`
-    is what is entered on it. `own_path` is the path of another page, such as that of sign-in. `status`
-    is that of the answer, such as 404."""
+    """`path` is the path and query of the page, below that of its robot for recipes. `tab` is
+    the part of the panel whose scripts and style it has: "alarms", "diagnostics", "log", "recipes", ""
+    for another. `robot` is the id of the robot whose frame is around the page, "" for
+    that of all, which has the state of the first. `entries` is what is entered on it. `status` is that
+    of the answer, such as 404."""
 
     template: str
     title: Text
+    path: str
+    tab: str = ""
     robot: str = ""
-    alarms_page: str | None = None
-    diagnostics_query: str | None = None
-    is_help: bool = False
-    vary: str = ""
-    recipes_page: str | None = None
     entries: Sequence[BaseWidget] = ()
-    own_path: str = ""
     status: int = 200
 
 
@@ -341,14 +308,10 @@ def framed_page(
         Page.model_construct(None, id=page_id, title=page.title, own=own, groups=()),
         who,
         REFRESH_S,
-        alarms_page=page.alarms_page,
-        diagnostics_query=page.diagnostics_query,
-        is_help=page.is_help,
-        recipes_page=page.recipes_page,
-        own_path=page.own_path,
+        framed=page,
     )
     html = state.templates.render(page.template, caller.language, **frame, **context)
-    headers = {"cache-control": "no-store"} | ({"vary": page.vary} if page.vary else {})
+    headers = {"cache-control": "no-store", "vary": "accept"}
     return caller.with_client_cookie(HTMLResponse(html, page.status, headers), token)
 
 

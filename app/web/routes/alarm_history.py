@@ -288,8 +288,8 @@ async def page(
     shown = await state.fleet.alarms.history.read(read)
     figures = await read_figures_of(state, *form.times(now()))
     context = history_context(state.fleet.panel, form, shown, figures)
-    path = f"alarms/history?{form.address()}"
-    framed = FramedPage("alarm-history.html", word("history_title"), alarms_page=path)
+    path = f"/alarms/history?{form.address()}"
+    framed = FramedPage("alarm-history.html", word("history_title"), path, "alarms")
     return framed_page(request, state, framed, {**context, "word": word, "log_word": log_word})
 
 

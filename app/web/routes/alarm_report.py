@@ -379,8 +379,8 @@ async def report(
     )
     context = report_context(panel, form, shift, parts, at)
     query = urlencode(form.model_dump(exclude={"act"}, exclude_defaults=True))
-    path = f"alarms/report?{query}"
-    page = FramedPage("alarm-report.html", word("report_title"), alarms_page=path)
+    path = f"/alarms/report?{query}"
+    page = FramedPage("alarm-report.html", word("report_title"), path, "alarms")
     refused = said_of(form.act, [state.fleet.first.shift_acts])
     texts = {"word": word, "log_word": log_word, "refused_message": refused}
     return framed_page(request, state, page, {**context, **texts})

@@ -120,7 +120,7 @@ async def confirm_page(
         "fields": fields,
         "failed": _failure(state, subject, who, query),
     }
-    framed = FramedPage("alarm-confirm.html", word(act), own_path=f"/alarms/{alarm}/{act}/confirm")
+    framed = FramedPage("alarm-confirm.html", word(act), f"/alarms/{alarm}/{act}/confirm")
     return framed_page(request, state, framed, context)
 
 
@@ -266,9 +266,7 @@ def _with_finite(content: dict[str, Any]) -> dict[str, Any]:
 def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
     """The page of alarms, for a browser."""
     choice = query.choice()
-    page = FramedPage(
-        "alarms.html", word("title"), alarms_page=f"alarms?{choice.address()}", vary="accept"
-    )
+    page = FramedPage("alarms.html", word("title"), f"/alarms?{choice.address()}", "alarms")
     context = alarms_context(state, choice, caller_of(request).language, with_sheet=query.sheet)
     return framed_page(request, state, page, {**context, "word": word})
 

@@ -170,7 +170,7 @@ async def page(request: Request, state: CurrentState, form: Annotated[LogQuery, 
         "word": word,
         "without_control": WITHOUT_CONTROL.code,
     }
-    framed = FramedPage("log.html", say("log_page_title"), form.robot)
+    framed = FramedPage("log.html", say("log_page_title"), "/log", "log", form.robot)
     return framed_page(request, state, framed, {**context, **functions})
 
 

@@ -270,9 +270,9 @@ async def _page(
     context = diagnostics_context(
         session, survey, state.doctor, query, looked, refused, language, trips
     )
-    again = urlencode({"robot": query.robot}) if query.robot else ""
+    again = urlencode({"robot": query.robot} if query.robot else {})
     name = "_diagnostics.html" if query.part else "diagnostics.html"
-    page = FramedPage(name, word("title"), query.robot, diagnostics_query=again, vary="accept")
+    page = FramedPage(name, word("title"), f"/diagnostics?{again}", "diagnostics", query.robot)
     more = {
         "act_refused": said_of(query.act, [state.fleet.first.diagnostic_acts]),
         "mqtt": state.fleet.alarms.mqtt,

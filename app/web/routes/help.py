@@ -68,6 +68,6 @@ async def page(
     request: Request, state: CurrentState, robot: Annotated[str, Query(max_length=64)] = ""
 ) -> Response:
     shown = signs(state.fleet.panel.may_raise)
-    framed = FramedPage("help.html", say("help_title"), robot, is_help=True)
+    framed = FramedPage("help.html", say("help_title"), "/help", robot=robot)
     key = say("help_log_key", key=state.log.key) if state.log.key else ""
     return framed_page(request, state, framed, {"signs": shown, "log_key": key})

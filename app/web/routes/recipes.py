@@ -132,8 +132,8 @@ async def confirmed_edit(
         "failed": failed,
     }
     robot = session.entry.id if session.entry else ""
-    path = f"recipes/{set_id}"
-    framed = FramedPage("alarm-confirm.html", word("title"), robot, recipes_page=path)
+    path = f"/recipes/{set_id}"
+    framed = FramedPage("alarm-confirm.html", word("title"), path, "recipes", robot)
     return None, framed_page(request, state, framed, context)
 
 
@@ -279,10 +279,10 @@ async def page(
     context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
     chosen = context["chosen"]
     shown = chosen.id if chosen else ""
-    path = f"recipes/{set}?{urlencode({'recipe': shown, 'mode': context['mode']})}"
+    path = f"/recipes/{set}?{urlencode({'recipe': shown, 'mode': context['mode']})}"
     robot = session.entry.id if session.entry else ""
     entries = entries_of(book.load, context["mode"])
-    framed = FramedPage("recipes.html", word("title"), robot, recipes_page=path, entries=entries)
+    framed = FramedPage("recipes.html", word("title"), path, "recipes", robot, entries)
     question = recipe_ask(session, book.load, chosen) if chosen and book.load.asks else None
     more = {"word": word, "question": question, "comparison": None}
     return framed_page(request, state, framed, {**context, **more})
@@ -365,8 +365,8 @@ def _compared(request: Request, state: AppState, session: RobotSession, asked: I
     seen = seen_of(book, body.csv, body.decimal)
     shown = comparison(book, rows, body.csv or "", body.decimal or "", seen)
     robot = session.entry.id if session.entry else ""
-    path = f"recipes/{book.load.id}?mode=csv"
-    framed = FramedPage("recipes.html", word("title"), robot, recipes_page=path)
+    path = f"/recipes/{book.load.id}?mode=csv"
+    framed = FramedPage("recipes.html", word("title"), path, "recipes", robot)
     more = {"word": word, "question": None, "comparison": shown}
     return framed_page(request, state, framed, {**context, **more})
 

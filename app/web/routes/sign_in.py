@@ -331,7 +331,7 @@ async def page(
         "failed": _failure(state, query.refused, name, who.client),
         "words_of": sign_in_words() | {"secret_of": _title(chosen, by_password)},
     }
-    framed = FramedPage("signin.html", say("signin_sign_in"), own_path="/signin")
+    framed = FramedPage("signin.html", say("signin_sign_in"), "/signin")
     return framed_page(request, state, framed, context)
 
 

@@ -192,5 +192,5 @@ def _page(
     rules, who = state.fleet.panel.access, caller_of(request).principal
     about = (rules.groups, who, query.name, query.tokens, query.mode, said, refused, token)
     context = {**users_context(state.access, *about), "word": word}
-    page = FramedPage("users.html", word("title"), own_path="/users")
+    page = FramedPage("users.html", word("title"), "/users")
     return framed_page(request, state, page, context)
