@@ -95,6 +95,16 @@ def test_every_page_has_its_frame(signed_in: httpx.Client, page: str, language: 
     assert text.count('id="menu"') == 1
 
 
+@pytest.mark.parametrize("page", [page for page, (_, status) in PAGES.items() if status == 200])
+def test_a_choice_in_the_menu_leads_back_to_the_page(signed_in: httpx.Client, page: str) -> None:
+    path, _ = PAGES[page]
+    menu = signed_in.get(path, headers={"accept": "text/html"}).text.partition('id="menu"')[2]
+    back = re.findall(r'name="page" value="([^"]*)"', menu)[0]
+    answer = signed_in.post("/display", data={"page": back, "hand": "right"})
+    leads_to = {"/": "/pages/main", "/alarms/air/acknowledge/confirm": "/"}.get(path, path)
+    assert answer.headers["location"] == leads_to
+
+
 def test_all_pages_are_here() -> None:
     routers = (import_module(f"app.web.routes.{name}").router for name in all_modules())
     routes = [route for router in routers for route in router.routes]
