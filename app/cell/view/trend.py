@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from app.cell.robot.history import Column, History
 from app.cell.robot.state import RobotState
 from app.cell.view.displays import FieldState, field_state, is_not_finite, readout
-from app.panel.numbers import is_scaled, shown_number
+from app.panel.numbers import is_beyond_battery, is_scaled, shown_number
 from app.panel.widgets.trend import Axis, Pen, Trend
 from app.system.clock import offset_text
 from app.system.texts import TextLike, joined, say
@@ -114,10 +114,19 @@ def pen_columns(
 
 
 def scaled_columns(columns: Sequence[Column], pen: Pen) -> Sequence[Column]:
-    """Columns of a field, in the unit of its pen."""
+    """Columns of a field, in the unit of its pen. A charge that can't be one is a gap."""
     if not is_scaled(pen):
         return columns
-    return [_scaled(column, pen) for column in columns]
+    scaled: list[Column] = []
+    gap = False
+    for column in columns:
+        if is_beyond_battery(pen, column.high):
+            gap = True
+        else:
+            shown = _scaled(column, pen)
+            scaled.append(shown._replace(gap=True) if gap else shown)
+            gap = False
+    return scaled
 
 
 def _scaled(column: Column, pen: Pen) -> Column:

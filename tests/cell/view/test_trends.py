@@ -15,8 +15,8 @@ from app.cell.history.trends import TrendRecorder
 from app.cell.robot.history import Column
 from app.cell.robot.state import RobotState
 from app.cell.view.kinds import attributes_of
-from app.cell.view.trend import COLUMNS, axis_range, draw, plot, time_ticks, value_ticks
-from app.panel.widgets.trend import Trend
+from app.cell.view.trend import COLUMNS, axis_range, draw, plot, scaled_columns, time_ticks, value_ticks
+from app.panel.widgets.trend import Pen, Trend
 from app.system.texts import render
 from tests.support.builders import INTERFACES, NOW, Table, panel_of, robot_there, says
 
@@ -101,6 +101,14 @@ def test_a_line_goes_through_both_ends_of_each_column_and_over_no_gap() -> None:
     assert drawn.lines[0].y == 20.0
     assert drawn.lines[1].x is None
     assert drawn.lines[1].path == ""
+
+
+def test_a_charge_above_one_in_percent_is_a_gap() -> None:
+    keys = {"topic": "/battery", "type": "sensor_msgs/msg/BatteryState", "field": "percentage"}
+    pen = Pen.model_validate({**keys, "label": "Charge", "scale": 100, "unit": "%"})
+    sent = [Column(number, value, value, value, False) for number, value in enumerate((0.5, 87.0, 0.6))]
+    shown = [(column.number, column.last, column.gap) for column in scaled_columns(sent, pen)]
+    assert shown == [(0, 50.0, False), (2, 60.0, True)]
 
 
 def test_the_axis_holds_all_values_and_limits() -> None:
