@@ -141,6 +141,14 @@ def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: 
     assert machine.run(f"{RELEASE}/bin/python -c {shlex.quote(services)}").returncode == 0
 
 
+def test_each_template_of_the_wheel_is_compiled(wheel: Path) -> None:
+    with ZipFile(wheel) as archive:
+        names = archive.namelist()
+    templates = [name for name in names if re.fullmatch(r"app/templates/.*\.html", name)]
+    compiled = [name for name in names if name.startswith("app/compiled_templates/tmpl_")]
+    assert len(compiled) == len(templates) > 0
+
+
 def test_the_dependencies_of_the_tests_are_those_that_are_locked_for_the_panel() -> None:
     of_tests = locked.entries(ROOT / "tests/requirements.lock")
     assert len(locked.entries(locked.LOCK)) > 20
