@@ -104,6 +104,7 @@ async def test_a_map_that_can_not_be_read_replaces_the_one_before(
     assert (state.grid is not None, state.problem) == (True, "")
 
 
+@pytest.mark.long("real time")
 @in_a_loop
 async def test_a_large_map_does_not_hold_the_event_loop() -> None:
     listening, data = Listening(), payload(0, SIDE)
