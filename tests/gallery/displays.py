@@ -105,9 +105,7 @@ CAMERAS: Final = (
 MAP: Final[Table] = {"label": texts.HALL.table}
 NOWHERE: Final = {"grid": None, "pose": None, "about": ""}
 MAPS: Final = (
-    Example(
-        "waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting", topic="/map")} | NOWHERE
-    ),
+    Example("waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting")} | NOWHERE),
     Example("unreadable", "map", MAP, {"state": "unreadable", "note": say("map_empty")} | NOWHERE),
 )
 LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}

@@ -76,9 +76,7 @@ def test_recipes_of_one_robot_are_on_its_page_only(cell: Server) -> None:
     assert cell.http.post("/robots/left/widgets/forces", json={}).status_code == 404
     assert load(cell, "right", "forces", "soft@1")["outcome"] == "published"
     form = {"forces": "soft@1"}
-    back = cell.http.post("/robots/right/widgets/forces", data=form).headers["location"]
-    assert back.startswith("/robots/right/recipes/forces?recipe=soft&receipt=")
-    assert cell.http.get(back).status_code == 200
+    assert cell.http.post("/robots/right/widgets/forces", data=form).status_code == 422  # needs scripts
 
 
 def load(server: Server, robot: str, set_id: str, recipe: str) -> dict[str, str]:

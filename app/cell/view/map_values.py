@@ -36,7 +36,7 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
     if state.problem:
         return _without_map("unreadable", state.problem), math.inf
     if state.grid is None:
-        return _without_map("waiting", say("map_waiting", topic=widget.topic)), math.inf
+        return _without_map("waiting", say("map_waiting")), math.inf
     geometry = state.grid.geometry
     shown = locate(widget, robot, geometry, now)
     note = shown.note
@@ -68,14 +68,12 @@ def _by_topic(
         return ShownPose(None, mismatch.reason or "")
     reading = robot.reading(source.topic)
     if reading.fields is None:
-        return ShownPose(None, say("map_pose_waiting", topic=source.topic))
+        return ShownPose(None, say("map_pose_waiting"))
     x, y, yaw, frame = (reading.value(path) for path in source.paths)
     if str(frame).lstrip("/") != geometry.frame:
-        return ShownPose(
-            None, say("map_pose_frame", topic=source.topic, frame=frame, map=geometry.frame)
-        )
+        return ShownPose(None, say("map_pose_frame", frame=frame, map=geometry.frame))
     if yaw is None or not all(map(math.isfinite, (x, y, yaw))):
-        return ShownPose(None, say("map_pose_not_finite", topic=source.topic))
+        return ShownPose(None, say("map_pose_not_finite"))
     return _dated(Pose(x, y, yaw), reading.at, widget.max_age_s, now)
 
 

@@ -63,7 +63,7 @@ def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:
     view = session.panel.widget(widget, MapView)
     grid = session.robot.maps[session.robot.key(view.topic)].grid
     if grid is None:
-        raise NotFound(say("map_waiting", topic=view.topic))
+        raise NotFound(say("map_waiting"))
     return view, grid
 
 

@@ -70,7 +70,7 @@ def test_a_map_that_has_not_come_or_can_not_be_read_says_so() -> None:
     robot.maps["map"].grid = None
     assert (shown(panel, robot)["state"], shown(panel, robot)["note"]) == (
         "waiting",
-        "Waiting for a map on /map",
+        "Waiting for the robot's map",
     )
     robot.maps["map"].problem = "The map has no cells"
     view = shown(panel, robot)
@@ -110,7 +110,7 @@ def test_a_robot_without_a_way_to_the_map_is_not_drawn(frame: str, child: str, n
 
 def test_a_pose_may_be_that_of_a_topic() -> None:
     panel, robot = robot_with(pose=POSE)
-    assert shown(panel, robot)["note"] == "Waiting for the robot's pose on /amcl_pose"
+    assert shown(panel, robot)["note"] == "Waiting for the robot's position"
     pose_said(robot)
     view = shown(panel, robot)
     assert (view["state"], view["pose"]) == ("live", [1.5, 0.0, pytest.approx(math.pi, abs=0.01)])
@@ -119,8 +119,8 @@ def test_a_pose_may_be_that_of_a_topic() -> None:
 @pytest.mark.parametrize(
     ("frame", "x", "note"),
     [
-        ("odom", 1.0, "The pose on /amcl_pose is in the frame odom. The map is in map."),
-        ("map", math.nan, "The pose on /amcl_pose has a number that is not finite, or no rotation"),
+        ("odom", 1.0, "The robot's position is in the frame odom. The map is in map."),
+        ("map", math.nan, "The robot's position has a number that is not finite, or no rotation"),
     ],
 )
 def test_a_pose_that_is_not_on_the_map_is_not_drawn(frame: str, x: float, note: str) -> None:
