@@ -21,7 +21,7 @@ STEPS_BETWEEN_CHECKS: Final = 10_000
 
 
 class HistoryRow(NamedTuple):
-    """A transition: `at` in seconds since the epoch, `event` as in `app/cell/alarms/history.py`,
+    """A transition: `at` in seconds since the epoch, one of `EVENT_NAMES`,
     `record` as in `app/cell/alarms/records.py`, `group` in the panel's own language. `lasted_s` is the
     time since the alarm was raised, None where it was raised. `clock_back_s`: so much earlier is `at`
     than that of the transition before, as the clock was set back; 0 if it was not. `seq` gives the

@@ -19,7 +19,7 @@ from app.system.texts.text import together
 # The states of an alarm after ISA-18.2-2016 and IEC 62682, as one table.
 #
 # The table is for an alarm that is not shelved, suppressed or out of service; under one of these it
-# runs on unseen (`app/cell/alarms/states.py`).
+# runs on unseen.
 
 
 class State(StrEnum):

@@ -1,7 +1,8 @@
 """The dialect of zenoh-bridge-ros2dds: ROS 2 names ↔ Zenoh key expressions. No I/O.
 
-Everything that knows this bridge's key expressions, liveliness tokens and admin space is here, so that
-a second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1.10, tried.
+What knows this bridge's key expressions and liveliness tokens is here, and in `bridge_entities.py` its
+admin space and the QoS in a token; so a second dialect (rmw_zenoh) stands beside it.
+Source: zenoh-plugin-ros2dds 1.10, tried.
 """
 
 import re
