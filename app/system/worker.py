@@ -20,6 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
+from tempfile import TemporaryFile
 from typing import IO, Any, Final, TypeVar
 
 from app.system.errors import KioskError, os_error_text
@@ -68,7 +69,7 @@ class Worker:
     def results(self) -> Generator[Any, None, None]:
         """Starts the child; its results as they arrive. WorkerError if it fails, OSError if it can't be
         started."""
-        with _start() as process:
+        with TemporaryFile() as errors, _start(errors) as process:
             assert process.stdin is not None
             self._process = process
             try:
@@ -77,7 +78,7 @@ class Worker:
                 with suppress(BrokenPipeError):  # it has ended: the reason is read below
                     process.stdin.write(self._request)
                     process.stdin.flush()  # it stays open: its end is the end of the parent
-                yield from _results(process)
+                yield from _results(process, errors)
             finally:
                 process.kill()
                 with suppress(BrokenPipeError):
@@ -95,28 +96,29 @@ class _PlainValues(pickle.Unpickler):
         raise pickle.UnpicklingError(f"{module}.{name} is not a plain value")
 
 
-def _start() -> "subprocess.Popen[bytes]":
+def _start(errors: IO[bytes]) -> "subprocess.Popen[bytes]":
+    """`errors` takes what the child writes to stderr: a pipe that no one reads would stop it."""
     path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
     return subprocess.Popen(
         COMMAND,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=errors,
         env={**os.environ, "PYTHONPATH": path},
         start_new_session=True,  # signals of the server's terminal do not reach it
     )
 
 
-def _results(process: "subprocess.Popen[bytes]") -> Iterator[Any]:
+def _results(process: "subprocess.Popen[bytes]", errors: IO[bytes]) -> Iterator[Any]:
     assert process.stdout is not None
-    assert process.stderr is not None
     while (frame := _frame(process.stdout)) is not None:
         is_result, value = frame
         if not is_result:
             raise WorkerError(value)
         yield value
     if status := process.wait():
-        output = process.stderr.read(MAX_OUTPUT).decode(errors="replace").strip()
+        errors.seek(max(0, errors.seek(0, os.SEEK_END) - MAX_OUTPUT))
+        output = errors.read().decode(errors="replace").strip()
         raise WorkerError((output.splitlines() or [""])[-1], status, output)
 
 

@@ -26,7 +26,7 @@ from app.records.principal import TOKEN, Client, Principal, anonymous, new_clien
 from app.system.errors import NotFound
 from app.web.app_state import AppState
 from app.web.language import COOKIE as LANGUAGE_COOKIE
-from app.web.language import negotiated
+from app.web.language import MOST_ACCEPTED, negotiated
 from app.web.pages.display_choice import DisplaySettings, display_of
 
 # A client is known by a cookie that the server sets, and its session by another. No token is in a path.
@@ -120,8 +120,8 @@ class Caller:
         language, available = panel.language, panel.readers_languages
         if len(available) > 1:
             chosen, accepted = (
-                self.cookies.get(LANGUAGE_COOKIE, ""),
-                self.headers.get("accept-language", ""),
+                self.cookies.get(LANGUAGE_COOKIE, "")[:MOST_ACCEPTED],
+                self.headers.get("accept-language", "")[:MOST_ACCEPTED],
             )
             language = negotiated(chosen, accepted, available) or language
         return language

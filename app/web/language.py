@@ -19,9 +19,10 @@ _accepted: Final = re.compile(
 
 @lru_cache(maxsize=256)
 def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
-    """The available language that fits best; "" if none does."""
+    """The available language that fits best; "" if none does. `chosen` and `accepted` are kept: cut
+    them to `MOST_ACCEPTED`."""
     by_name = {tag.lower(): tag for tag in available}
-    preferred = [*([chosen] if chosen else []), *_preferred(accepted[:MOST_ACCEPTED])]
+    preferred = [*([chosen] if chosen else []), *_preferred(accepted)]
     language = negotiate_locale(preferred, available, sep="-")
     return by_name.get((language or "").lower(), "")
 

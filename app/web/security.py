@@ -23,7 +23,9 @@ from app.web.caller import Caller, caller_in, only_shows
 from app.web.root_path import path_of
 
 # Read by the panel's own pages only.
-GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines|lock))/?")
+GUARDED: Final = re.compile(
+    r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines|lock|map(\.png|/.*)))/?"
+)
 # Asked by a browser before Foxglove reads a recording that was shared with it.
 PREFLIGHTED: Final = re.compile(r"/recordings/shared/[^/]+")
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})

@@ -128,3 +128,17 @@ def test_a_robot_that_is_not_known_is_not_drawn(tmp_path: Path, page: Page) -> N
         expect(widget(page, "hall").locator(".note")).to_contain_text(
             "No transform from map to base_link"
         )
+
+
+def test_a_map_whose_tile_does_not_come_is_not_shown_as_unknown_floor(
+    shuttle: Server, own_page: Page
+) -> None:
+    own_page.route("**/map/**", lambda route: route.abort())
+    own_page.goto(shuttle.url)
+    root = widget(own_page, "hall")
+    expect(root.locator(".broken")).to_be_visible()
+    expect(own_page.locator(".map-robot")).to_be_hidden()
+    own_page.unroute_all()
+    expect(root).to_have_attribute("data-version", VERSION)
+    expect(root.locator(".broken")).to_be_hidden()
+    expect(own_page.locator(".map-robot")).to_be_visible()

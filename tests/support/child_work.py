@@ -36,6 +36,12 @@ def end(how: str) -> Iterator[Any]:
         yield Path("/")
 
 
+def talk(count: int) -> Iterator[Any]:
+    """Writes so many bytes to stderr."""
+    os.write(2, b"w" * count)
+    yield "done"
+
+
 def own_pid(file: Path) -> Iterator[Any]:
     """Writes the child's id, then waits for its end."""
     file.write_text(str(os.getpid()))

@@ -17,7 +17,7 @@ from app.system.worker import Limits, Worker, WorkerError, Workers
 from tests.support.parts import ROOT, until
 
 WORK: Final = "tests.support.child_work:"
-LIMITS: Final = Limits(within_s=0.5, memory=50_000_000)
+MEMORY: Final = 50_000_000
 VALUES: Final = (None, True, 2**70, 0.5, "é\n", b"\0" * 100_000, [1, ("a",)], {"a": [b"b"]})
 
 
@@ -44,12 +44,17 @@ def test_plain_values_arrive_one_by_one_and_what_is_printed_is_none() -> None:
     ],
 )
 def test_each_failure_comes_after_the_results_before_it(how: str, reason: str, ended_with: int) -> None:
-    work = Worker(WORK + "end", how, limits=LIMITS).results()
+    limits = Limits(within_s=0.5 if how == "time" else 30.0, memory=MEMORY)
+    work = Worker(WORK + "end", how, limits=limits).results()
     results = [next(work)]
     with pytest.raises(WorkerError) as caught:
         next(work)
     assert results == [how]
     assert (str(caught.value), caught.value.ended_with) == (reason, ended_with)
+
+
+def test_a_child_that_writes_much_to_stderr_is_not_stopped_by_it() -> None:
+    assert list(Worker(WORK + "talk", 1_000_000, limits=Limits(within_s=20)).results()) == ["done"]
 
 
 def test_no_other_value_is_created() -> None:

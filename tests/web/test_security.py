@@ -13,7 +13,11 @@ from app.web.security import SECURITY_HEADERS, RequestGuard
 
 pytestmark = pytest.mark.promise("security")
 
-GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
+GUARDED = [
+    ("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events"),
+    ("GET", "/widgets/x/frame"), ("GET", "/widgets/x/map.png"),
+    ("GET", "/robots/r1/widgets/x/map/0/1-2.png"),
+]  # fmt: skip
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
 Named = Mapping[str, str] | list[tuple[str, str]]
 OWN = {"host": "localhost:8000"}

@@ -558,7 +558,7 @@ class Recorder:
         types = panel.subscriptions()
         self._channels = {
             key: Channel(f"/{key}", types[topic], interfaces.definition(types[topic]))
-            for topic in (types if rules.topics is None else rules.topics)
+            for topic in ({*types} - {*panel.maps} if rules.topics is None else rules.topics)
             for key in robot.possible_keys(topic)
         }
         self._ring = RingBuffer(max(rules.before_s, LAST_S), recordings.ring_bytes)

@@ -86,12 +86,18 @@ class Grid:
 
 @dataclass(slots=True)
 class MapState:
-    """The newest map of a topic. `wall` (seconds since the epoch) is when
-    the newest message arrived; `problem` is why that has no map, "" if it has one."""
+    """The newest map of a topic.
+
+    `wall` (seconds since the epoch) is when the newest message arrived; `problem` is why that has no
+    map, "" if it has one. `source` is the zid of the peer that sent it, None if unknown; `is_cut`: it
+    is from before the link was lost.
+    """
 
     grid: Grid | None = None
     wall: float = 0.0
     problem: TextLike = ""
+    source: str | None = None
+    is_cut: bool = False
 
 
 def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:
@@ -137,22 +143,38 @@ def tile(grid: Grid, column: int, row: int, theme: str) -> bytes:
     return _png(b"".join(lines), right - left, top - bottom, theme)
 
 
-def overview(grid: Grid, theme: str, pose: Pose | None = None, radius: float = 0.0) -> bytes:
-    """The whole map as a PNG file of at most `MAX_OVERVIEW` pixels a side: a pixel is occupied if
-    a cell of its square is. With the robot at `pose`, of this radius in metres, if that is known."""
+def reduced(grid: Grid) -> bytes:
+    """The whole map in at most `MAX_OVERVIEW` pixels a side, a byte each with the number of its colour,
+    the upper row first: a pixel is occupied if a cell of its square is."""
     from PIL import Image
 
     width, height = grid.geometry.width, grid.geometry.height
     image = Image.frombytes("L", (width, height), bytes(grid.cells).translate(COLOURS))
     image = image.transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-    factor = math.ceil(max(width, height) / MAX_OVERVIEW)
+    factor = _reduction(grid)
     if factor > 1:
         walls = image.point([255 * (colour == OCCUPIED_COLOUR) for colour in range(256)]).reduce(factor)
         image = image.resize(walls.size, Image.Resampling.NEAREST)
         image.paste(OCCUPIED_COLOUR, mask=walls.point([0] + 255 * [255]))  # no wall gets lost
+    return image.tobytes()
+
+
+def _reduction(grid: Grid) -> int:
+    """How many cells of the map a pixel of its reduced picture is wide."""
+    return math.ceil(max(grid.geometry.width, grid.geometry.height) / MAX_OVERVIEW)
+
+
+def overview(pixels: bytes, grid: Grid, theme: str, pose: Pose | None, radius: float) -> bytes:
+    """A map's reduced picture as a PNG file, with the robot at `pose`, of this radius in metres, if
+    that is known."""
+    from PIL import Image
+
+    factor = _reduction(grid)
+    size = math.ceil(grid.geometry.width / factor), math.ceil(grid.geometry.height / factor)
+    image = Image.frombytes("L", size, pixels)
     if pose is not None:
         _draw_robot(image, grid.geometry, pose, radius, factor)
-    return _png(image.tobytes(), *image.size, theme, is_translated=True)
+    return _png(image.tobytes(), *size, theme, is_translated=True)
 
 
 def _draw_robot(image: "Image", geometry: Geometry, pose: Pose, radius: float, factor: int) -> None:

@@ -212,12 +212,19 @@ class RobotState:
         process of the robot's, which has ended."""
         self.silent_publishers.remove_peer(peer)
         status: Literal["cut", "ended"] = "cut" if self.traits.stamped_by_peer else "ended"
+        if self.traits.stamped_by_peer:
+            self._cut_maps()
         for key, topic in self._topics.items():
             topic.forget_source(peer)
             sample = topic.sample
             if sample is not None and sample.seq < seq and sample.source in (peer, None):
                 topic.invalidate(status)
                 self.replayed.begin(key)
+
+    def _cut_maps(self) -> None:
+        self.transforms.cut(time.monotonic())
+        for state in self.maps.values():
+            state.is_cut = True
 
     def update_publishers(self, before: float = math.inf) -> None:
         """Call after every change of the graph. If a required publisher has ended, its samples (before
@@ -266,6 +273,7 @@ class RobotState:
         self.topic_publishers = TopicPublishers()
         self.replayed.begin_all()
         self.presence.clear()
+        self._cut_maps()
         for topic in self._topics.values():
             topic.invalidate()
 
@@ -288,6 +296,14 @@ class RobotState:
         if source is not None or sender is None or key not in self._condition_keys:
             return source is None or source in peers
         return sender in peers or self.graph.announces(sender, "MP", key)
+
+    def is_foreign(self, source: str | None) -> bool:
+        """Whether what came from the peer `source` is none of this robot's; not while its peers are not
+        known."""
+        peers = self.graph.every_peer
+        return (
+            self.traits.stamped_by_peer and source is not None and bool(peers) and source not in peers
+        )
 
     def peers_of(self, key: str) -> Collection[str]:
         """The zids of the peers through which a topic may come."""

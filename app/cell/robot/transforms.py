@@ -100,12 +100,14 @@ class _Frame:
     seconds), `static` the one of `/tf_static`."""
 
     parent: str
+    is_cut: bool = False  # it is from before the link was lost
     static: Transform | None = None
     at: float = -math.inf
     stamps: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))
     transforms: deque[Transform] = field(default_factory=lambda: deque(maxlen=KEPT))
 
-    def add(self, stamp: float, transform: Transform) -> None:
+    def add(self, stamp: float, transform: Transform, at: float) -> None:
+        """Takes one with a newer stamp: a robot whose stamps do not go on gets old."""
         if self.stamps and (
             stamp < self.stamps[-1] - BACK_S
         ):  # a recording or a simulation began again
@@ -114,6 +116,7 @@ class _Frame:
         if not self.stamps or stamp > self.stamps[-1]:
             self.stamps.append(stamp)
             self.transforms.append(transform)
+            self.at = at
         while self.stamps[-1] - self.stamps[0] > KEPT_S:
             self.stamps.popleft()
             self.transforms.popleft()
@@ -143,11 +146,13 @@ def _between(first: Transform, second: Transform, part: float) -> Transform:
 @dataclass(frozen=True, slots=True)
 class LocatedFrame:
     """`at` (monotonic seconds) is when the oldest of the transforms that move arrived, inf if none
-    moves; `stamp` is the robot's time of them, None if none moves."""
+    moves; `stamp` is the robot's time of them, None if none moves. `is_cut`: they are from before the
+    link was lost, at `at` at the latest."""
 
     pose: Pose
     at: float
     stamp: float | None
+    is_cut: bool = False
 
 
 class TransformTree:
@@ -155,6 +160,7 @@ class TransformTree:
 
     def __init__(self) -> None:
         self._frames: dict[str, _Frame] = {}
+        self._cut_at = math.inf
         self.is_full = False  # more frames came than have room
         self.problem: TextLike = ""  # the newest of a transform: two parents, or no rotation
 
@@ -166,9 +172,11 @@ class TransformTree:
         for transform in message.transforms:
             self._record(transform, at, is_static)
 
-    def clear(self) -> None:
-        """The link was lost: what was known is not valid any more."""
-        self._frames.clear()
+    def cut(self, at: float) -> None:
+        """The link was lost at `at` (monotonic seconds): what was known is where the robot was."""
+        self._cut_at = at
+        for frame in self._frames.values():
+            frame.is_cut = True
         self.is_full, self.problem = False, ""
 
     def locate(self, base: str, fixed: str) -> LocatedFrame | TextLike:
@@ -179,6 +187,9 @@ class TransformTree:
         if common is None:
             return self._missing(base, fixed, ups, downs)
         path = [*_until(ups, common), *_until(downs, common)]
+        cut = [name for name in path if self._frames[name].is_cut]
+        if 0 < len(cut) < len(path):  # the others are of another run of the robot
+            return say("transform_unknown", base=base, fixed=fixed, name=cut[0])
         moving = [frame for frame in (self._frames[name] for name in path) if frame.static is None]
         stamp = min((frame.stamps[-1] for frame in moving), default=math.inf)
         up, down = IDENTITY, IDENTITY
@@ -191,7 +202,8 @@ class TransformTree:
         if not all(map(math.isfinite, pose)):
             return say("transform_not_finite", base=base, fixed=fixed)
         at = min((frame.at for frame in moving), default=math.inf)
-        return LocatedFrame(pose, at, stamp if moving else None)
+        known = stamp if moving else None
+        return LocatedFrame(pose, min(at, self._cut_at) if cut else at, known, bool(cut))
 
     def _record(self, message: Any, at: float, is_static: bool) -> None:
         parent, child = (_name(name) for name in (message.header.frame_id, message.child_frame_id))
@@ -205,7 +217,11 @@ class TransformTree:
             self.problem = say("transform_no_rotation", child=child, parent=parent)
             return
         frame = self._frames.get(child)
+        if frame is not None and frame.is_cut:
+            frame = None
         if frame is None:
+            if len(self._frames) >= MAX_FRAMES:
+                self._frames = {name: f for name, f in self._frames.items() if not f.is_cut}
             if len(self._frames) >= MAX_FRAMES:
                 self.is_full = True
                 return
@@ -213,13 +229,12 @@ class TransformTree:
         elif frame.parent != parent:
             self.problem = say("transform_two_parents", child=child, first=frame.parent, second=parent)
             frame = self._frames[child] = _Frame(parent)
-        frame.at = at
         if is_static:
-            frame.static = Transform(place, turned)
+            frame.static, frame.at = Transform(place, turned), at
         else:
             stamp = message.header.stamp
             frame.static = None
-            frame.add(stamp.sec + stamp.nanosec / 1e9, Transform(place, turned))
+            frame.add(stamp.sec + stamp.nanosec / 1e9, Transform(place, turned), at)
 
     def _chain(self, name: str) -> Mapping[str, None]:
         """The frame and those above it, up to the root; a loop ends it."""

@@ -5,9 +5,10 @@ shows the link status of the other robots.
 """
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,9 @@ from app.system.texts import TextLike, joined, say
 
 if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
+    from app.cell.session.maps import MapPictures
+
+log = logging.getLogger("kiosk.fleet")
 
 
 # Interlocks and conditions of one robot that widgets of another robot name.
@@ -163,6 +167,13 @@ class Fleet:
         for session in self.sessions:
             session.refresher.show_shared()
 
+    @cached_property
+    def map_pictures(self) -> "MapPictures":
+        """Those of all robots: one is made at a time."""
+        from app.cell.session.maps import MapPictures
+
+        return MapPictures()
+
     async def start(self) -> None:
         """Starts all sessions. Does not wait for the robots."""
         for session in self.sessions:
@@ -282,7 +293,11 @@ class Fleet:
         """Once for all robots that have changed: each change is on the pages of each robot."""
         self._sharing = False
         for session in self.sessions:
-            session.refresher.show_shared()
+            try:
+                session.refresher.show_shared()
+            except Exception:  # its own next frame locks its page, or shows it
+                log.exception("a view of several robots was not built")
+                session.refresher.refresh_next_frame()
 
     def watched(self, robot: RobotState, widgets: Collection[str]) -> frozenset[str]:
         own = {widget for widget, name in self._widget_robots.items() if name == robot.id}

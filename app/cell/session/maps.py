@@ -1,22 +1,31 @@
-"""What the maps of one robot are drawn from: maps, read beside the event loop, and transforms."""
+"""What the maps of one robot are drawn from: maps, read beside the event loop, and transforms. And the
+pictures of maps, made one after the other."""
 
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Final
 
 from app.cell.link.peer import RobotContext
 from app.cell.robot.maps import NoMap, read_grid
+from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.cell.robot.transforms import TF, TF_STATIC, TF_TYPE
 from app.panel.widgets.map_view import MapView
 from app.ros.zenoh.sample import Sample
 from app.system.concurrency import spawn_logged
-from app.system.errors import DecodeError
+from app.system.errors import DecodeError, TooMany
+from app.system.limits import BoundedDict
+from app.system.texts import say
 
 log = logging.getLogger("kiosk.maps")
 
-PAUSE_S: Final = 0.5  # between two maps of a topic: a browser fetches all tiles of each
+PAUSE_S: Final = 0.5  # between two maps of a topic
+TILES_PER_S: Final = 30  # that a browser fetches of maps that change
+KEPT_PICTURES: Final = 256
+MAX_WAITING: Final = 128  # all tiles of a large map, for two browsers
+AGAIN_S: Final = 2
 
 
 class MapListener:
@@ -37,18 +46,26 @@ class MapListener:
 
     @property
     def keys(self) -> frozenset[str]:
-        return frozenset((*self._robot.maps, *self._static))
+        """The topics of transforms. Of a map the newest counts: it is not recorded with the others."""
+        return frozenset(self._static)
+
+    def register(self, handlers: SampleHandlers) -> None:
+        for key in self._robot.maps:
+            handlers.add(key, SampleHandler(partial(self.take_map, key)))
 
     def record_sample(self, key: str, sample: Sample) -> None:
-        """A map, or transforms."""
-        if (is_static := self._static.get(key)) is not None:
-            try:
-                message = self._interfaces.decode(TF_TYPE, bytes(sample.payload))
-            except DecodeError as error:
-                self._robot.traffic.count_undecodable(key, sample, error)
-            else:
-                self._robot.transforms.record(message, sample.at, is_static=is_static)
+        """Transforms."""
+        if self._robot.is_foreign(sample.source):
             return
+        try:
+            message = self._interfaces.decode(TF_TYPE, bytes(sample.payload))
+        except DecodeError as error:
+            self._robot.traffic.count_undecodable(key, sample, error)
+        else:
+            self._robot.transforms.record(message, sample.at, is_static=self._static[key])
+
+    def take_map(self, key: str, sample: Sample) -> None:
+        """A map; the one before it is not read if it waits."""
         self._newest[key] = sample
         if key not in self._reading:
             self._reading.add(key)
@@ -60,13 +77,16 @@ class MapListener:
             while (sample := self._newest.pop(key, None)) is not None:
                 began = time.monotonic()
                 await self._read_one(key, sample)
-                await asyncio.sleep(max(PAUSE_S, 4 * (time.monotonic() - began)))
+                grid = self._robot.maps[key].grid
+                tiles = grid.columns * grid.rows if grid is not None else 0
+                took_s = time.monotonic() - began
+                await asyncio.sleep(max(PAUSE_S, 4 * took_s, tiles / TILES_PER_S))
         finally:
             self._reading.discard(key)
 
     async def _read_one(self, key: str, sample: Sample) -> None:
         state = self._robot.maps[key]
-        state.wall = sample.wall
+        state.wall, state.source, state.is_cut = sample.wall, sample.source, False
         try:
             grid = await asyncio.to_thread(lambda: read_grid(self._interfaces, bytes(sample.payload)))
         except NoMap as error:
@@ -76,3 +96,34 @@ class MapListener:
             if before is None or before.digest != grid.digest:
                 state.grid = grid
         self._changed(key)
+
+
+class MapPictures:
+    """The newest pictures of maps. A large one takes a second and half a gigabyte: they are made one
+    after the other, whoever asks. Used on the event loop only."""
+
+    def __init__(self) -> None:
+        self._kept = BoundedDict[Hashable, bytes](KEPT_PICTURES)
+        self._making: dict[Hashable, asyncio.Task[bytes]] = {}
+        self._turn = asyncio.Semaphore(1)
+
+    async def picture(self, key: Hashable, make: Callable[[], bytes]) -> bytes:
+        """The picture with this key, made by `make` in a thread unless it is kept. TooMany if too many
+        others are asked for."""
+        if (kept := self._kept.get(key)) is not None:
+            return kept
+        making = self._making.get(key)
+        if making is None:
+            if len(self._making) >= MAX_WAITING:
+                raise TooMany(say("map_too_many"), AGAIN_S)
+            making = self._making[key] = asyncio.ensure_future(self._make(key, make))
+        return await asyncio.shield(making)
+
+    async def _make(self, key: Hashable, make: Callable[[], bytes]) -> bytes:
+        try:
+            async with self._turn:
+                picture = await asyncio.to_thread(make)
+            self._kept[key] = picture
+            return picture
+        finally:
+            del self._making[key]

@@ -368,6 +368,9 @@ def wire_session(
     )
     robot_alarms.evaluation_began.connect(published_alarms.resume)
     log_lines = LogListener(robot.log_lines, robot.namespace)
+    map_listeners = [*_map_listeners(context)]
+    for listener in map_listeners:
+        listener.register(commands.sample_handlers)
     ingest = Ingest(
         panel,
         robot,
@@ -377,7 +380,7 @@ def wire_session(
             log_lines,
             published_alarms,
             *recorders,
-            *_map_listeners(context),
+            *map_listeners,
         ],
     )
     own_line = partial(_show_own_line, robot, refresher)

@@ -79,6 +79,7 @@ WORDS: Final = (
     "map_zoom_out",
     "map_follow",
     "map_whole",
+    "map_not_loaded",
     "rosout_level",
     "rosout_node",
     "rosout_search",

@@ -1,18 +1,19 @@
 """The pictures of a map: its tiles, and the whole map with the robot for a page without scripts."""
 
-import asyncio
+import time
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
 
-from app.cell.robot.maps import Grid, overview, tile
+from app.cell.robot.maps import Grid, overview, reduced, tile
+from app.cell.robot.transforms import Pose
 from app.cell.session.session import RobotSession
-from app.cell.view.map_values import locate
+from app.cell.view.map_values import map_view
 from app.panel.widgets.map_view import MapView
 from app.system.errors import NotFound
 from app.system.texts import say
-from app.web.app_state import CurrentSession
+from app.web.app_state import CurrentSession, CurrentState
 from app.web.requests import Described, errors
 
 router = APIRouter()
@@ -29,7 +30,7 @@ KEPT: Final = "private, max-age=31536000, immutable"  # another map has another 
     "/widgets/{widget}/map/{version}/{column}-{row}.png",
     response_class=Response,
     summary="A tile of a map: 512 cells a side, from the upper left; unknown cells are transparent",
-    responses=errors(403, 404, 422) | PNG,
+    responses=errors(403, 404, 422, 429) | PNG,
 )
 async def map_tile(
     widget: str,
@@ -37,12 +38,15 @@ async def map_tile(
     column: Place,
     row: Place,
     session: CurrentSession,
+    state: CurrentState,
     theme: Theme = "light",
 ) -> Response:
     _, grid = _grid(session, widget)
     if grid.version != version or column >= grid.columns or row >= grid.rows:
         raise NotFound(say("map_changed"))
-    picture = await asyncio.to_thread(tile, grid, column, row, theme)
+    picture = await state.fleet.map_pictures.picture(
+        (version, column, row, theme), lambda: tile(grid, column, row, theme)
+    )
     return _picture(picture, KEPT)
 
 
@@ -50,13 +54,20 @@ async def map_tile(
     "/widgets/{widget}/map.png",
     response_class=Response,
     summary="The whole map with the robot, at most 1000 pixels a side",
-    responses=errors(403, 404, 422) | PNG,
+    responses=errors(403, 404, 422, 429) | PNG,
 )
-async def map_picture(widget: str, session: CurrentSession, theme: Theme = "light") -> Response:
+async def map_picture(
+    widget: str, session: CurrentSession, state: CurrentState, theme: Theme = "light"
+) -> Response:
     view, grid = _grid(session, widget)
-    shown = locate(view, session.robot, grid.geometry, asyncio.get_running_loop().time())
-    pose = None if shown.note else shown.pose
-    return _picture(await asyncio.to_thread(overview, grid, theme, pose, view.radius), "no-store")
+    shown, _ = map_view(view, session.robot, time.monotonic())
+    pose = Pose(*shown["pose"]) if shown["state"] == "live" else None
+    pixels = await state.fleet.map_pictures.picture((grid.version, "reduced"), lambda: reduced(grid))
+    picture = await state.fleet.map_pictures.picture(
+        (grid.version, theme, pose, view.radius),
+        lambda: overview(pixels, grid, theme, pose, view.radius),
+    )
+    return _picture(picture, "no-store")
 
 
 def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:

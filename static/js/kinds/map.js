@@ -11,6 +11,7 @@ const PAN = 0.2; // of the view, by an arrow key
 const MARGIN = 0.04; // of the view, around the whole map
 const MOST_PX_PER_CELL = 24;
 const SCALE_PX = 140; // at most
+const AGAIN_MS = 3000; // until tiles that did not come are asked for again
 
 /** @type {WeakMap<HTMLElement, MapView>} */
 const views = new WeakMap();
@@ -32,10 +33,13 @@ class MapView {
   #view;
   /** @type {HTMLElement} */
   #tiles;
+  /** @type {Grid | null} */
+  #newest = null;
+  /** @type {Grid | null} */
+  #grid = null; // of the tiles that are shown: until those of the newest are there, all is drawn by these
   /** @type {HTMLElement | null} */
   #layer = null;
-  /** @type {Grid | null} */
-  #grid = null;
+  #again = 0;
   /** @type {number[] | null} */
   #pose = null;
   #perMetre = 0; // pixels
@@ -66,12 +70,9 @@ class MapView {
 
   /** @param {Grid | null} grid */
   showGrid(grid) {
-    const before = this.#grid?.version;
-    this.#grid = grid;
-    for (const key of this.#root.querySelectorAll("button")) key.disabled = !grid;
-    find(this.#root, ".map-scale").hidden = !grid;
+    const before = this.#newest?.version;
+    this.#newest = grid;
     if (grid?.version !== before) this.#load();
-    this.#draw();
   }
 
   /** @param {number[] | null} pose */
@@ -80,13 +81,11 @@ class MapView {
     this.#draw();
   }
 
-  // All tiles of a map are shown at once, in place of those before.
+  // All tiles of a map are shown at once, in place of those before. A map with a tile missing is not shown.
   async #load() {
-    const grid = this.#grid;
-    if (!grid) {
-      this.#layer = null;
-      return this.#tiles.replaceChildren();
-    }
+    clearTimeout(this.#again);
+    const grid = this.#newest;
+    if (!grid) return this.#show(null, null);
     const layer = document.createElement("div");
     const theme = document.documentElement.dataset.theme;
     const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/map/${grid.version}`;
@@ -97,11 +96,21 @@ class MapView {
         image.style.top = `${row * TILE - grid.height}px`;
         layer.append(image);
       }
-    await Promise.allSettled([...layer.querySelectorAll("img")].map((image) => image.decode()));
-    if (grid.version !== this.#grid?.version) return;
-    this.#layer = layer;
-    this.#tiles.replaceChildren(layer);
-    this.#root.dataset.version = grid.version;
+    const tiles = await Promise.allSettled([...layer.querySelectorAll("img")].map((image) => image.decode()));
+    if (grid.version !== this.#newest?.version) return;
+    const isWhole = tiles.every(({ status }) => status === "fulfilled");
+    this.#root.toggleAttribute("data-broken", !isWhole);
+    if (isWhole) this.#show(grid, layer);
+    else this.#again = setTimeout(() => this.#load(), AGAIN_MS);
+  }
+
+  /** @param {Grid | null} grid @param {HTMLElement | null} layer */
+  #show(grid, layer) {
+    [this.#grid, this.#layer] = [grid, layer];
+    this.#tiles.replaceChildren(...(layer ? [layer] : []));
+    for (const key of this.#root.querySelectorAll("button")) key.disabled = !grid;
+    find(this.#root, ".map-scale").hidden = !grid;
+    this.#root.dataset.version = grid?.version ?? "";
     this.#draw();
   }
 

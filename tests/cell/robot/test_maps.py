@@ -7,7 +7,17 @@ from typing import Any, Final
 import pytest
 from PIL import Image
 
-from app.cell.robot.maps import GRID_TYPE, MAX_CELLS, TILE, Grid, NoMap, overview, read_grid, tile
+from app.cell.robot.maps import (
+    GRID_TYPE,
+    MAX_CELLS,
+    TILE,
+    Grid,
+    NoMap,
+    overview,
+    read_grid,
+    reduced,
+    tile,
+)
 from app.cell.robot.transforms import Pose
 from app.ros.messages import load_interfaces
 from app.system.texts import Text
@@ -72,11 +82,11 @@ def test_the_picture_of_a_large_map_loses_no_wall_and_has_the_robot() -> None:
     cells = [0] * (side * side)
     cells[1500 * side : 1501 * side] = [100] * side  # one cell thick
     grid = grid_of(cells, side, side, position={"x": -75.0, "y": -75.0})
-    image = pixels(overview(grid, "light"))
+    image = pixels(overview(reduced(grid), grid, "light", None, 0.0))
     assert image.size == (1000, 1000)
     assert {colour(image, x, 499) for x in range(0, 1000, 50)} == {WALL}
     assert colour(image, 500, 250) == FREE
-    with_robot = pixels(overview(grid, "light", Pose(0.0, 37.5, 0.0), 2.0))
+    with_robot = pixels(overview(reduced(grid), grid, "light", Pose(0.0, 37.5, 0.0), 2.0))
     assert colour(with_robot, 500, 250) == WALL
 
 
@@ -84,7 +94,7 @@ def test_the_robot_stands_where_a_turned_map_has_it() -> None:
     grid = grid_of([0] * 2500, 50, 50, resolution=0.1, position={"x": 5.0, "y": 0.0},
                    orientation={"z": math.sin(math.pi / 4), "w": math.cos(math.pi / 4)})  # fmt: skip
     assert grid.geometry.origin.yaw == pytest.approx(math.pi / 2)
-    image = pixels(overview(grid, "light", Pose(4.0, 3.0, 0.0), 0.1))
+    image = pixels(overview(reduced(grid), grid, "light", Pose(4.0, 3.0, 0.0), 0.1))
     assert colour(image, 30, 39) == WALL  # 3 m along the map's first row, 1 m above it
 
 

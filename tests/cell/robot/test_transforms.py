@@ -134,3 +134,34 @@ def test_frames_and_times_are_bounded() -> None:
     assert code(tree) == "transforms_full"
     long = tree_with(*(transform("map", "base_link", number * EVERY_S) for number in range(10_000)))
     assert sum(len(frame.stamps) for frame in long._frames.values()) <= 100
+
+
+@pytest.mark.parametrize("stamp", [0.0, 96.0])
+def test_a_robot_whose_stamps_do_not_go_on_gets_old(stamp: float) -> None:
+    tree = tree_with(transform("map", "base_link", 100.0 if stamp else 0.0, x=1.0), at=10.0)
+    tree.record(
+        Message(transforms=[transform("map", "base_link", stamp, x=50.0)]), 20.0, is_static=False
+    )
+    assert (located(tree).pose.x, located(tree).at) == (1.0, 10.0)
+
+
+def test_after_a_cut_the_robot_is_where_it_was_and_a_new_run_is_not_mixed_with_the_old() -> None:
+    tree = tree_with(
+        transform("odom", "base_link", 1.0, x=2.0), static=(transform("map", "odom", x=1.0),)
+    )
+    assert not located(tree).is_cut
+    tree.cut(120.0)
+    assert (located(tree).is_cut, located(tree).pose.x, located(tree).at) == (True, 3.0, 100.0)
+    moved = transform("odom", "base_link", 1.0, x=7.0)  # the robot has begun again, not localized yet
+    tree.record(Message(transforms=[moved]), 130.0, is_static=False)
+    assert code(tree) == "transform_unknown"
+    tree.record(Message(transforms=[transform("map", "odom", x=5.0)]), 131.0, is_static=True)
+    assert (located(tree).is_cut, located(tree).pose.x) == (False, 12.0)
+
+
+def test_frames_of_before_a_cut_make_room() -> None:
+    tree = tree_with(*(transform("map", f"frame_{number}") for number in range(MAX_FRAMES + 1)))
+    tree.cut(120.0)
+    tree.record(Message(transforms=[transform("map", "base_link", x=1.0)]), 130.0, is_static=False)
+    assert located(tree).pose.x == 1.0
+    assert len(tree) == 1

@@ -1,6 +1,7 @@
 """Maps of a robot are read beside the event loop: the newest counts, and nothing piles up."""
 
 import asyncio
+import threading
 import time
 from collections.abc import Callable, Coroutine
 from functools import wraps
@@ -11,8 +12,9 @@ import pytest
 
 from app.cell.robot.maps import GRID_TYPE
 from app.cell.session import maps
-from app.cell.session.maps import MapListener
+from app.cell.session.maps import MapListener, MapPictures
 from app.ros.zenoh.sample import Sample
+from app.system.errors import TooMany
 from app.system.texts import Text
 from tests.support.builders import BRIDGE, INTERFACES, NOW, panel_of, robot_there
 
@@ -61,11 +63,11 @@ async def test_of_many_maps_the_first_and_the_newest_are_read(monkeypatch: pytes
     monkeypatch.setattr(maps, "PAUSE_S", 0.05)
     listening = Listening()
     for value in range(50):
-        listening.listener.record_sample("map", sample(payload(value), value))
+        listening.listener.take_map("map", sample(payload(value), value))
     await listening.reported(1)
     first = listening.robot.maps["map"].grid
     for value in range(50, 101):
-        listening.listener.record_sample("map", sample(payload(value), value))
+        listening.listener.take_map("map", sample(payload(value), value))
     await listening.reported(2)
     await asyncio.sleep(0.2)
     newest = listening.robot.maps["map"].grid
@@ -79,10 +81,10 @@ async def test_of_many_maps_the_first_and_the_newest_are_read(monkeypatch: pytes
 async def test_the_same_map_again_is_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(maps, "PAUSE_S", 0.0)
     listening = Listening()
-    listening.listener.record_sample("map", sample(payload(5)))
+    listening.listener.take_map("map", sample(payload(5)))
     await listening.reported(1)
     first = listening.robot.maps["map"].grid
-    listening.listener.record_sample("map", sample(payload(5), 2))
+    listening.listener.take_map("map", sample(payload(5), 2))
     await listening.reported(2)
     assert listening.robot.maps["map"].grid is first
 
@@ -94,7 +96,7 @@ async def test_a_map_that_can_not_be_read_replaces_the_one_before(
     monkeypatch.setattr(maps, "PAUSE_S", 0.0)
     listening = Listening()
     for number, data in enumerate((payload(5), b"\0\1\0\0", payload(6)), start=1):
-        listening.listener.record_sample("map", sample(data, number))
+        listening.listener.take_map("map", sample(data, number))
         await listening.reported(number)
         state = listening.robot.maps["map"]
         if number == 2:
@@ -109,7 +111,7 @@ async def test_a_map_that_can_not_be_read_replaces_the_one_before(
 async def test_a_large_map_does_not_hold_the_event_loop() -> None:
     listening, data = Listening(), payload(0, SIDE)
     longest = 0.0
-    listening.listener.record_sample("map", sample(data))
+    listening.listener.take_map("map", sample(data))
     while not listening.changed:
         began = time.monotonic()
         await asyncio.sleep(0.001)
@@ -133,5 +135,41 @@ def test_transforms_are_those_of_all_messages_and_a_broken_one_is_counted() -> N
 
 
 def test_a_map_with_a_pose_topic_does_not_read_transforms() -> None:
-    assert Listening(pose={"topic": "/pose"}).listener.keys == {"map"}
-    assert Listening().listener.keys == {"map", "tf", "tf_static"}
+    assert Listening(pose={"topic": "/pose"}).listener.keys == frozenset()
+    assert Listening().listener.keys == {"tf", "tf_static"}
+
+
+def test_transforms_of_another_session_are_not_the_robots() -> None:
+    listening = Listening()
+    way = {"translation": {"x": 1.0, "y": 0.0, "z": 0.0}, "rotation": {"w": 1.0}}
+    stamped = {"header": {"frame_id": "map"}, "child_frame_id": "base_link", "transform": way}
+    data = INTERFACES.encode(TF, {"transforms": [stamped]})
+    foreign = sample(data)._replace(source="0123456789abcdef")
+    listening.listener.record_sample("tf", foreign)
+    assert len(listening.robot.transforms) == 0
+    listening.listener.record_sample("tf", sample(data))
+    assert len(listening.robot.transforms) == 1
+
+
+@in_a_loop
+async def test_pictures_are_made_one_at_a_time_kept_and_bounded() -> None:
+    pictures, running, most = MapPictures(), 0, 0
+    goes_on = threading.Event()
+
+    def make() -> bytes:
+        nonlocal running, most
+        running += 1
+        most = max(most, running)
+        goes_on.wait(10)
+        running -= 1
+        return b"picture"
+
+    asked = [asyncio.ensure_future(pictures.picture(n % 4, make)) for n in range(12)]
+    others = [asyncio.ensure_future(pictures.picture(n, make)) for n in range(4, maps.MAX_WAITING)]
+    await asyncio.sleep(0.05)
+    with pytest.raises(TooMany):
+        await pictures.picture("one more", make)
+    goes_on.set()
+    assert await asyncio.gather(*asked, *others) == [b"picture"] * (8 + maps.MAX_WAITING)
+    assert most == 1
+    assert await pictures.picture(0, lambda: b"another") == b"picture"

