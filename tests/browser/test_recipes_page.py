@@ -118,10 +118,14 @@ def test_a_page_without_scripts_is_locked_and_says_why(cell: Server, without_scr
     page = without_scripts
     page.goto(f"{cell.url}/recipes/boxes?recipe=tray")
     expect(page.locator(LOAD)).to_be_disabled()
-    expect(page.locator(".recipe noscript")).to_have_text("Locked: recipes need JavaScript.")
+    expect(page.locator(".recipe noscript")).to_have_js_property(
+        "textContent", "Locked: recipes need JavaScript."
+    )
     page.get_by_role("link", name="Edit").click()
     expect(page.get_by_role("button", name="Save")).to_be_disabled()
-    expect(page.locator(".recipe noscript")).to_have_text("Locked: recipes need JavaScript.")
+    expect(page.locator(".recipe noscript")).to_have_js_property(
+        "textContent", "Locked: recipes need JavaScript."
+    )
 
 
 def test_axe_finds_nothing_and_nothing_is_cut_at_any_size(cell: Server, axe_page: Page) -> None:
