@@ -64,7 +64,8 @@ class Commands:
         self._calls: list[dict[str, Any]] = []
         self._readers: dict[str, Any] = {}
         self._heard_on: dict[str, list[Any]] = {}
-        self._repeated: dict[str, threading.Event] = {}  # topic → set to end it
+        # Topic → set to end it, and its thread.
+        self._repeated: dict[str, tuple[threading.Event, threading.Thread]] = {}
         self._answer_of_set_enabled = (True, "")
         self._slow_s: float | None = 1.0
         self._node.serve("/set_enabled", SetBool_Request, SetBool_Response, self._on_set_enabled)
@@ -147,7 +148,9 @@ class Commands:
         """Publishes where a frame is in another one: once, or so many times a second with the time of
         now, until the next call for the topic."""
         if (before := self._repeated.pop(topic, None)) is not None:
-            before.set()
+            ended, thread = before
+            ended.set()
+            thread.join()  # it publishes no more after this
 
         def publish() -> None:
             header = Header(Time.at(time.time_ns()), parent)
@@ -158,13 +161,15 @@ class Commands:
         publish()
         if not hz:
             return
-        ended = self._repeated[topic] = threading.Event()
+        stop = threading.Event()
 
         def repeat() -> None:
-            while not ended.wait(1 / hz):
+            while not stop.wait(1 / hz):
                 publish()
 
-        threading.Thread(target=repeat, daemon=True).start()
+        repeating = threading.Thread(target=repeat, daemon=True)
+        self._repeated[topic] = stop, repeating
+        repeating.start()
 
     def subscribers(self, topic: str) -> int:
         """How many listen to a topic, be it the action's or `/parameter_events`."""
