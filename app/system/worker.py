@@ -85,7 +85,7 @@ class Worker:
                     process.stdin.close()
 
     def kill(self) -> None:
-        """Ends the child: whoever reads its results gets a WorkerError."""
+        """Ends the child: the reader of its results gets a WorkerError."""
         self._killed = True
         if self._process is not None:
             self._process.kill()

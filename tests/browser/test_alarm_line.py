@@ -162,8 +162,7 @@ def test_nothing_moves_when_an_alarm_comes(tmp_path: Path, page: Page) -> None:
 @pytest.mark.parametrize("text_size", ["normal", "large"])
 def test_a_note_moves_nothing(tmp_path: Path, page: Page, text_size: str) -> None:
     with demo_server(tmp_path, WITH_AND_WITHOUT_NOTE) as server:
-        size = {"name": "kiosk_text_size", "value": text_size, "url": server.url}
-        page.context.add_cookies([size])  # type: ignore[list-item]
+        page.context.add_cookies([{"name": "kiosk_text_size", "value": text_size, "url": server.url}])
         page.goto(server.url)
         for kind in ("number", "lamp"):
             live, silent = (widget(page, f"{state}_{kind}") for state in ("live", "silent"))

@@ -89,15 +89,21 @@ class MapState:
     """The newest map of a topic.
 
     `wall` (seconds since the epoch) is when the newest message arrived; `problem` is why that has no
-    map, "" if it has one. `source` is the zid of the peer that sent it, None if unknown; `is_cut`: it
-    is from before the link was lost.
+    map, "" if it has one. `source` is the zid of the peer that sent it, None if unknown. `at` is when
+    it arrived, `cut_at` when the link was lost last (monotonic seconds).
     """
 
     grid: Grid | None = None
     wall: float = 0.0
     problem: TextLike = ""
     source: str | None = None
-    is_cut: bool = False
+    at: float = -math.inf
+    cut_at: float = -math.inf
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the map is from before the link was lost."""
+        return self.at < self.cut_at
 
 
 def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:

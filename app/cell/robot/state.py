@@ -222,9 +222,10 @@ class RobotState:
                 self.replayed.begin(key)
 
     def _cut_maps(self) -> None:
-        self.transforms.cut(time.monotonic())
+        now = time.monotonic()
+        self.transforms.cut(now)
         for state in self.maps.values():
-            state.is_cut = True
+            state.cut_at = now
 
     def update_publishers(self, before: float = math.inf) -> None:
         """Call after every change of the graph. If a required publisher has ended, its samples (before

@@ -86,7 +86,7 @@ class MapListener:
 
     async def _read_one(self, key: str, sample: Sample) -> None:
         state = self._robot.maps[key]
-        state.wall, state.source, state.is_cut = sample.wall, sample.source, False
+        state.wall, state.at, state.source = sample.wall, sample.at, sample.source
         try:
             grid = await asyncio.to_thread(lambda: read_grid(self._interfaces, bytes(sample.payload)))
         except NoMap as error:
@@ -100,7 +100,7 @@ class MapListener:
 
 class MapPictures:
     """The newest pictures of maps. A large one takes a second and half a gigabyte: they are made one
-    after the other, whoever asks. Used on the event loop only."""
+    after the other, for all clients. Used on the event loop only."""
 
     def __init__(self) -> None:
         self._kept = BoundedDict[Hashable, bytes](KEPT_PICTURES)

@@ -173,3 +173,12 @@ async def test_pictures_are_made_one_at_a_time_kept_and_bounded() -> None:
     assert await asyncio.gather(*asked, *others) == [b"picture"] * (8 + maps.MAX_WAITING)
     assert most == 1
     assert await pictures.picture(0, lambda: b"another") == b"picture"
+
+
+@in_a_loop
+async def test_a_map_that_waited_over_a_cut_is_of_before_it() -> None:
+    listening = Listening()
+    listening.listener.take_map("map", sample(payload(5))._replace(at=time.monotonic()))
+    listening.robot.mark_link_lost()
+    await listening.reported(1)
+    assert listening.robot.maps["map"].is_cut

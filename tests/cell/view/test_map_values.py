@@ -1,6 +1,7 @@
 """What a map shows: its geometry, where the robot is, and what is wrong."""
 
 import math
+import time
 from types import SimpleNamespace as Message
 from typing import Any, Final
 
@@ -24,7 +25,7 @@ def robot_with(frame: str = "map", **keys: Any) -> tuple[Any, RobotState]:
     robot = robot_there(panel)
     message = {"header": {"frame_id": frame}, "info": INFO, "data": [0, 100]}
     robot.maps["map"].grid = read_grid(INTERFACES, INTERFACES.encode(GRID_TYPE, message))
-    robot.maps["map"].wall = NOW
+    robot.maps["map"].wall = robot.maps["map"].at = NOW
     return panel, robot
 
 
@@ -145,7 +146,7 @@ def test_after_a_cut_the_map_is_old_until_it_comes_again() -> None:
     robot.mark_peer_lost(BRIDGE, 10)
     moved(robot, 1.0)
     assert shown(panel, robot)["state"] == "old"
-    robot.maps["map"].is_cut = False  # as the listener does with the next map
+    robot.maps["map"].at = time.monotonic()  # as the listener does with the next map
     assert shown(panel, robot)["state"] == "live"
 
 
