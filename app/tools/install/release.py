@@ -237,8 +237,8 @@ class PublicKey:
 
     @property
     def name(self) -> str:
-        """The id as minisign writes it."""
-        return self.id[::-1].hex().upper()
+        """The id as minisign writes it: a number, without zeros before it."""
+        return f"{int.from_bytes(self.id, 'little'):X}"
 
 
 @dataclass(frozen=True, slots=True)

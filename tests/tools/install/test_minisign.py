@@ -17,6 +17,7 @@ from app.tools.install.host import Host
 from app.tools.install.release import (
     PINNED,
     SIGNATURE_SUFFIX,
+    PublicKey,
     check_wheel,
     parse_keys,
     parse_signature,
@@ -72,6 +73,13 @@ def test_a_signature_of_minisign_fits(signer: Signer, wheel: Path) -> None:
     said = check(wheel, signer)
     assert said.endswith(": 0.2.0 for cell 1")
     assert said.split(": ")[0].rpartition(" ")[2] in signer.text  # the key's name in its comment
+
+
+def test_a_key_is_named_as_minisign_names_it(signer: Signer) -> None:
+    (key,) = parse_keys(signer.text, "keys")
+    begins_with_zeros = PublicKey(bytes.fromhex("0a296e989478660c"), key.key)
+    assert signer.text.splitlines()[0].endswith(f" {key.name}")
+    assert begins_with_zeros.name == "C667894986E290A"
 
 
 def test_of_several_keys_one_has_to_fit(signer: Signer, wheel: Path, tmp_path: Path) -> None:
