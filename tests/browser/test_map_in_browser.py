@@ -142,3 +142,47 @@ def test_a_map_whose_tile_does_not_come_is_not_shown_as_unknown_floor(
     expect(root).to_have_attribute("data-version", VERSION)
     expect(root.locator(".broken")).to_be_hidden()
     expect(own_page.locator(".map-robot")).to_be_visible()
+
+
+# What another script of the page does: it counts draws, and takes the first finger on the map.
+OTHER_SCRIPT: Final = """async (root) => {
+  const scripts = performance.getEntriesByType("resource");
+  const { name } = scripts.find(({ name }) => name.endsWith("/kinds/map.js"));
+  const view = (await import(name)).viewOf(root);
+  const seen = window.seen = { version: view.version, draws: 0, taken: 0, ended: 0, at: null };
+  view.onDraw(() => seen.draws++);
+  view.onPointer((event) => {
+    const point = view.pointAt(event);
+    seen.at = view.at(point.x, point.y);
+    seen.taken++;
+    return () => seen.ended++;
+  });
+}"""
+
+
+def test_another_script_can_take_a_finger_until_a_second_one_enlarges_the_map(
+    shuttle: Server, touchscreen: Page
+) -> None:
+    page = opened(touchscreen, shuttle)
+    widget(page, "hall").evaluate(OTHER_SCRIPT)
+    first, (x, y) = state(page), middle(page.locator(".map-view"))
+    box = place(page.locator(".map-view"))
+    touch = Touch(page)
+    touch.send("touchStart", (x, y))
+    touch.send("touchMove", (x + 80, y))
+    touch.send("touchEnd")
+    until(lambda: page.evaluate("seen.taken") == 1, "the script has the finger")
+    assert state(page)["left"] == pytest.approx(first["left"], abs=1)
+    touch.send("touchStart", (x - 50, y))
+    touch.send("touchStart", (x - 50, y), (x + 50, y))
+    touch.send("touchMove", (x - 100, y), (x + 100, y))
+    touch.send("touchEnd")
+    until(
+        lambda: state(page)["width"] == pytest.approx(2 * first["width"], rel=0.03),
+        "two fingers enlarge it",
+    )
+    seen = page.evaluate("seen")
+    assert (seen["taken"], seen["ended"]) == (2, 1)
+    assert seen["at"]["x"] == pytest.approx(x - 50 - box["x"], abs=1)
+    assert seen["draws"] > 0
+    assert VERSION.fullmatch(seen["version"])

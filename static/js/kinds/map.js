@@ -3,6 +3,7 @@ import { closest, find } from "../show.js";
 
 /** @typedef {{ version: string, width: number, height: number, resolution: number, x: number, y: number, yaw: number }} Grid */
 /** @typedef {{ x: number, y: number }} Point */
+/** @typedef {(event: PointerEvent) => (() => void) | null} Taker */
 
 const TILE = 512; // cells a side, as the server cuts them
 const LEAST_ROBOT_PX = 12; // its radius, however small the map
@@ -19,6 +20,10 @@ const views = new WeakMap();
 // Called for each widget of this kind.
 /** @param {HTMLElement} root */
 export const equip = (root) => views.set(root, new MapView(root));
+
+// The view of a map, for other scripts; undefined until the widget is equipped.
+/** @param {HTMLElement} root @returns {MapView | undefined} */
+export const viewOf = (root) => views.get(root);
 
 /** @type {Record<string, Show>} */
 export const show = {
@@ -50,6 +55,12 @@ class MapView {
   /** @type {Map<number, Point>} */
   #fingers = new Map();
   #frame = 0;
+  /** @type {(() => void)[]} */
+  #drawn = [];
+  /** @type {Taker[]} */
+  #takers = [];
+  /** @type {{ id: number, point: Point, end: () => void } | null} */
+  #taken = null; // the finger that another script took
 
   /** @param {HTMLElement} root */
   constructor(root) {
@@ -61,7 +72,7 @@ class MapView {
     view.addEventListener("pointerdown", (event) => this.#down(event));
     view.addEventListener("pointermove", (event) => this.#move(event));
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
-      view.addEventListener(name, (event) => this.#fingers.delete(/** @type {PointerEvent} */ (event).pointerId));
+      view.addEventListener(name, (event) => this.#up(/** @type {PointerEvent} */ (event).pointerId));
     view.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     view.addEventListener("keydown", (event) => this.#key(event));
     find(root, ".map-keys").addEventListener("click", ({ target }) => this.#do(closest(target, "button")?.dataset.do));
@@ -79,6 +90,48 @@ class MapView {
   showPose(pose) {
     this.#pose = pose;
     this.#draw();
+  }
+
+  // The version of the map that is shown, "" without one.
+  get version() {
+    return this.#grid?.version ?? "";
+  }
+
+  // `call` is called after each draw: positions in the view may be others then.
+  /** @param {() => void} call */
+  onDraw(call) {
+    this.#drawn.push(call);
+    this.#draw();
+  }
+
+  // `take` gets the "pointerdown" of a first finger. If it returns a function, the finger does not move the map, and
+  // its further events on `.map-view` are for the caller. The function is called if a second finger ends that:
+  // two move and enlarge the map.
+  /** @param {Taker} take */
+  onPointer(take) {
+    this.#takers.push(take);
+  }
+
+  // Where a point of the map's frame, in metres, is in the view, in pixels.
+  /** @param {number} x @param {number} y @returns {Point} */
+  at(x, y) {
+    const { clientWidth, clientHeight } = this.#view;
+    return {
+      x: clientWidth / 2 + this.#perMetre * (x - this.#centre.x),
+      y: clientHeight / 2 - this.#perMetre * (y - this.#centre.y),
+    };
+  }
+
+  // Where an event is in the map's frame, in metres; null without a map.
+  /** @param {PointerEvent | MouseEvent} event @returns {Point | null} */
+  pointAt(event) {
+    if (!this.#grid || !this.#perMetre) return null;
+    const { clientWidth, clientHeight } = this.#view;
+    const { x, y } = this.#point(event);
+    return {
+      x: this.#centre.x + (x - clientWidth / 2) / this.#perMetre,
+      y: this.#centre.y - (y - clientHeight / 2) / this.#perMetre,
+    };
   }
 
   // All tiles of a map are shown at once, in place of those before. A map with a tile missing is not shown.
@@ -127,13 +180,13 @@ class MapView {
     if (!grid || !this.#view.clientWidth) return;
     if (this.#isWhole) this.#fit(grid);
     if (this.#follows && this.#pose) this.#centre = { x: this.#pose[0], y: this.#pose[1] };
-    const { x, y } = this.#at(grid.x, grid.y);
+    const { x, y } = this.at(grid.x, grid.y);
     const perCell = this.#perMetre * grid.resolution;
     if (this.#layer)
       this.#layer.style.transform = `translate(${x}px, ${y}px) rotate(${-grid.yaw}rad) scale(${perCell})`;
     this.#tiles.toggleAttribute("data-large", perCell > 1);
     if (this.#pose) {
-      const place = this.#at(this.#pose[0], this.#pose[1]);
+      const place = this.at(this.#pose[0], this.#pose[1]);
       const radius = Math.max(Number(this.#root.dataset.radius) * this.#perMetre, LEAST_ROBOT_PX);
       const turn = (-this.#pose[2] * 180) / Math.PI;
       robot.setAttribute("transform", `translate(${place.x} ${place.y}) rotate(${turn}) scale(${radius})`);
@@ -141,6 +194,7 @@ class MapView {
     }
     this.#drawScale();
     find(this.#root, '[data-do="follow"]').setAttribute("aria-pressed", String(this.#follows));
+    for (const call of this.#drawn) call();
   }
 
   #drawScale() {
@@ -150,16 +204,6 @@ class MapView {
     const shown = fitting[fitting.length - 1] ?? texts[0];
     for (const text of texts) text.hidden = text !== shown;
     scale.style.width = `${Number(shown.dataset.metres) * this.#perMetre}px`;
-  }
-
-  // Where a point of the map's frame is in the view.
-  /** @param {number} x @param {number} y @returns {Point} */
-  #at(x, y) {
-    const { clientWidth, clientHeight } = this.#view;
-    return {
-      x: clientWidth / 2 + this.#perMetre * (x - this.#centre.x),
-      y: clientHeight / 2 - this.#perMetre * (y - this.#centre.y),
-    };
   }
 
   // The whole map, with a margin.
@@ -206,13 +250,33 @@ class MapView {
 
   /** @param {PointerEvent} event */
   #down(event) {
-    this.#fingers.set(event.pointerId, this.#point(event));
     this.#view.setPointerCapture(event.pointerId);
+    const [id, point] = [event.pointerId, this.#point(event)];
+    if (this.#taken) {
+      this.#fingers.set(this.#taken.id, this.#taken.point);
+      this.#taken.end();
+      this.#taken = null;
+    } else if (!this.#fingers.size) {
+      for (const take of this.#takers) {
+        const end = take(event);
+        if (!end) continue;
+        this.#taken = { id, point, end };
+        return;
+      }
+    }
+    this.#fingers.set(id, point);
+  }
+
+  /** @param {number} id */
+  #up(id) {
+    this.#fingers.delete(id);
+    if (this.#taken?.id === id) this.#taken = null;
   }
 
   // One finger moves the map, two enlarge and move it.
   /** @param {PointerEvent} event */
   #move(event) {
+    if (this.#taken?.id === event.pointerId) this.#taken.point = this.#point(event);
     const before = this.#fingers.get(event.pointerId);
     if (!before || !this.#grid) return;
     const now = this.#point(event);
