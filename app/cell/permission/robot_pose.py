@@ -1,0 +1,75 @@
+"""Where a robot is on a map, and whether that map is the robot's of now. Pure, from (widget, robot,
+time)."""
+
+import math
+from dataclasses import dataclass
+
+from app.cell.permission.verdict import topic_mismatch
+from app.cell.robot.maps import Geometry, MapState
+from app.cell.robot.state import RobotState
+from app.cell.robot.transforms import LocatedFrame, Pose
+from app.panel.shared_keys import stale_at
+from app.panel.widgets.map_view import MapView, PoseTopic
+from app.system.clock import age_changes_at, format_age, format_time
+from app.system.texts import TextLike, say
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPose:
+    """Where the robot is, or was: None if it was never seen. `note` says what is wrong, "" if it is
+    there now. `until` (monotonic seconds) is when time alone changes that."""
+
+    pose: Pose | None
+    note: TextLike = ""
+    until: float = math.inf
+
+
+def locate(widget: MapView, robot: RobotState, geometry: Geometry, now: float) -> ShownPose:
+    """Where the robot is on the map."""
+    if widget.pose is not None:
+        return _by_topic(widget, widget.pose, robot, geometry, now)
+    located = robot.transforms.locate(widget.base_frame, geometry.frame)
+    if not isinstance(located, LocatedFrame):
+        return ShownPose(None, located)
+    if located.is_cut:
+        return _old(located.pose, located.at, now)
+    return _dated(located.pose, located.at, widget.max_age_s, now)
+
+
+def _by_topic(
+    widget: MapView, source: PoseTopic, robot: RobotState, geometry: Geometry, now: float
+) -> ShownPose:
+    if mismatch := topic_mismatch("MS", source, robot):
+        return ShownPose(None, mismatch.reason or "")
+    reading = robot.reading(source.topic)
+    if reading.fields is None:
+        return ShownPose(None, say("map_pose_waiting"))
+    x, y, yaw, frame = (reading.value(path) for path in source.paths)
+    if str(frame).lstrip("/") != geometry.frame:
+        return ShownPose(None, say("map_pose_frame", frame=frame, map=geometry.frame))
+    if yaw is None or not all(map(math.isfinite, (x, y, yaw))):
+        return ShownPose(None, say("map_pose_not_finite"))
+    if reading.status == "foreign":
+        return ShownPose(None, say("readout_foreign", time=format_time(reading.wall)))
+    if reading.status in ("cut", "ended"):
+        return _old(Pose(x, y, yaw), reading.at, now)
+    return _dated(Pose(x, y, yaw), reading.at, widget.max_age_s, now)
+
+
+def _dated(pose: Pose, at: float, max_age_s: float, now: float) -> ShownPose:
+    if now < (until := stale_at(at, max_age_s)):
+        return ShownPose(pose, until=until)
+    return _old(pose, at, now)
+
+
+def _old(pose: Pose, at: float, now: float) -> ShownPose:
+    return ShownPose(pose, say("map_pose_old", age=format_age(now - at)), age_changes_at(at, now))
+
+
+def map_doubt(state: MapState, robot: RobotState) -> TextLike:
+    """Why the map may not be the robot's of now; "" if it is."""
+    if state.is_cut:
+        return say("readout_before_disconnect", time=format_time(state.wall))
+    if robot.is_foreign(state.source):
+        return say("readout_foreign", time=format_time(state.wall))
+    return ""
