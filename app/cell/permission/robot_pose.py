@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.maps import Geometry, MapState
 from app.cell.robot.state import RobotState
-from app.cell.robot.transforms import LocatedFrame, Pose
+from app.cell.robot.transforms import TF, TF_STATIC, TF_TYPE, LocatedFrame, Pose
+from app.panel.base import TopicQos
 from app.panel.shared_keys import stale_at
+from app.panel.widgets.families import TopicSource
 from app.panel.widgets.map_view import MapView, PoseTopic
 from app.system.clock import age_changes_at, format_age, format_time
 from app.system.texts import TextLike, say
@@ -30,10 +32,18 @@ def locate(widget: MapView, robot: RobotState, geometry: Geometry, now: float) -
         return _by_topic(widget, widget.pose, robot, geometry, now)
     located = robot.transforms.locate(widget.base_frame, geometry.frame)
     if not isinstance(located, LocatedFrame):
-        return ShownPose(None, located)
+        return ShownPose(None, _unread_transforms(robot) or located)
     if located.is_cut:
         return _old(located.pose, located.at, now)
     return _dated(located.pose, located.at, widget.max_age_s, now)
+
+
+def _unread_transforms(robot: RobotState) -> TextLike:
+    """Why transforms of the robot can't be received; "" if nothing is known."""
+    for topic in (TF, TF_STATIC):
+        if mismatch := topic_mismatch("MS", TopicSource(topic, TF_TYPE, TopicQos(), ()), robot):
+            return mismatch.reason or ""
+    return ""
 
 
 def _by_topic(

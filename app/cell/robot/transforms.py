@@ -9,16 +9,22 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from struct import Struct
 from typing import Any, Final, NamedTuple
 
+from app.ros.cdr.reader import ByteOrder, check_end, split_header
+from app.system.errors import DecodeError
+from app.system.limits import BoundedDict
 from app.system.texts import TextLike, say
 
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 TF, TF_STATIC = "/tf", "/tf_static"
 MAX_FRAMES: Final = 500
 MAX_FRAME_NAME: Final = 200  # characters
-KEPT: Final = 100  # transforms of a frame: two seconds at 50 Hz
+KEPT: Final = 100  # transforms of a frame: two seconds or more
 KEPT_S: Final = 10.0
+STEP_S: Final = 0.02  # between two that are kept: the newest takes the place of one before it
+PROBLEM_S: Final = 5.0  # a frame that had two parents since then may have them still
 BACK_S: Final = 5.0  # a stamp so far before the newest is of a clock that began again
 
 
@@ -60,7 +66,10 @@ class Quaternion(NamedTuple):
 
 def rotation(quaternion: Any) -> Quaternion | None:
     """A rotation of unit length from a `geometry_msgs/msg/Quaternion`; None if it is none."""
-    numbers = (quaternion.x, quaternion.y, quaternion.z, quaternion.w)
+    return _rotation((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
+
+
+def _rotation(numbers: tuple[float, ...]) -> Quaternion | None:
     length = math.hypot(*numbers)
     if not (math.isfinite(length) and length > 1e-6):
         return None
@@ -90,6 +99,63 @@ class Transform(NamedTuple):
         x, y, z = back.rotated(self.place)
         return Transform((-x, -y, -z), back)
 
+    def pose(self) -> Pose:
+        """The same in the plane."""
+        return Pose(self.place[0], self.place[1], self.turned.yaw())
+
+    def is_finite(self) -> bool:
+        return all(map(math.isfinite, (*self.place, *self.turned)))
+
+
+class StampedTransform(NamedTuple):
+    """A `geometry_msgs/msg/TransformStamped`: `stamp` in seconds, `place` in metres, `turned` as x, y,
+    z, w of its quaternion."""
+
+    parent: str
+    child: str
+    stamp: float
+    place: tuple[float, float, float]
+    turned: tuple[float, float, float, float]
+
+
+# Transforms come often: their bytes are read without an object for each part.
+_FORMS: Final[Mapping[ByteOrder, tuple[Struct, Struct, Struct]]] = {
+    order: (Struct(f"{order}I"), Struct(f"{order}iI"), Struct(f"{order}7d")) for order in ("<", ">")
+}
+
+
+def read_transforms(payload: bytes) -> list[StampedTransform]:
+    """Those of a `tf2_msgs/msg/TFMessage`; DecodeError if the bytes are none."""
+    try:
+        body, order = split_header(payload)
+        size_form, stamp_form, numbers_form = _FORMS[order]
+
+        def text(at: int) -> tuple[str, int]:
+            at += -at % 4
+            (size,), at = size_form.unpack_from(body, at), at + 4
+            end = at + size
+            if not size or end > len(body) or body[end - 1]:
+                raise ValueError(f"a text of {size} bytes at {at} is cut off or has no end")
+            return str(body[at : end - 1], "utf-8"), end
+
+        (count,), at = size_form.unpack_from(body, 0), 4
+        transforms = []
+        for _ in range(count):
+            at += -at % 4
+            sec, nanosec = stamp_form.unpack_from(body, at)
+            parent, at = text(at + stamp_form.size)
+            child, at = text(at)
+            at += -at % 8
+            numbers = numbers_form.unpack_from(body, at)
+            at += numbers_form.size
+            transforms.append(
+                StampedTransform(parent, child, sec + nanosec / 1e9, numbers[:3], numbers[3:])
+            )
+        check_end(body, at)
+    except Exception as error:  # no received bytes may stop the panel
+        raise DecodeError(f"{len(payload)} bytes are not a {TF_TYPE}: {error}") from error
+    return transforms
+
 
 IDENTITY: Final = Transform((0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
 
@@ -108,12 +174,14 @@ class _Frame:
 
     def add(self, stamp: float, transform: Transform, at: float) -> None:
         """Takes one with a newer stamp: a robot whose stamps do not go on gets old."""
-        if self.stamps and (
-            stamp < self.stamps[-1] - BACK_S
-        ):  # a recording or a simulation began again
+        # Further back, a recording or a simulation has begun again.
+        if self.stamps and stamp < self.stamps[-1] - BACK_S:
             self.stamps.clear()
             self.transforms.clear()
         if not self.stamps or stamp > self.stamps[-1]:
+            if len(self.stamps) > 1 and stamp - self.stamps[-2] < STEP_S:
+                self.stamps.pop()
+                self.transforms.pop()
             self.stamps.append(stamp)
             self.transforms.append(transform)
             self.at = at
@@ -149,10 +217,14 @@ class LocatedFrame:
     moves; `stamp` is the robot's time of them, None if none moves. `is_cut`: they are from before the
     link was lost, at `at` at the latest."""
 
-    pose: Pose
+    transform: Transform
     at: float
     stamp: float | None
     is_cut: bool = False
+
+    @property
+    def pose(self) -> Pose:
+        return self.transform.pose()
 
 
 class TransformTree:
@@ -162,14 +234,28 @@ class TransformTree:
         self._frames: dict[str, _Frame] = {}
         self._cut_at = math.inf
         self.is_full = False  # more frames came than have room
-        self.problem: TextLike = ""  # the newest of a transform: two parents, or no rotation
+        # By the child's name: what is wrong with its transforms, and when the newest such came.
+        self._problems = BoundedDict[str, tuple[TextLike, float]](MAX_FRAMES)
 
     def __len__(self) -> int:
         return len(self._frames)
 
     def record(self, message: Any, at: float, *, is_static: bool) -> None:
-        """A `tf2_msgs/msg/TFMessage` that arrived at `at` (monotonic seconds)."""
-        for transform in message.transforms:
+        """A decoded `tf2_msgs/msg/TFMessage` that arrived at `at` (monotonic seconds)."""
+        for each in message.transforms:
+            stamp, way = each.header.stamp, each.transform
+            transform = StampedTransform(
+                each.header.frame_id,
+                each.child_frame_id,
+                stamp.sec + stamp.nanosec / 1e9,
+                (way.translation.x, way.translation.y, way.translation.z),
+                (way.rotation.x, way.rotation.y, way.rotation.z, way.rotation.w),
+            )
+            self._record(transform, at, is_static)
+
+    def record_bytes(self, payload: bytes, at: float, *, is_static: bool) -> None:
+        """The same of its bytes; DecodeError if they are no such message."""
+        for transform in read_transforms(payload):
             self._record(transform, at, is_static)
 
     def cut(self, at: float) -> None:
@@ -177,11 +263,12 @@ class TransformTree:
         self._cut_at = at
         for frame in self._frames.values():
             frame.is_cut = True
-        self.is_full, self.problem = False, ""
+        self.is_full = False
+        self._problems.clear()
 
-    def locate(self, base: str, fixed: str) -> LocatedFrame | TextLike:
-        """Where the frame `base` is in the frame `fixed`, at the newest common time; or why that is not
-        known."""
+    def locate(self, base: str, fixed: str, wanted: float | None = None) -> LocatedFrame | TextLike:
+        """Where the frame `base` is in the frame `fixed`, at the newest common time, or at the robot's
+        time `wanted` if that is before it; or why that is not known."""
         ups, downs = self._chain(base), self._chain(fixed)
         common = next((name for name in ups if name in downs), None)
         if common is None:
@@ -191,34 +278,38 @@ class TransformTree:
         if 0 < len(cut) < len(path):  # the others are of another run of the robot
             return say("transform_unknown", base=base, fixed=fixed, name=cut[0])
         moving = [frame for frame in (self._frames[name] for name in path) if frame.static is None]
-        stamp = min((frame.stamps[-1] for frame in moving), default=math.inf)
+        newest = min((frame.stamps[-1] for frame in moving), default=math.inf)
+        stamp = newest if wanted is None else min(newest, wanted)
         up, down = IDENTITY, IDENTITY
         for name in _until(ups, common):
             up = self._frames[name].at_stamp(stamp).then(up)
         for name in _until(downs, common):
             down = self._frames[name].at_stamp(stamp).then(down)
-        place, turned = down.inverse().then(up)
-        pose = Pose(place[0], place[1], turned.yaw())
-        if not all(map(math.isfinite, pose)):
+        transform = down.inverse().then(up)
+        if not transform.is_finite():
             return say("transform_not_finite", base=base, fixed=fixed)
         at = min((frame.at for frame in moving), default=math.inf)
         known = stamp if moving else None
-        return LocatedFrame(pose, min(at, self._cut_at) if cut else at, known, bool(cut))
+        return LocatedFrame(transform, min(at, self._cut_at) if cut else at, known, bool(cut))
 
-    def _record(self, message: Any, at: float, is_static: bool) -> None:
-        parent, child = (_name(name) for name in (message.header.frame_id, message.child_frame_id))
-        turned = rotation(message.transform.rotation)
-        moved = message.transform.translation
-        place = (moved.x, moved.y, moved.z)
+    def _record(self, received: StampedTransform, at: float, is_static: bool) -> None:
+        parent, child = _name(received.parent), _name(received.child)
+        turned = _rotation(received.turned)
         if not parent or not child or parent == child:
-            self.problem = say("transform_no_frame", child=child, parent=parent)
+            self._problems[child] = say("transform_no_frame", child=child, parent=parent), at
             return
-        if turned is None or not all(map(math.isfinite, place)):
-            self.problem = say("transform_no_rotation", child=child, parent=parent)
+        if turned is None or not all(map(math.isfinite, received.place)):
+            self._problems[child] = say("transform_no_rotation", child=child, parent=parent), at
             return
         frame = self._frames.get(child)
         if frame is not None and frame.is_cut:
             frame = None
+        if frame is not None and frame.parent != parent:
+            two = say("transform_two_parents", child=child, first=frame.parent, second=parent)
+            self._problems[child] = two, at
+            frame = self._frames[child] = _Frame(parent)
+        elif child in self._problems and at > self._problems[child][1] + PROBLEM_S:
+            del self._problems[child]
         if frame is None:
             if len(self._frames) >= MAX_FRAMES:
                 self._frames = {name: f for name, f in self._frames.items() if not f.is_cut}
@@ -226,15 +317,12 @@ class TransformTree:
                 self.is_full = True
                 return
             frame = self._frames[child] = _Frame(parent)
-        elif frame.parent != parent:
-            self.problem = say("transform_two_parents", child=child, first=frame.parent, second=parent)
-            frame = self._frames[child] = _Frame(parent)
+        transform = Transform(received.place, turned)
         if is_static:
-            frame.static, frame.at = Transform(place, turned), at
+            frame.static, frame.at = transform, at
         else:
-            stamp = message.header.stamp
             frame.static = None
-            frame.add(stamp.sec + stamp.nanosec / 1e9, Transform(place, turned), at)
+            frame.add(received.stamp, transform, at)
 
     def _chain(self, name: str) -> Mapping[str, None]:
         """The frame and those above it, up to the root; a loop ends it."""
@@ -254,8 +342,9 @@ class TransformTree:
         known = {frame.parent for frame in self._frames.values()} | self._frames.keys()
         if self.is_full:
             return say("transforms_full", most=MAX_FRAMES)
-        if self.problem:
-            return self.problem
+        for name in (*ups, *downs):  # what ends the way, not what is wrong elsewhere
+            if name in self._problems:
+                return self._problems[name][0]
         for name in (base, fixed):
             if name not in known:
                 return say("transform_unknown", base=base, fixed=fixed, name=name)

@@ -11,7 +11,7 @@ from typing import Final
 from app.cell.link.peer import RobotContext
 from app.cell.robot.maps import NoMap, read_grid
 from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
-from app.cell.robot.transforms import TF, TF_STATIC, TF_TYPE
+from app.cell.robot.transforms import TF, TF_STATIC
 from app.panel.widgets.map_view import MapView
 from app.ros.zenoh.sample import Sample
 from app.system.concurrency import spawn_logged
@@ -57,12 +57,11 @@ class MapListener:
         """Transforms."""
         if self._robot.is_foreign(sample.source):
             return
+        transforms, is_static = self._robot.transforms, self._static[key]
         try:
-            message = self._interfaces.decode(TF_TYPE, bytes(sample.payload))
+            transforms.record_bytes(bytes(sample.payload), sample.at, is_static=is_static)
         except DecodeError as error:
             self._robot.traffic.count_undecodable(key, sample, error)
-        else:
-            self._robot.transforms.record(message, sample.at, is_static=self._static[key])
 
     def take_map(self, key: str, sample: Sample) -> None:
         """A map; the one before it is not read if it waits."""

@@ -6,8 +6,10 @@ from typing import Any, Final
 
 import pytest
 
-from app.cell.robot.transforms import MAX_FRAMES, LocatedFrame, TransformTree
+from app.cell.robot.transforms import MAX_FRAMES, PROBLEM_S, TF_TYPE, LocatedFrame, TransformTree
+from app.system.errors import DecodeError
 from app.system.texts import Text
+from tests.support.builders import INTERFACES
 
 EVERY_S: Final = 0.02
 
@@ -165,3 +167,71 @@ def test_frames_of_before_a_cut_make_room() -> None:
     tree.record(Message(transforms=[transform("map", "base_link", x=1.0)]), 130.0, is_static=False)
     assert located(tree).pose.x == 1.0
     assert len(tree) == 1
+
+
+def test_where_a_frame_was_at_a_time_of_the_robot() -> None:
+    tree = tree_with(
+        transform("map", "base_link", 10.0, x=0.0), transform("map", "base_link", 11.0, x=2.0)
+    )
+    for wanted, x in ((10.5, 1.0), (11.0, 2.0), (12.0, 2.0), (9.0, 0.0)):
+        result = tree.locate("base_link", "map", wanted)
+        assert isinstance(result, LocatedFrame)
+        assert result.pose.x == pytest.approx(x)
+        assert result.stamp == min(wanted, 11.0)
+
+
+def test_what_was_wrong_with_another_frame_is_not_why_a_way_is_missing() -> None:
+    tree = tree_with(transform("map", "odom"), transform("gripper", "finger", w=0.0))
+    assert code(tree) == "transform_unknown"
+
+
+def test_what_was_wrong_with_a_frame_is_forgotten_when_its_transforms_are_right() -> None:
+    tree = tree_with(transform("odom", "base_link", w=0.0), transform("map", "other"), at=1.0)
+    assert code(tree) == "transform_no_rotation"
+    right = Message(transforms=[transform("odom", "base_link", 1.0)])
+    tree.record(right, 2.0 + PROBLEM_S, is_static=False)
+    assert code(tree) == "transform_unconnected"
+
+
+def test_frames_that_come_more_often_than_is_shown_are_kept_for_as_long() -> None:
+    often = [transform("map", "base_link", number / 500, x=number / 500) for number in range(2_000)]
+    tree = tree_with(*often)
+    result = tree.locate("base_link", "map", 2.5)
+    assert isinstance(result, LocatedFrame)
+    assert result.pose.x == pytest.approx(2.5)
+    assert located(tree).pose.x == pytest.approx(often[-1].transform.translation.x)
+
+
+def message_of(*transforms: Any) -> bytes:
+    def fields(each: Any) -> Any:
+        nested = vars(each) if isinstance(each, Message) else None
+        return each if nested is None else {name: fields(value) for name, value in nested.items()}
+
+    return INTERFACES.encode(TF_TYPE, {"transforms": [fields(each) for each in transforms]})
+
+
+def test_bytes_are_read_as_the_message_is() -> None:
+    sent = [transform("map", "odom", 1.25, x=1.0, yaw=1.0), transform("odom", "base_link", 1.5, y=2.0)]
+    tree = TransformTree()
+    tree.record_bytes(message_of(*sent), 3.0, is_static=False)
+    decoded = tree_with(*sent, at=3.0)
+    assert located(tree) == located(decoded)
+    big = bytearray(INTERFACES.encode("std_msgs/msg/UInt32", {"data": 0}))
+    big[1] = 0  # big-endian
+    tree.record_bytes(bytes(big), 4.0, is_static=False)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        b"",
+        b"\0\1\0\0",
+        b"\0\1\0\0\xff\xff\xff\xff",
+        message_of(transform("map", "odom"))[:-8],
+        message_of(transform("map", "odom")) + bytes(16),
+        message_of(transform("map", "odom")).replace(b"map\0", b"map!"),
+    ],
+)
+def test_bytes_that_are_no_transforms_are_an_error(broken: bytes) -> None:
+    with pytest.raises(DecodeError):
+        TransformTree().record_bytes(broken, 1.0, is_static=False)

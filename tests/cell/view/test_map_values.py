@@ -10,7 +10,7 @@ import pytest
 from app.cell.robot.maps import GRID_TYPE, read_grid
 from app.cell.robot.state import RobotState, Sample
 from app.cell.view.view import build_view
-from tests.support.builders import BRIDGE, INTERFACES, NOW, panel_of, robot_there
+from tests.support.builders import BRIDGE, INTERFACES, NOW, endpoint, panel_of, robot_there
 from tests.support.words import english
 
 MAP: Final = {"id": "hall", "kind": "map", "label": "Hall", "max_age_s": 1.0}
@@ -162,3 +162,11 @@ def test_a_pose_of_another_session_is_not_drawn() -> None:
     pose_said(robot, source="0123456789abcdef")
     view = shown(panel, robot)
     assert (view["state"], view["pose"]) == ("old", None)
+
+
+def test_transforms_of_another_type_are_named() -> None:
+    panel, robot = robot_with()
+    endpoint(robot, "MP", "/tf", "std_msgs/msg/String")
+    view = shown(panel, robot)
+    assert (view["state"], view["pose"]) == ("old", None)
+    assert view["note"].startswith("/tf is std_msgs/msg/String")
