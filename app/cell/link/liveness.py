@@ -26,6 +26,7 @@ log = logging.getLogger("kiosk.pulse")
 EVERY_S: Final = 0.2  # from one query to the next
 SILENT_S: Final = 0.4  # without a reply, in addition to the network's delay
 TURN_S: Final = 0.02  # for a reply that arrived while the event loop stalled
+EARLY: Final = 0.05  # of an interval: a timer that fires this much early counts as on time
 STALLED_S: Final = 0.4  # a query this late: messages published in the meantime are not received yet
 GOOD: Final = 2  # replies in time, to queries sent after a silence: the peer's data came before them
 DELAYS_KEPT: Final = 10
@@ -70,6 +71,12 @@ class LivenessDetector:
         """Sets `silent` if the oldest query has had no reply within the limit."""
         if not self.silent and self._unanswered and now - self._unanswered[0] >= self.limit:
             self.silent, self._replied_at, self._good = True, math.inf, 0
+
+
+def until_next(now: float, every_s: float) -> float:
+    """Seconds from `now` to the next multiple of `every_s`. All that wait so wake the event loop
+    together: queries to 50 robots in one turn cost a fifth of the same queries one by one."""
+    return (math.floor(now / every_s + EARLY) + 1) * every_s - now
 
 
 class PeerLiveness:
@@ -154,9 +161,10 @@ class PeerLiveness:
             self._changed()
 
     async def _query_regularly(self) -> None:
+        loop = asyncio.get_running_loop()
         while True:
             self._query()
-            await asyncio.sleep(EVERY_S)
+            await asyncio.sleep(until_next(loop.time(), EVERY_S))
 
     def _query(self) -> "asyncio.Task[bool]":
         self.check_stall()
@@ -181,32 +189,41 @@ class PeerLiveness:
     async def _answered(self) -> bool:
         """Queries all peers once; whether they answered."""
         detector, sent_at = self._detector, self._monotonic()
-        answer = asyncio.ensure_future(self._all(self._peers))
         detector.on_query(sent_at)
-        try:
-            await asyncio.wait({answer}, timeout=detector.limit)
-            if not answer.done():
-                await asyncio.wait({answer}, timeout=TURN_S)
-            answered = answer.done() and answer.result()
-            if not answered:
-                detector.judge(self._monotonic())
-                self._publish_state()
-                answered = await answer
-        finally:
-            answer.cancel()
-        if answered:
-            replied_at = self._monotonic()
-            detector.on_reply(sent_at, replied_at)
-            self.robot.round_trips.record(replied_at - sent_at, replied_at)
+        loop = asyncio.get_running_loop()
+        late: asyncio.TimerHandle | None = None
+
+        def judge() -> None:
+            detector.judge(self._monotonic())
             self._publish_state()
-            self._on_reply(sent_at)
-        return answered
+
+        def wait_a_turn() -> None:
+            nonlocal late
+            late = loop.call_later(TURN_S, judge)
+
+        late = loop.call_later(detector.limit, wait_a_turn)
+        try:
+            answered = await self._all(self._peers)
+        finally:
+            late.cancel()
+        if not answered:
+            judge()
+            return False
+        replied_at = self._monotonic()
+        detector.on_reply(sent_at, replied_at)
+        self.robot.round_trips.record(replied_at - sent_at, replied_at)
+        self._publish_state()
+        self._on_reply(sent_at)
+        return True
 
     async def _all(self, peers: frozenset[str]) -> bool:
-        queries = (self._link.query_all(query, LONGEST_S) for query in peers)
+        queries = [self._link.query_all(query, LONGEST_S) for query in peers]
         began = self._monotonic()
         try:
-            answered = bool(peers) and all(await asyncio.gather(*queries))
+            if len(queries) == 1:  # the usual case, without a further task
+                answered = bool(await queries[0])
+            else:
+                answered = bool(peers) and all(await asyncio.gather(*queries))
         except LinkError:
             return False  # there is no session at this moment
         if peers and peers == self._peers:

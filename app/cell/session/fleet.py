@@ -28,8 +28,8 @@ from app.cell.view.group_stops import StopOfRobot, group_stop
 from app.cell.view.kinds import Attributes
 from app.cell.view.link_status import Lamp
 from app.cell.view.overview import TileFigure, Tiles, figure_now, most_urgent
-from app.cell.view.publisher import ViewPublisher
-from app.cell.view.view import NO_SHARED, SharedWidgets
+from app.cell.view.publisher import ViewPublisher, difference
+from app.cell.view.view import NO_SHARED, SharedWidgets, ViewWithDeadlines
 from app.panel.condition import NamedCondition
 from app.panel.frame_keys import stops_of_several
 from app.panel.keys import SUMS
@@ -138,6 +138,7 @@ class Fleet:
         self._most_urgent: Mapping[str, AlarmRow] = {}
         self.root_path = root_path
         self._sessions: dict[str | None, RobotSession] = {}
+        self._shared_views: dict[str | None, ViewWithDeadlines] = {}  # by the robot's id
         self.alarms = Alarms(panel)
         self.recipes = Recipes(panel)
         self.group_stops = GroupStops()
@@ -280,14 +281,31 @@ class Fleet:
         return SharedWidgets(widgets, without, controls)
 
     def share(self, robot: RobotState) -> None:
-        self._tiles_now = None
         if not (
             self._has_overview or robot.id in self._widget_robots.values() or self._stops_differ(robot)
         ):
             return
+        # Sums get old by time alone.
+        if not self._has_total and not self._differs(robot):
+            return
+        self._tiles_now = None
         if not self._sharing:
             self._sharing = True
             asyncio.get_running_loop().call_soon(self._share)
+
+    def _differs(self, robot: RobotState) -> bool:
+        """Whether what other robots show of this one has changed since this was asked the last time."""
+        session = self._sessions.get(robot.id)
+        if session is None:  # not wired yet
+            return True
+        own = session.refresher.own
+        before, self._shared_views[robot.id] = self._shared_views.get(robot.id), own
+        return (
+            before is None
+            or before.robot != own.robot
+            or before.without_control != own.without_control
+            or bool(difference(before.view, own.view))
+        )
 
     def _share(self) -> None:
         """Once for all robots that have changed: each change is on the pages of each robot."""

@@ -41,10 +41,11 @@ async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]]
             loop.call_soon_threadsafe(finish)
 
     ask(Callback(on_reply, on_end, indirect=False))
-    with suppress(TimeoutError):
-        # Not `wait_for`: that of Python 3.11 loses a cancel that comes with the end.
-        async with asyncio.timeout(timeout_s + 1):
-            await done
+    late = loop.call_later(timeout_s + 1, finish)
+    try:
+        await done
+    finally:
+        late.cancel()
     return answers, time.monotonic() < end
 
 

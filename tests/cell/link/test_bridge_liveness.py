@@ -14,6 +14,7 @@ from app.cell.link.liveness import (
     GOOD,
     LONGEST_S,
     LivenessDetector,
+    until_next,
 )
 from app.cell.permission.interlocks import link_verdict
 from app.cell.robot.state import RobotState
@@ -104,6 +105,16 @@ def test_a_loop_that_stood_still_is_no_slow_network() -> None:
     silence.on_reply(end, end + 2.0)  # no one judged in the meantime
     assert not silence.silent
     assert silence.limit < liveness.SILENT_S + 0.01
+
+
+@pytest.mark.parametrize(
+    ("now", "pause"),
+    [(10.0, 0.2), (10.05, 0.15), (10.15, 0.05), (10.199, 0.201), (10.201, 0.199)],
+)
+def test_robots_are_asked_together(now: float, pause: float) -> None:
+    """At multiples of the interval, whenever each began; a timer that fires early asks no second
+    time."""
+    assert until_next(now, 0.2) == pytest.approx(pause)
 
 
 class Line(FakeTransport):
