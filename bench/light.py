@@ -2,11 +2,13 @@
 
 The floors are `bench/peers/bare`: a page by FastAPI, Zenoh and Jinja, a press by a POST and a put,
 subscribers whose callback does nothing. Each figure is CPU time (or memory) of both in the same run, in
-turn or in the same window. Needs no bridge and no browser; with `QUICK=1` some seconds. Prints a table;
-`python -m bench light` writes it with the other results.
+turn or in the same window. The rows of the kiosk are times by the clock, with Chromium without windows
+and without a compositor; their floor is Chromium that shows a page from a file. Needs no bridge; with
+`QUICK=1` some seconds. Prints a table; `python -m bench light` writes it with the other results.
 """
 
 import json
+import math
 import os
 import statistics
 import sys
@@ -21,10 +23,21 @@ from typing import Any, Final
 
 import httpx
 
+from app.tools.kiosk.browser import FLAGS
 from bench.light_rows import ABSOLUTE, ASKED, asked
 from bench.over_zenoh import Load, OverZenoh
 from bench.parts import KIOSK_PYTHON, pss_mib
-from tests.support.parts import ROOT, SHIPPED, Process, free_port, http_client, until, zenoh_file
+from tests.support.browser.screen import HEADLESS_FLAGS, KioskScreen, evaluated
+from tests.support.parts import (
+    CHROMIUM,
+    ROOT,
+    SHIPPED,
+    Process,
+    free_port,
+    http_client,
+    until,
+    zenoh_file,
+)
 from tests.web.test_first_page import THREE
 
 QUICK: Final = bool(os.environ.get("QUICK"))
@@ -33,6 +46,7 @@ FOR_S: Final = 2.0 if QUICK else 15.0
 PRESSES: Final = 20 if QUICK else 300
 ROBOTS: Final = 5 if QUICK else 50
 SETTLE_S: Final = 2.0 if QUICK else 6.0
+STARTS: Final = 1 if QUICK else 5  # of a kiosk
 PAUSE_S: Final = 0.03  # between two presses: fewer than a client may
 BARE: Final = ROOT / "bench/peers/bare"
 TEXT: Final = "std_msgs/msg/String"
@@ -57,6 +71,19 @@ ONE_PAGE: Final = 'title = "Cell"\n[[page]]\nid = "{id}"\ntitle = "Main"\n'
 ROBOT: Final = '[[robot]]\nid = "r{n}"\nname = "R{n}"\nnamespace = "/r{n}"\n'
 
 
+# When a page was painted first, in seconds since the epoch; null before.
+PAINTED: Final = """(() => {
+  const paint = performance.getEntriesByName("first-contentful-paint")[0];
+  return paint ? (performance.timeOrigin + paint.startTime) / 1000 : null;
+})()"""
+WAITS: Final = f"document.body?.dataset.waiting === undefined ? null : {PAINTED}"
+PRESSABLE: Final = """(() => {
+  const button = document.querySelector("[data-widget=start] button");
+  const live = window.operatorPanel && operatorPanel.eventAgeMs() < 2000;
+  return live && button && !button.disabled && button.ariaDisabled !== "true";
+})()"""
+
+
 def cpu_s(pid: int) -> float:
     """The CPU time of a process and all its threads, in ns of resolution."""
     return time.clock_gettime((~pid << 3) | 2)
@@ -73,7 +100,8 @@ class Served:
         options = ["--port", str(self.port), "--log-level", "warning", "--no-access-log"]
         options += ["--app-dir", str(BARE)] if app == "app:app" else []
         command = [str(python), "-m", "uvicorn", app, *options]
-        self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=where)
+        new = {"PYTHONPATH": "", "PYTHONUNBUFFERED": "1"}  # not forked from another, as in tests
+        self.process = Process(command, {**environment, **new}, cwd=where)
         self.http = http_client(f"http://127.0.0.1:{self.port}", 20.0)
 
     def page(self) -> None:
@@ -255,6 +283,61 @@ class Bench:
             bare = stack.enter_context(self._bare(zenoh))
             return self._idle(panel, bare)
 
+    def _painted(self) -> float:
+        """Seconds from Chromium's start to a page from a file on its screen."""
+        page = self._file("page.html", "<!doctype html><title>Page</title><body>Page")
+        profile, port = self._folder / f"chromium-{time.monotonic()}", free_port()
+        began = time.time()
+        command = [str(CHROMIUM), *HEADLESS_FLAGS, f"--remote-debugging-port={port}"]
+        command += [flag for flag in FLAGS if flag != "--remote-debugging-pipe"]
+        command += [f"--user-data-dir={profile}", f"--app={page.as_uri()}"]
+        chromium = Process(command, {})
+        try:
+            look = partial(evaluated, port, PAINTED)
+            painted: float = until(look, "a page is shown", every_s=0.02)
+        finally:
+            chromium.end()
+        return painted - began
+
+    def _kiosk(self) -> tuple[float, float]:
+        """Seconds from the start of the server and the screen at once: to the waiting page on the
+        screen, and to a button that can be pressed."""
+        with ExitStack() as stack:
+            robot = OverZenoh()
+            stack.callback(robot.close)
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=self._folder)))
+            file = self._file("button.toml", ONE_PAGE.format(id="a") + BUTTON)
+            zenoh = zenoh_file(self._folder, robot.locator)
+            began, at = time.time(), time.monotonic()
+            server = stack.enter_context(self._panel(file, zenoh))
+            screen = KioskScreen(
+                f"http://127.0.0.1:{server.port}",
+                folder / "run",
+                "--compositor=none",
+                f"--panel={file}",
+            )
+            stack.callback(screen.end)
+            waited: list[float] = []
+
+            def live() -> bool:
+                if not waited and (painted := screen.evaluate(WAITS)):
+                    waited.append(painted - began)
+                return bool(screen.evaluate(PRESSABLE))
+
+            until(live, "a button can be pressed", every_s=0.02)
+            return waited[0] if waited else math.nan, time.monotonic() - at
+
+    def _kiosks(self, number: int) -> tuple[float, float]:
+        took = [(self._kiosk()[number], self._painted()) for _ in range(STARTS + 1)][1:]
+        panel, floor = zip(*took, strict=True)
+        return statistics.median(panel), statistics.median(floor)
+
+    def kiosk_waiting(self) -> tuple[float, float]:
+        return self._kiosks(0)
+
+    def kiosk_live(self) -> tuple[float, float]:
+        return self._kiosks(1)
+
 
 @contextmanager
 def watching(server: Served) -> Iterator[None]:
@@ -287,6 +370,8 @@ ROWS: Final[tuple[Row, ...]] = (
     ("memory at rest, three widgets", "MiB", Bench.memory),
     ("idle, shipped panel", "%", Bench.idle_shipped),
     ("idle, 50 robots", "%", Bench.idle_robots),
+    ("kiosk, to the waiting page", "s by the clock", Bench.kiosk_waiting),
+    ("kiosk, to a live button", "s by the clock", Bench.kiosk_live),
 )
 
 

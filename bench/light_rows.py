@@ -14,8 +14,10 @@ ASKED: Final[Mapping[str, float]] = {
     "memory at rest, three widgets": 65,
     "idle, shipped panel": 2,
     "idle, 50 robots": 4,
+    "kiosk, to the waiting page": 0.3,
+    "kiosk, to a live button": 2,
 }
-ABSOLUTE: Final = ("MiB", "%")  # units in which is asked; else a ratio to the floor
+ABSOLUTE: Final = ("MiB", "%", "s by the clock")  # units in which is asked; else a ratio to the floor
 
 
 def asked(row: Mapping[str, Any]) -> str:

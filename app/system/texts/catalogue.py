@@ -4,9 +4,10 @@ A language is a BCP 47 tag, such as "en" or "pt-BR". `msgid` is the code, `msgst
 `{name}` for a parameter. A sentence that a catalogue lacks is rendered in English.
 """
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -58,14 +59,62 @@ def renamed_codes() -> Mapping[str, str]:
 def sentences(language: str) -> Mapping[str, str]:
     """The sentences of a language by their codes; KeyError for one without a catalogue.
 
-    Read when it is first needed: Babel takes 15 ms to load, and a catalogue as long to read.
+    Read when it is first needed.
     """
     own = translations(files()[language])
     return own if language == ENGLISH else {**sentences(ENGLISH), **own}
 
 
+# Catalogues as this project writes them are read here, in 3 ms. Babel takes 20 ms to load and 12 ms for
+# each: it reads those with more in them, and says what is wrong with one.
+_STRING: Final = re.compile(r'"((?:[^"\\]|\\.)*)"')
+_ESCAPED: Final = re.compile(r"\\(.)")
+_ESCAPES: Final = {"n": "\n", "t": "\t", "r": "\r"}
+_COMMENTS: Final = ("# ", "#. ", "#: ")
+_CHARSET: Final = "charset=utf-8"
+
+
+def _plain_entries(text: str) -> dict[str, str] | None:
+    """The entries of a catalogue that has only codes, sentences and comments; None for any other."""
+    entries: list[list[str]] = [[]]  # of each the code, then the lines of its sentence, quoted
+    for line in text.split("\n"):
+        if line.startswith("msgid "):
+            entries.append([line.removeprefix("msgid ")])
+        elif line.startswith("msgstr ") and len(entries[-1]) == 1:
+            entries[-1].append(line.removeprefix("msgstr "))
+        elif line.startswith('"') and len(entries[-1]) > 1:
+            entries[-1].append(line)
+        elif line not in ("", "#") and not line.startswith(_COMMENTS):
+            return None
+    try:
+        read = {_unquoted(code): "".join(map(_unquoted, lines)) for code, *lines in entries[1:]}
+    except ValueError:
+        return None
+    if len(read) < len(entries) - 1 or _CHARSET not in read.pop("", "").lower():
+        return None
+    return {code: sentence for code, sentence in read.items() if sentence}
+
+
+def _unquoted(line: str) -> str:
+    """The text of a string in quotes; ValueError for what is not one."""
+    text = line[1:-1]
+    if len(line) > 1 and line[0] == line[-1] == '"' and '"' not in text and "\\" not in text:
+        return text
+    if not (quoted := _STRING.fullmatch(line)):
+        raise ValueError(line)
+    return _ESCAPED.sub(lambda match: _ESCAPES.get(match[1], match[1]), quoted[1])
+
+
 def translations(path: Path) -> dict[str, str]:
     """What stands in one catalogue, without what is marked as fuzzy or not translated yet."""
+    with suppress(UnicodeDecodeError):
+        if (plain := _plain_entries(path.read_text(encoding="utf-8"))) is not None:
+            return plain
+    return babel_translations(path)
+
+
+def babel_translations(path: Path) -> dict[str, str]:
+    """The same, for every catalogue of gettext."""
     from babel.messages.pofile import read_po
 
     with path.open("rb") as file:

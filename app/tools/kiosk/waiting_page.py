@@ -1,19 +1,21 @@
-"""The page that is shown until the panel server answers: `python -m app.kiosk.waiting_page PANEL FILE`.
+"""The page that is shown until the panel server answers.
 
-It is made by a process of its own, once: the catalogues need more memory than all that watches the
-screen.
+It is on the screen while the server still loads, so it reads of the panel file only the title and the
+languages, and imports nothing but Python's own library. `python -m app.kiosk.waiting_page PANEL FILE`
+writes it too, for a watcher that has run since before an update.
 """
 
 import sys
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any, Final
 
-from app.system.errors import KioskError
-from app.system.texts import render, say
-from app.system.texts.catalogue import files
+from app.system.texts.catalogue import ENGLISH, files, translations
+from app.tools.kiosk.config import TAG
 
-STYLE = """
+STYLE: Final = """
 html { background: #1b1f23; color: #fff;
   font: min(28px, 4.2vh)/1.4 "Noto Sans", "Noto Sans CJK JP", sans-serif }
 body { margin: 0 4vw; height: 100vh; display: grid; gap: 1.2em; place-content: center;
@@ -38,31 +40,60 @@ def waiting_page(title: str, languages: Sequence[str]) -> str:
 
 
 def _sentences(language: str) -> str:
-    waits, late = (
-        escape(render(say(code), language)) for code in ("kiosk_starting", "kiosk_no_response")
-    )
+    said = translations(files()[language if language in files() else ENGLISH])
+    waits, late = escape(said["kiosk_starting"]), escape(said["kiosk_no_response"])
     return f'<div lang="{language}"><p>{waits}</p><p class="late">{late}</p></div>'
 
 
 def page_of(panel: Path) -> str:
-    """The page for a panel file. One with faults, or none, is waited for in every language."""
-    from app.panel import load_panel
-
+    """The page for a panel file. One that can't be read is waited for in every language."""
     try:
-        loaded = load_panel(panel)
-        first = loaded.language
-        others = [tag for tag in loaded.readers_languages if tag != first]
-        return waiting_page(render(loaded.title, first), [first, *others])
-    except (KioskError, OSError):
+        keys = tomllib.loads(panel.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         return waiting_page("", list(files()))
+    languages = _languages(keys)
+    return waiting_page(_title(keys.get("title"), languages[0]), languages)
+
+
+def _languages(keys: Mapping[str, Any]) -> list[str]:
+    """The panel's language, then the others that a reader can choose, as `Panel.readers_languages`."""
+    first, chosen = keys.get("language", ENGLISH), keys.get("languages")
+    if not isinstance(chosen, list):
+        written = set(_languages_of_texts(keys)) or files().keys()
+        chosen = [tag for tag in files() if tag in written]
+    tags = [tag for tag in (first, *chosen) if isinstance(tag, str) and TAG.fullmatch(tag)]
+    return list(dict.fromkeys(tags)) or list(files())
+
+
+def _languages_of_texts(value: Any) -> Iterator[str]:
+    """The languages of all texts in several languages: tables whose keys are languages."""
+    if isinstance(value, list):
+        for element in value:
+            yield from _languages_of_texts(element)
+    elif isinstance(value, dict):
+        if value and value.keys() <= files().keys():
+            yield from value
+        for element in value.values():
+            yield from _languages_of_texts(element)
+
+
+def _title(title: Any, language: str) -> str:
+    """In the panel's language, else in any that it has."""
+    if isinstance(title, dict):
+        title = title.get(language) or next(iter(title.values()), "")
+    return title if isinstance(title, str) else ""
+
+
+def write_page(panel: Path, target: Path) -> None:
+    """Writes the whole page at once: the browser may be reading the one before."""
+    draft = target.with_suffix(".draft")
+    draft.write_text(page_of(panel), encoding="utf-8")
+    draft.replace(target)
 
 
 def main(arguments: Sequence[str]) -> int:
     panel, target = map(Path, arguments)
-    page = page_of(panel)
-    draft = target.with_suffix(".draft")
-    draft.write_text(page)
-    draft.replace(target)
+    write_page(panel, target)
     return 0
 
 

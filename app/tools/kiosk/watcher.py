@@ -6,9 +6,7 @@ so a watcher that hangs is restarted too, with all that it started.
 
 import asyncio
 import logging
-import os
 import shutil
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -20,10 +18,11 @@ from urllib.parse import urlsplit
 
 from app.system.errors import SettingsError
 from app.system.process.service import ServiceManager, status_line
-from app.tools.kiosk.browser import Browser, Child, DevToolsError, find_browser
+from app.tools.kiosk.browser import Browser, DevToolsError, find_browser
 from app.tools.kiosk.config import KioskConfig, panel_language
 from app.tools.kiosk.judge import Action, Judge
 from app.tools.kiosk.screen import Compositor, Night
+from app.tools.kiosk.waiting_page import write_page
 
 if TYPE_CHECKING:
     import ssl
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 # Whether the panel server answers: one small request on loopback.
 
 ANSWERS_WITHIN_S: Final = 1.0
-POLL_S: Final = 0.1
 
 
 async def server_answers(url: str, path: str = "/healthz") -> bool:
@@ -42,14 +40,6 @@ async def server_answers(url: str, path: str = "/healthz") -> bool:
             return await _status(url, path) == 200
     except (OSError, TimeoutError, ValueError):
         return False
-
-
-async def answers_within(url: str, within_s: float) -> bool:
-    """The same, of a server that may be starting."""
-    end = monotonic() + within_s
-    while not (answers := await server_answers(url)) and monotonic() < end:
-        await asyncio.sleep(POLL_S)
-    return answers
 
 
 async def _status(url: str, path: str) -> int:
@@ -83,9 +73,7 @@ def _unchecked() -> "ssl.SSLContext":
 log = logging.getLogger("kiosk.screen")
 
 LOOK_INTERVAL_S: Final = 1.0
-WAITING_INTERVAL_S: Final = 0.2  # while the panel is not shown
-# A server that starts with the machine mostly answers by then: the waiting page is not made for it.
-SERVER_STARTS_WITHIN_S: Final = 2.0
+WAITING_INTERVAL_S: Final = 0.1  # while the panel is not shown
 # From this age of the last event on the server is queried.
 YOUNG_S: Final = 2.0
 # After a start that failed, so that a missing part does not fill the machine's log.
@@ -159,8 +147,8 @@ class Watcher:
         profile = self._folder / "profile"
         if self._starts_failed:  # perhaps by what is in it
             shutil.rmtree(profile, ignore_errors=True)
-        up = await answers_within(self._config.url, SERVER_STARTS_WITHIN_S)
-        url = self._config.url if up else await self._waiting_url()
+        up = await server_answers(self._config.url)
+        url = self._config.url if up else self._waiting_url()
         flags = (*self._compositor.flags, *self._language_flags(), *self._config.flags)
         self._browser = Browser(self._program, flags, profile)
         await self._browser.start(url, self._compositor.env)
@@ -184,7 +172,7 @@ class Watcher:
         if verdict.action is Action.OPEN_PANEL:
             await browser.open(self._config.url)
         elif verdict.action is Action.OPEN_WAITING:
-            await browser.open(await self._waiting_url())
+            await browser.open(self._waiting_url())
         elif verdict.action is Action.RESTART:
             await self._stop_browser()
             await self._start_browser()
@@ -198,11 +186,10 @@ class Watcher:
         if self._browser is not None:
             await self._browser.ignore_input(ignore)
 
-    async def _waiting_url(self) -> str:
+    def _waiting_url(self) -> str:
         """The address of the waiting page, which is made when it is needed for the first time."""
         if not self._waiting.exists():
-            made = [sys.executable, "-m", "app.kiosk.waiting_page", self._config.panel]
-            await Child([*made, str(self._waiting)], os.environ).ended.wait()
+            write_page(Path(self._config.panel), self._waiting)
         return self._waiting.as_uri()
 
     def _language_flags(self) -> tuple[str, ...]:

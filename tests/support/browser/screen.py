@@ -59,23 +59,18 @@ class KioskScreen:
 
     def pages(self) -> list[dict[str, Any]]:
         """The pages that the browser has; none while it does not answer."""
-        with suppress(httpx.HTTPError):
-            return [devtool for devtool in self._devtools("list") if devtool["type"] == "page"]
-        return []
+        return pages_of(self.port)
 
     def _devtools(self, resource: str) -> Any:
-        with http_client(f"http://127.0.0.1:{self.port}", ANSWER_WITHIN_S) as http:
-            return http.get(f"/json/{resource}").json()
+        return _devtools(self.port, resource)
 
     def call(self, method: str, **params: Any) -> dict[str, Any] | None:
         """The result of a command to the page; None if it does not answer."""
-        pages = self.pages()
-        return _called(pages[0]["webSocketDebuggerUrl"], method, params) if pages else None
+        return _page_call(self.port, method, params)
 
     def evaluate(self, expression: str) -> Any:
         """The value of an expression in the page; None if the page does not answer."""
-        options = {"expression": expression, "awaitPromise": True, "returnByValue": True}
-        return ((self.call("Runtime.evaluate", **options) or {}).get("result") or {}).get("value")
+        return evaluated(self.port, expression)
 
     def lives(self) -> bool:
         """Whether exactly one page is shown, is the panel's, receives events and draws."""
@@ -108,6 +103,30 @@ class KioskScreen:
     def end(self) -> None:
         if self.process.running:
             assert self.process.end() == 0, self.process.text
+
+
+def _devtools(port: int, resource: str) -> Any:
+    with http_client(f"http://127.0.0.1:{port}", ANSWER_WITHIN_S) as http:
+        return http.get(f"/json/{resource}").json()
+
+
+def pages_of(port: int) -> list[dict[str, Any]]:
+    """The pages of the browser with this DevTools port; none while it does not answer."""
+    with suppress(httpx.HTTPError):
+        return [devtool for devtool in _devtools(port, "list") if devtool["type"] == "page"]
+    return []
+
+
+def _page_call(port: int, method: str, params: Mapping[str, Any]) -> dict[str, Any] | None:
+    pages = pages_of(port)
+    return _called(pages[0]["webSocketDebuggerUrl"], method, params) if pages else None
+
+
+def evaluated(port: int, expression: str) -> Any:
+    """The value of an expression in the page of the browser with this DevTools port; None if the page
+    does not answer."""
+    options = {"expression": expression, "awaitPromise": True, "returnByValue": True}
+    return ((_page_call(port, "Runtime.evaluate", options) or {}).get("result") or {}).get("value")
 
 
 def _called(url: str, method: str, params: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -21,7 +21,7 @@ from app.system.texts import (
     sentences,
     text_in,
 )
-from app.system.texts.catalogue import catalogues_in, files
+from app.system.texts.catalogue import babel_translations, catalogues_in, files, translations
 from app.system.texts.check import faults, placeholders
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
@@ -309,3 +309,30 @@ def test_sentences_for_operators_name_no_topic(language: str) -> None:
     with_topic = {code for code, text in sentences(language).items() if "{topic}" in text}
     labelled = {code for code in with_topic if code.startswith(("interlock_", "link_node_stale"))}
     assert with_topic - labelled == NAME_TOPICS
+
+
+@pytest.mark.parametrize("path", files().values(), ids=lambda path: path.stem)
+def test_a_catalogue_is_read_as_babel_reads_it(path: Path) -> None:
+    assert translations(path) == babel_translations(path)
+
+
+HEADER = 'msgid ""\nmsgstr ""\n"Content-Type: text/plain; charset=utf-8\\n"\n\n'
+
+
+@pytest.mark.parametrize(
+    ("entries", "expected"),
+    [
+        ('#. About\nmsgid "a"\nmsgstr "one\\n"\n"two \\"x\\" \\\\n"\n', {"a": 'one\ntwo "x" \\n'}),
+        ('#, fuzzy\nmsgid "a"\nmsgstr "x"\n', {}),
+        ('msgid "a"\nmsgstr ""\n\nmsgid "b"\nmsgstr "x"\n', {"b": "x"}),
+        ('msgid ""\n"a"\nmsgstr "x"\n', {"a": "x"}),
+        ('#~ msgid "a"\n#~ msgstr "x"\n', {}),
+        ('msgid "a"\nmsgstr "x" \n', {"a": "x"}),
+    ],
+)
+def test_what_a_translators_tool_writes_is_read(
+    entries: str, expected: dict[str, str], tmp_path: Path
+) -> None:
+    path = tmp_path / "xx.po"
+    path.write_text(HEADER + entries)
+    assert translations(path) == babel_translations(path) == expected
