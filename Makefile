@@ -1,4 +1,4 @@
-# make run   the panel with a simulated robot, at http://127.0.0.1:8000
+# make run   the panel with a simulated robot, at http://127.0.0.1:8000; PANEL=mobile-robot make run: a robot that drives
 # make test  all that needs no Rust and no ROS, with a real browser: ten minutes on a bare machine
 # make test-robot  on the real bridge, real ROS 2 nodes, brokers, proxies and other browsers
 # make test-long  real time, floods, faults, every screen, packaging: an hour; writes docs/test-report.md
@@ -30,7 +30,7 @@ export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
 run: .venv/run .venv/bin/operator-panel
 	@echo "starting the panel server"
-	@.venv/bin/python -m app.cli run
+	@.venv/bin/python -m app.cli run $(PANEL)
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
 WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))

@@ -73,7 +73,7 @@ NO_ENTRY: Final = DemoEntry()
 
 # The stories that a simulated robot can play: the names that belong together, with their types.
 
-StoryName = Literal["palletizing"]
+StoryName = Literal["palletizing", "driving"]
 Use = Literal["topic", "publication", "service", "action"]  # how a panel uses a name
 
 BOOL: Final = "std_msgs/msg/Bool"
@@ -159,4 +159,41 @@ PALLETIZING: Final = Story(
     actions={"/pallet_out": "example_interfaces/action/Fibonacci"},
 )
 
-STORIES: Final[Mapping[StoryName, Story]] = {"palletizing": PALLETIZING}
+DRIVING: Final = Story(
+    publishes={
+        "/map": "nav_msgs/msg/OccupancyGrid",
+        "/tf": "tf2_msgs/msg/TFMessage",
+        "/tf_static": "tf2_msgs/msg/TFMessage",
+        "/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "/odom": "nav_msgs/msg/Odometry",
+        "/scan": "sensor_msgs/msg/LaserScan",
+        "/plan": "nav_msgs/msg/Path",
+        "/local_costmap/published_footprint": "geometry_msgs/msg/PolygonStamped",
+        "/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+        "/battery_state": "sensor_msgs/msg/BatteryState",
+        "/battery_hours_left": NUMBER,
+        "/robot_state": TEXT,
+        "/robot_mode": TEXT,
+        "/robot_place": TEXT,
+        "/moving": BOOL,
+        "/docked": BOOL,
+        "/way_blocked": BOOL,
+        "/obstacle": BOOL,
+        "/safety/estop_released": BOOL,
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+        "/rosout": "rcl_interfaces/msg/Log",
+    },
+    subscribes={
+        "/stop": "std_msgs/msg/Empty",
+        "/cmd_vel_teleop": "geometry_msgs/msg/TwistStamped",
+        "/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    },
+    services={"/manual_mode": SWITCH, "/obstacle": SWITCH},
+    actions={
+        "/navigate_to_pose": "nav2_msgs/action/NavigateToPose",
+        "/dock_robot": "nav2_msgs/action/DockRobot",
+        "/undock_robot": "nav2_msgs/action/UndockRobot",
+    },
+)
+
+STORIES: Final[Mapping[StoryName, Story]] = {"palletizing": PALLETIZING, "driving": DRIVING}

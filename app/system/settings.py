@@ -47,6 +47,17 @@ def shipped_path(name: str) -> Path:
     return inside if inside.exists() else PACKAGE.parent / name
 
 
+# Examples that are shipped beside the panel of the package, by name.
+SHIPPED_PANELS = {"mobile-robot": "docs/examples/mobile-robot/panel.toml"}
+
+
+def panel_path(name: str) -> Path:
+    """The path of a panel file, or of a shipped panel by its name, if no file has that name."""
+    path = Path(name).expanduser().resolve()
+    is_shipped = name in SHIPPED_PANELS and not path.is_file()
+    return shipped_path(SHIPPED_PANELS[name]) if is_shipped else path
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
     """The values of the `KIOSK_…` variables; see docs/reference/settings.md."""
@@ -79,7 +90,7 @@ class Settings:
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
         return cls(
-            panel=_parse_path(env, "KIOSK_PANEL", PACKAGE / "panel.toml"),
+            panel=panel_path(panel) if (panel := env.get("KIOSK_PANEL")) else PACKAGE / "panel.toml",
             zenoh=_parse_path(env, "KIOSK_ZENOH", shipped_path("zenoh.json5")),
             mode=_parse_mode(env.get("KIOSK_MODE", "")),
             hosts=(*LOOPBACK_HOSTS, *_parse_hosts(env.get("KIOSK_HOSTS", ""))),

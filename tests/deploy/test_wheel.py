@@ -134,6 +134,8 @@ def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: 
     shipped = machine.run(f"{RELEASE}/bin/python -m app.check")
     assert shipped.returncode == 0, shipped.stderr
     assert str(ROOT) not in shipped.stdout
+    by_name = machine.run(f"{RELEASE}/bin/operator-panel check mobile-robot")
+    assert (by_name.returncode, str(ROOT) in by_name.stdout) == (0, False), by_name.stderr
     services = (
         "from app.ros.messages import load_interfaces as of; "
         "of('jazzy').service_types('std_srvs/srv/SetBool')"

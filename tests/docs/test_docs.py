@@ -28,7 +28,8 @@ PAGES: Final = {
     path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8")
     for path in sorted(DOCS.rglob("*.md"))
 }
-QUOTES: Final = {("palletizing.md", "toml")}  # of the shipped panel: test_palletizing.py compares them
+# Of the shipped panels: test_palletizing.py compares them.
+QUOTES: Final = {("palletizing.md", "toml"), ("how-to/mobile-robot.md", "toml")}
 JOG: Final = "float64 speed\nuint32 valid_ms\nuint16 number\n"
 # What an example that is a part of a panel may name and not have itself.
 PAGE: Final = '[[page]]\nid = "example"\ntitle = "Example"\n'

@@ -1,6 +1,6 @@
-"""The page about the shipped panel quotes it word for word.
+"""The pages about the shipped panels quote them word for word.
 
-An excerpt is one table of app/panel.toml, from its first line to its last. `# …` stands for one or
+An excerpt is one table of a panel file, from its first line to its last. `# …` stands for one or
 more lines that are left out. Empty lines and lines of comment are left out without a sign. An empty
 line separates excerpts.
 """
@@ -14,8 +14,15 @@ from tests.support.parts import ROOT
 
 pytestmark = pytest.mark.promise("documents")
 
-PAGE: Final = (ROOT / "docs/palletizing.md").read_text(encoding="utf-8")
-PANEL: Final = (ROOT / "app/panel.toml").read_text(encoding="utf-8")
+PANELS: Final = {
+    "docs/palletizing.md": "app/panel.toml",
+    "docs/how-to/mobile-robot.md": "docs/examples/mobile-robot/panel.toml",
+}
+TEXTS: Final = {
+    page: tuple((ROOT / path).read_text(encoding="utf-8") for path in (page, panel))
+    for page, panel in PANELS.items()
+}
+PANEL: Final = TEXTS["docs/palletizing.md"][1]
 LEFT_OUT: Final = "# …"
 GUARD: Final = '[[interlock]]\nid = "guard"\ntopic = "/guard_locked"\nmax_age_s = 3.0\n'
 
@@ -40,13 +47,17 @@ def quoted(excerpt: str, panel: str) -> list[str]:
     return [table for table in tables(panel) if re.fullmatch("".join(lines), table)]
 
 
-def test_page_has_excerpts() -> None:
-    assert len(excerpts(PAGE)) >= 10
+@pytest.mark.parametrize("page", PANELS)
+def test_page_has_excerpts(page: str) -> None:
+    assert excerpts(TEXTS[page][0])
 
 
-@pytest.mark.parametrize("excerpt", excerpts(PAGE))
-def test_excerpt_quotes_one_table_of_the_shipped_panel(excerpt: str) -> None:
-    assert len(quoted(excerpt, PANEL)) == 1, excerpt
+@pytest.mark.parametrize(
+    ("excerpt", "panel"),
+    [(excerpt, panel) for page, panel in TEXTS.values() for excerpt in excerpts(page)],
+)
+def test_excerpt_quotes_one_table_of_the_shipped_panel(excerpt: str, panel: str) -> None:
+    assert len(quoted(excerpt, panel)) == 1, excerpt
 
 
 @pytest.mark.parametrize(

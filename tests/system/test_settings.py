@@ -37,6 +37,19 @@ def test_a_file_is_taken_from_where_the_variable_points(name: str, tmp_path: Pat
     assert tmp_path / "mine" in (settings.panel, settings.zenoh)
 
 
+def test_shipped_panel_is_named_unless_a_file_has_that_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mobile-robot").mkdir()
+    shipped = Settings.from_environment({"KIOSK_PANEL": "mobile-robot"}).panel
+    assert shipped.is_file()
+    assert shipped.parent.name == "mobile-robot"
+    (tmp_path / "mobile-robot").rmdir()
+    (tmp_path / "mobile-robot").touch()
+    assert Settings.from_environment({"KIOSK_PANEL": "mobile-robot"}).panel == tmp_path / "mobile-robot"
+
+
 def test_data_lives_where_the_variable_points(tmp_path: Path) -> None:
     settings = Settings.from_environment({"KIOSK_DATA": str(tmp_path)})
     assert settings.data_folder("live") == settings.data_folder("demo") == tmp_path

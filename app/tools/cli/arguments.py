@@ -15,7 +15,10 @@ from app.tools.cli.parser import Parser
 # Arguments that several commands have: types whose mistake is one sentence, and the settings.
 
 HIGHEST_PORT: Final = 65_535
-PANEL_HELP: Final = "the panel file; without one that of KIOSK_PANEL, else the shipped one"
+PANEL_HELP: Final = (
+    "the panel file, or the name of a shipped one (mobile-robot); without one that of KIOSK_PANEL, else"
+    " that of the palletizing cell"
+)
 # Options that stand for a variable of the environment, and go before it.
 VARIABLES: Final[Mapping[str, str]] = {
     "panel": "KIOSK_PANEL",

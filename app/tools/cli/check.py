@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.panel import Panel, check_panel
 from app.system.errors import KioskError, PanelError
-from app.system.settings import Settings, shipped_path
+from app.system.settings import Settings, panel_path, shipped_path
 from app.tools.cli.parser import Parser
 
 PROG = "python -m app.check"
@@ -61,7 +61,7 @@ def make_parser(prog: str) -> Parser:
     parser.add_argument(
         "panel",
         nargs="*",
-        type=Path,
+        type=panel_path,
         metavar="PANEL",
         help="a panel file; without any, the one of KIOSK_PANEL or else the shipped one",
     )

@@ -293,6 +293,13 @@ def _transforms(moment: Moment, wanted: Collection[str]) -> Fields:
     }
 
 
+def static_transforms(moment: Moment) -> Fields:
+    """Where a sensor is on the robot: a transform of `/tf_static` does not change."""
+    mounted = {"translation": {"x": 0.2, "y": 0.0, "z": 0.3}, "rotation": {"w": 1.0}}
+    transform = {"header": header(moment), "child_frame_id": "base_scan", "transform": mounted}
+    return {"transforms": [transform]}
+
+
 def _diagnostic(name: str, moment: Moment) -> Fields:
     bad = (moment.t / 30 + phase_of(name)) % 1 > 0.85
     return {

@@ -4,14 +4,14 @@ import math
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from math import nan
 from random import Random
 from typing import Any, Final
 
 from app.panel.demo import PALLETIZING, Story
-from app.tools.simulator.known_types import JOINTS, Moment, header, stamp
+from app.tools.simulator.known_types import JOINTS, Moment, header
+from app.tools.simulator.parameters import NODE, NodeParameters
 from app.tools.simulator.robot import (
     CANCEL_OK,
     CANCEL_TOO_LATE,
@@ -21,6 +21,13 @@ from app.tools.simulator.robot import (
     EXECUTING,
     KEPT_GOALS,
     SUCCEEDED,
+)
+from app.tools.simulator.story import (
+    PlayedStory,
+    StoryTopic,
+    StoryTopics,
+    diagnostic_status,
+    log_fields,
 )
 
 # One cycle of the arm, by the part of it that is done (0 to 1): pure.
@@ -504,15 +511,7 @@ OK, WARN, ERROR = 0, 1, 2  # diagnostic_msgs/msg/DiagnosticStatus
 HOT_C: Final = 60.0
 
 
-@dataclass(frozen=True, slots=True)
-class CellTopic:
-    """The fields of a topic. It is published when they change, at most each `least_s`, and again each
-    second: a stamp alone is no change, so `value` is compared."""
-
-    value: Callable[[PalletizingCell], Any]
-    fields: Callable[[Any, Moment], Fields] = lambda value, _: {"data": value}
-    least_s: float = 0.0
-    latched: bool = True
+CellTopic = StoryTopic["PalletizingCell"]
 
 
 def vacuum_kpa(cell: PalletizingCell) -> float:
@@ -531,7 +530,7 @@ def _joints(positions: list[float], moment: Moment) -> Fields:
 
 def _parts(cell: PalletizingCell) -> list[Fields]:
     """The statuses of the cell's parts: of each (level, name, message, values)."""
-    return [_status(*part) for part in _statuses(cell)]
+    return [diagnostic_status(*part) for part in _statuses(cell)]
 
 
 Status = tuple[int, str, str, Mapping[str, str]]
@@ -557,16 +556,6 @@ def _statuses(cell: PalletizingCell) -> Iterator[Status]:
 def _minutes_left(cell: PalletizingCell) -> float | None:
     """None while the cell does not go on by itself: no one knows when the pallet is full."""
     return round(cell.left_s / 60, 1) if cell.goes_on else None
-
-
-def _status(level: int, name: str, message: str, values: Mapping[str, str]) -> Fields:
-    listed = [{"key": key, "value": value} for key, value in values.items()]
-    return {"level": level, "name": name, "message": message, "hardware_id": name, "values": listed}
-
-
-def log_fields(level: int, text: str, moment: Moment) -> Fields:
-    """A line of the log of the cell's node."""
-    return {"stamp": stamp(moment), "level": level, "name": "cell", "msg": text, "file": "cell.py"}
 
 
 MOVING: Final = 0.2  # seconds between the messages of what changes all the time
@@ -623,8 +612,6 @@ ROWS: Final[Mapping[str, CellTopic]] = {
 # full pallet goes out. Pure.
 
 ABORTED: Final = 6  # action_msgs/msg/GoalStatus
-REPEAT_S: Final = 1.0
-EARLY_S: Final = 0.02  # a step may come a little too early
 LOG: Final = "/rosout"
 OUT: Final = "/pallet_out"
 
@@ -687,15 +674,15 @@ class PalletOut:
         return round(100 * (self._cell.out_s or 0.0) / OUT_S)
 
 
-class PlayedPalletizing:
+class PlayedPalletizing(PlayedStory):
     """The story, for the `names` that the panel uses."""
 
     def __init__(self, names: Story, seed: int, heals_s: float | None = None) -> None:
-        self.names = names
+        super().__init__(names)
         self.cell = PalletizingCell(seed, heals_s)
         self._out = PalletOut(self.cell)
         self.actions = {name: self._out for name in names.actions}
-        self._published: dict[str, tuple[float, Any]] = {}
+        self._topics = StoryTopics(self.cell, ROWS)
         self._services: Mapping[str, Callable[[Any], str]] = {
             "/cell/start": lambda _: self.cell.start(),
             "/cell/pause": lambda _: self.cell.pause(),
@@ -705,8 +692,12 @@ class PlayedPalletizing:
         }
 
     def is_latched(self, topic: str) -> bool:
-        """Whether late subscribers get the last message."""
-        return topic in ROWS and ROWS[topic].latched
+        return self._topics.is_latched(topic)
+
+    def configure(self, nodes: Mapping[str, NodeParameters]) -> None:
+        """Its belt has the speed that the parameter of the node sets."""
+        if NODE in nodes:
+            self.cell.speed_mm_s = nodes[NODE].value("speed", SPEED_MM_S)
 
     def receive(self, topic: str, message: Any) -> None:
         match topic:
@@ -719,30 +710,18 @@ class PlayedPalletizing:
                 self.cell.load_order(order)
 
     def serve(self, service: str, request: Any) -> Fields:
-        """The response, with a message if it is refused. A panel has words for success."""
         refused = self._services[service](request)
         return {"success": not refused, "message": refused}
 
     def step(self, moment: Moment) -> Iterator[tuple[str, Fields]]:
-        """The messages that it publishes, as (topic, fields)."""
         self.cell.step(moment.t)
         self._out.step()
         for level, text in self.cell.notes():
             if LOG in self.names.publishes:
-                yield LOG, log_fields(level, text, moment)
+                yield LOG, log_fields(level, text, moment, "cell")
         for topic in self.names.publishes:
-            if topic in ROWS and (fields := self._due(topic, moment)) is not None:
+            if (fields := self._topics.due(topic, moment)) is not None:
                 yield topic, fields
-
-    def _due(self, topic: str, moment: Moment) -> Fields | None:
-        row, last = ROWS[topic], self._published.get(topic)
-        value = row.value(self.cell)
-        if last is not None:
-            since = moment.t - last[0] + EARLY_S
-            if since < (REPEAT_S if value == last[1] else row.least_s):
-                return None
-        self._published[topic] = moment.t, value
-        return row.fields(value, moment)
 
     def _switch_light(self, request: Any) -> str:
         self.cell.switch_light(on=request.data)

@@ -16,9 +16,9 @@ from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.model import Panel
 from app.panel.numbers import Range
 from app.panel.template import NOW, fill, placeholders
-from app.panel.used import played_names
 from app.panel.values import same_value
 from app.panel.widgets import parameter as parameter_widgets
+from app.panel.widgets.map_view import TF_TYPE
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.robot_options import EACH
 from app.panel.widgets.service_action import Call
@@ -30,10 +30,15 @@ from app.system.errors import DecodeError, FieldError
 from app.system.texts import render
 from app.tools.simulator.fields import FieldSignal, PanelFields
 from app.tools.simulator.kinds import needs_of
-from app.tools.simulator.known_types import Message, Moment, plausible, put_result
+from app.tools.simulator.known_types import (
+    Message,
+    Moment,
+    plausible,
+    put_result,
+    static_transforms,
+)
 from app.tools.simulator.machine import Machine
 from app.tools.simulator.needs import Acted, Declared, DisplayedField, Need, Published, Served
-from app.tools.simulator.palletizing import SPEED_MM_S, PlayedPalletizing
 from app.tools.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters, Parameter
 from app.tools.simulator.robot import (
     CHOICES,
@@ -54,6 +59,7 @@ from app.tools.simulator.robot import (
     good_response,
     own_parameters,
 )
+from app.tools.simulator.stories import play
 from app.tools.simulator.values import Fields, Signal, merged, put, span_of
 
 # The topics that a panel listens to, as the simulated robot publishes them: pure.
@@ -184,7 +190,12 @@ def _message(fields: PanelFields, topic: str, type_name: str) -> Message:
     paths = [path for named in fields.paths.get(topic, ()) for path in field_paths(named)]
     keys = [step for path in paths for step in path_steps(path)]
     wanted = [str(step.value) for step in keys if isinstance(step, Key) and step.path == "name"]
-    base = plausible(type_name, fields.interfaces, dict.fromkeys(wanted))
+    is_static = type_name == TF_TYPE and topic.endswith("/tf_static")
+    base = (
+        static_transforms
+        if is_static
+        else plausible(type_name, fields.interfaces, dict.fromkeys(wanted))
+    )
     over = fields.entry(topic).message
     return (lambda moment: merged(base(moment), over)) if over else base
 
@@ -466,9 +477,8 @@ class PanelRobot:
         self._panel = panel
         self._demo = DemoRobot()
         needs = [need for widget in panel.widgets() for need in needs_of(widget, self._interfaces)]
-        names = played_names(panel)
-        self._story = None if names is None else PlayedPalletizing(names, number, panel.demo_heals_s)
-        of_story = {} if names is None else names.publishes
+        self._story = play(panel, number, self._interfaces)
+        of_story = {} if self._story is None else self._story.names.publishes
         self._own = {
             name: kind for name, kind in _reference_topics(panel).items() if name not in of_story
         }
@@ -612,11 +622,10 @@ class PanelRobot:
                 yield name, payload
 
     def _tell(self) -> Iterator[tuple[str, bytes]]:
-        """The messages of the story. Its belt has the speed that the parameter of the node sets."""
+        """The messages of the story."""
         if self._story is None:
             return
-        if NODE in self._nodes:
-            self._story.cell.speed_mm_s = self._nodes[NODE].value("speed", SPEED_MM_S)
+        self._story.configure(self._nodes)
         for topic, fields in self._story.step(self._moment):
             yield topic, self._interfaces.encode(self._story.names.publishes[topic], fields)
 

@@ -10,6 +10,7 @@ import pytest
 
 from app.cell.permission.conditions import permits
 from app.cell.robot.parameter_state import EMPTY_VALUE
+from app.cell.robot.transforms import TF_TYPE
 from app.panel import Panel, load_panel
 from app.panel.widgets.families import Display
 from app.panel.widgets.publish import SinglePublish
@@ -696,3 +697,23 @@ def test_everything_is_simulated_in_each_distribution(tmp_path: Path, distro: st
     robot = Stepped(load_panel(path)).run(2)
     assert set(robot.panel.subscriptions()) - {EVENTS} <= set(robot.said)
     assert all(publish.type_hash for publish in robot.robot.publishes.values())
+
+
+def test_what_moves_is_not_on_tf_static(loaded: Loaded) -> None:
+    widget = (
+        '[[page]]\nid = "map"\ntitle = "Map"\n[[page.widget]]\nid = "map"\nkind = "map"\nlabel = "M"\n'
+    )
+    robot = Stepped(loaded(widget)).run(5)
+
+    def transforms(topic: str) -> set[tuple[str, float]]:
+        messages = (robot.interfaces.decode(TF_TYPE, payload) for _, payload in robot.said[topic])
+        return {
+            (transform.child_frame_id, round(transform.transform.translation.x, 6))
+            for message in messages
+            for transform in message.transforms
+        }
+
+    moving, still = transforms("/tf"), transforms("/tf_static")
+    assert len(moving) > 10
+    assert len(still) == 1
+    assert not {child for child, _ in moving} & {child for child, _ in still}

@@ -1,0 +1,188 @@
+"""The mobile robot of the shipped example as the robot of a panel: its topics, commands and actions."""
+
+import math
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, Final
+
+import pytest
+
+from app.cell.robot.maps import read_grid
+from app.cell.robot.transforms import LocatedFrame, TransformTree
+from app.panel import load_panel
+from app.panel.demo import DRIVING
+from app.system.settings import panel_path
+from app.tools.simulator.driving import (
+    FOLLOW_NO_PROGRESS,
+    GOAL_OCCUPIED,
+    PLACES,
+    START,
+    MobileRobot,
+    Pose,
+)
+from app.tools.simulator.hall import COLUMNS, ROWS
+from app.tools.simulator.robot import CANCEL_OK, CANCEL_TOO_LATE, CANCEL_UNKNOWN, CANCELED, SUCCEEDED
+from tests.support.stepped import Stepped
+
+ABORTED: Final = 6
+EXAMPLE: Final = panel_path("mobile-robot")
+NAVIGATE: Final = "/navigate_to_pose"
+GOAL_ID: Final = bytes([7] * 16)
+
+
+@pytest.fixture
+def robot() -> Stepped:
+    return Stepped(load_panel(EXAMPLE)).run(1)
+
+
+def goal(pose: Pose, frame: str = "map") -> Any:
+    turn = SimpleNamespace(x=0.0, y=0.0, z=math.sin(pose.yaw / 2), w=math.cos(pose.yaw / 2))
+    place = SimpleNamespace(position=SimpleNamespace(x=pose.x, y=pose.y), orientation=turn)
+    header = SimpleNamespace(frame_id=frame)
+    return SimpleNamespace(pose=SimpleNamespace(header=header, pose=place))
+
+
+def end(robot: Stepped, action: str = NAVIGATE) -> tuple[int, Mapping[str, Any]]:
+    """(status, result) of the goal; the result is encoded as the action's definition has it."""
+    server = robot.robot.actions[action]
+    for _ in range(1200):
+        if (ended := server.result(GOAL_ID)) is not None:
+            types = robot.interfaces.action_types(server.type)
+            robot.interfaces.encode(types.result, ended[1])
+            return ended
+        robot.run(0.1)
+    raise AssertionError("the goal does not end")
+
+
+def newest(robot: Stepped, topic: str) -> Any:
+    return robot.interfaces.decode(robot.robot.publishes[topic].type, robot.said[topic][-1][1])
+
+
+def test_panel_plays_all_that_it_uses_of_the_story(robot: Stepped) -> None:
+    used = {**robot.panel.listened(), **robot.panel.publications(), **robot.panel.actions()}
+    played = {name for _, name, _ in DRIVING.types}
+    assert used.keys() - played == {"/front_camera/image_raw/compressed"}
+    assert used.keys() & DRIVING.publishes.keys() <= {*robot.said, "/rosout"}
+
+
+def test_map_and_fixed_transforms_are_published_once_for_late_subscribers(robot: Stepped) -> None:
+    robot.run(30)
+    for topic in ("/map", "/tf_static"):
+        assert robot.robot.publishes[topic].qos.transient_local
+        assert len(robot.said[topic]) == 1
+    assert not robot.robot.publishes["/tf"].qos.transient_local
+    grid = read_grid(robot.interfaces, robot.said["/map"][0][1])
+    assert (grid.geometry.width, grid.geometry.height, grid.geometry.frame) == (COLUMNS, ROWS, "map")
+
+
+def test_transforms_lead_from_the_map_to_the_robot(robot: Stepped) -> None:
+    tree = TransformTree()
+    for topic in ("/tf", "/tf_static"):
+        for at, payload in robot.said[topic]:
+            message = robot.interfaces.decode("tf2_msgs/msg/TFMessage", payload)
+            tree.record(message, at, is_static=topic == "/tf_static")
+    located, lidar = tree.locate("base_link", "map"), tree.locate("lidar", "map")
+    assert isinstance(located, LocatedFrame)
+    assert isinstance(lidar, LocatedFrame)
+    assert located.pose == pytest.approx(START, abs=0.01)
+    assert lidar.pose.y == pytest.approx(START.y + 0.3, abs=0.01)
+
+
+def test_robot_that_stands_repeats_its_transforms_and_one_that_drives_sends_ten_a_second(
+    robot: Stepped,
+) -> None:
+    before = len(robot.said["/tf"])
+    robot.run(10)
+    still = len(robot.said["/tf"]) - before
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(5)
+    assert still == pytest.approx(20, abs=2)
+    assert len(robot.said["/tf"]) - before - still == pytest.approx(50, abs=3)
+
+
+def test_goal_is_reached_with_feedback(robot: Stepped) -> None:
+    server = robot.robot.actions[NAVIGATE]
+    assert server.begin(GOAL_ID, goal(PLACES["PALLETIZER_1"]))
+    assert not server.begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(3)
+    ((goal_id, feedback),) = server.feedback()
+    robot.interfaces.encode(robot.interfaces.action_types(server.type).feedback, feedback)
+    assert goal_id == GOAL_ID
+    assert 5 < feedback["distance_remaining"] < 15
+    assert end(robot) == (SUCCEEDED, {"error_code": 0})
+    robot.run(1.5)
+    assert newest(robot, "/robot_place").data == "PALLETIZER_1"
+
+
+def test_goal_in_another_frame_is_rejected(robot: Stepped) -> None:
+    server = robot.robot.actions[NAVIGATE]
+    assert not server.begin(GOAL_ID, goal(PLACES["WRAPPER"], "odom"))
+    assert server.result(GOAL_ID) == (0, {})
+
+
+def test_goal_in_a_wall_is_aborted_with_the_code_of_the_planner(robot: Stepped) -> None:
+    assert robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(Pose(-3.4, 9.0, 0.0)))
+    assert end(robot) == (ABORTED, {"error_code": GOAL_OCCUPIED})
+
+
+def test_goal_is_canceled_and_the_robot_stands(robot: Stepped) -> None:
+    server = robot.robot.actions[NAVIGATE]
+    assert server.cancel(GOAL_ID) == (CANCEL_UNKNOWN, [])
+    server.begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(5)
+    assert server.cancel(GOAL_ID) == (CANCEL_OK, [GOAL_ID])
+    assert end(robot)[0] == CANCELED
+    assert server.cancel(GOAL_ID) == (CANCEL_TOO_LATE, [])
+    robot.run(1.5)
+    assert not newest(robot, "/moving").data
+
+
+def test_box_in_the_way_is_reported_and_ends_the_goal(robot: Stepped) -> None:
+    assert robot.call("/obstacle", data=True).success
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(8)
+    assert newest(robot, "/way_blocked").data
+    assert newest(robot, "/robot_state").data == "BLOCKED"
+    assert end(robot) == (ABORTED, {"error_code": FOLLOW_NO_PROGRESS})
+
+
+def test_stop_of_the_panel_ends_the_goal(robot: Stepped) -> None:
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(3)
+    robot.hear("/stop")
+    assert end(robot)[0] == ABORTED
+
+
+def test_robot_docks_and_undocks_by_actions(robot: Stepped) -> None:
+    docking = robot.robot.actions["/dock_robot"]
+    wanted = SimpleNamespace(dock_id="charger", navigate_to_staging_pose=True)
+    docking.begin(GOAL_ID, wanted)
+    robot.run(1)
+    ((_, feedback),) = docking.feedback()
+    robot.interfaces.encode(robot.interfaces.action_types(docking.type).feedback, feedback)
+    assert end(robot, "/dock_robot") == (SUCCEEDED, {"success": True, "error_code": 0})
+    robot.run(2)
+    assert newest(robot, "/docked").data
+    assert newest(robot, "/battery_state").power_supply_status == 1
+    robot.robot.actions["/undock_robot"].begin(GOAL_ID, SimpleNamespace())
+    assert end(robot, "/undock_robot")[0] == SUCCEEDED
+
+
+def test_robot_is_driven_by_hand_only_in_that_mode(robot: Stepped) -> None:
+    twist = {"twist": {"linear": {"x": 0.4}, "angular": {"z": 0.2}}}
+    robot.hear("/cmd_vel_teleop", **twist)
+    robot.run(0.3)
+    assert not newest(robot, "/moving").data
+    assert robot.call("/manual_mode", data=True).success
+    robot.hear("/cmd_vel_teleop", **twist)
+    robot.run(0.3)
+    assert newest(robot, "/moving").data
+    assert newest(robot, "/robot_mode").data == "MANUAL"
+
+
+def test_robots_of_several_panels_do_not_share_a_pose() -> None:
+    first, second = MobileRobot(), MobileRobot()
+    first.navigate(PLACES["WRAPPER"])
+    first.step(3.0)
+    assert second.pose == START
+    assert first.pose != START
