@@ -24,6 +24,7 @@ from app.ros.zenoh.session import ZenohSession
 from app.system.errors import DecodeError, InterfaceError, LinkError, SettingsError
 from app.system.texts import say
 from app.tools.doctor.findings import Report, few
+from app.tools.doctor.maps import MapChecks
 from app.tools.doctor.names import PanelNames, PanelRobot
 from app.tools.doctor.received import ReceivedSamples, copies, receive
 from app.tools.doctor.topics import TopicChecks, check_permissions
@@ -365,6 +366,7 @@ async def _inspect(
     behind = PanelNames.for_robot(robot, graph)
     check_permissions(report, behind, received, interfaces)
     TopicChecks(report, behind, interfaces, PanelNames.for_robot(robot, before)).check()
+    MapChecks(report, behind, received, interfaces).check()
     check_clocks(report, robot, received, interfaces)
     if graph.bridges:
         check_copies(report, robot, received)

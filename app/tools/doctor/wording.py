@@ -38,6 +38,10 @@ ERRORS: Final = (
     "definition_differs",
     "topic_qos",
     "topic_unrouted",
+    # Maps
+    "map_unreadable",
+    "map_no_transform",
+    "map_pose_frame",
     # Permissions
     "permission_no_publisher",
     "permission_ends",
@@ -67,6 +71,7 @@ WARNINGS: Final = (
     "clock_differs",
     "topic_no_publisher",
     "topic_no_subscriber",
+    "map_not_latched",
     "permission_publishers",
     "permission_not_latched",
 )

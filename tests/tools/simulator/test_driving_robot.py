@@ -24,6 +24,8 @@ from app.tools.simulator.hall import COLUMNS, ROWS
 from app.tools.simulator.robot import CANCEL_OK, CANCEL_TOO_LATE, CANCEL_UNKNOWN, CANCELED, SUCCEEDED
 from tests.support.stepped import Stepped
 
+pytestmark = pytest.mark.promise("demo")
+
 ABORTED: Final = 6
 EXAMPLE: Final = panel_path("mobile-robot")
 NAVIGATE: Final = "/navigate_to_pose"
