@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
+from app.cell.commands.nav2_errors import CODE, code_path, sentence_of
 from app.cell.commands.press import PressHandle
 from app.cell.commands.services import LATE_S, with_fields, with_reply
 from app.cell.commands.transport import Transport
@@ -230,7 +231,9 @@ class ActionClient:
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
         """The response of `get_result`: the status, and the result fields that the widget shows."""
-        paths = (STATUS, *(RESULT + path for path in response_paths(widget.result)))
+        code = code_path(widget, self._interfaces)
+        shown = (*response_paths(widget.result), *(() if code is None else (code,)))
+        paths = (STATUS, *(RESULT + path for path in shown))
         response = self._interfaces.action_types(widget.type).get_result_response
         try:
             return await self._robot.slices.read_all(
@@ -338,7 +341,8 @@ class ResultWaiter:
             return Outcome("unknown", say("goal_forgotten") if goal.is_known else say("goal_not_known"))
         outcome, ended, had_ended = ENDS[status]
         sentence = had_ended if goal.doubt else ended
-        text = with_fields(goal.widget.result, fields, RESULT, self._robot.texts)
+        error = sentence_of(fields.get(RESULT + CODE)) if outcome == "aborted" else None
+        text = error or with_fields(goal.widget.result, fields, RESULT, self._robot.texts)
         return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), text))
 
     async def _result(self, goal: Goal) -> bytes | None:
