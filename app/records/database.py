@@ -184,6 +184,11 @@ class Files:
             raise LogCorrupt(say("log_file_emptied"))
 
 
+def entry_count(db: sqlite3.Connection) -> int:
+    (first, last) = db.execute("SELECT min(seq), max(seq) FROM entry").fetchone()
+    return last - first + 1 if isinstance(first, int) and isinstance(last, int) else 0
+
+
 def _paths(folder: Path, name: str = NAME) -> list[Path]:
     return [folder / (name + suffix) for suffix in SUFFIXES]
 

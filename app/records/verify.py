@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from app.records.database import as_log_error, open_read_only
+from app.records.database import as_log_error, entry_count, open_read_only
 from app.records.entry import Entry
 from app.records.log_key import is_signed, read_signature
 from app.records.store import COLUMNS
@@ -130,15 +130,10 @@ def verify(
         with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            entries = _reported(_entries(db), _count(db), progress)
+            entries = _reported(_entries(db), entry_count(db), progress)
             return _Chain(genesis, known_head, SignedPart(keys), against).check(entries)
     finally:
         db.close()
-
-
-def _count(db: sqlite3.Connection) -> int:
-    (first, last) = db.execute("SELECT min(seq), max(seq) FROM entry").fetchone()
-    return last - first + 1 if isinstance(first, int) and isinstance(last, int) else 0
 
 
 def _reported(entries: Iterator[Entry], total: int, progress: Progress) -> Iterator[Entry]:

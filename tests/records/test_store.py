@@ -1,6 +1,9 @@
 """The operator's log as a file: what is appended stays, in a chain that shows every change."""
 
+import csv
+import gzip
 import hashlib
+import io
 import json
 import sqlite3
 import stat
@@ -12,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from app.records import reader
 from app.records import verify as verification
 from app.records.data_dir import LOCK, DataDir
 from app.records.database import NAME, Filter, Head, log_query, rows, set_aside
@@ -19,6 +23,7 @@ from app.records.entry import LONGEST_VALUES, Entry, Origin, as_json, clean_text
 from app.records.store import COLUMNS, DAY_MS, REMOVED_AT_ONCE, Store
 from app.records.verify import verify
 from app.records.writer import HOUR_S, ClockSteadiness, Opening
+from app.system import csv_text
 from app.system.errors import FolderInUse, LogCorrupt, LogError
 from app.system.texts import TextLike, say
 from app.tools.cli.log import main
@@ -327,6 +332,42 @@ def test_verification_shows_its_progress_on_a_terminal_only(
     assert main(["verify", "--data", str(tmp_path)]) == 0
     shown = "\r2 of 6 entries verified\r4 of 6 entries verified\r\x1b[K"
     assert shown in capsys.readouterr().err if is_terminal else not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.csv.gz"])
+def test_the_whole_log_is_exported_with_its_progress(
+    store: Store,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+) -> None:
+    fill(store, 3)
+    for module in (csv_text, reader):
+        monkeypatch.setattr(module, "ROWS_AT_ONCE", 4)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    file = tmp_path / name
+    assert main(["export", "--data", str(tmp_path), str(file)]) == 0
+    shown = "\r4 of 6 entries exported\r6 of 6 entries exported\r\x1b[K6 entries written to "
+    assert shown in capsys.readouterr().err
+    written = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()
+    assert written == b"".join(reader.export(tmp_path, Filter(every=True), None))
+    assert [row["seq"] for row in csv.DictReader(io.StringIO(written.decode("utf-8-sig")))] == [
+        str(seq) for seq in range(6, 0, -1)
+    ]
+    assert file.stat().st_mode & 0o077 == 0
+    assert sorted(path.name for path in tmp_path.glob("*log.csv*")) == [name]
+
+
+def test_an_export_to_where_nothing_can_be_written_leaves_nothing(
+    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fill(store, 1)
+    file = tmp_path / "none" / "log.csv"
+    assert main(["export", "--data", str(tmp_path), str(file)]) == 1
+    assert f"{file} can't be written" in capsys.readouterr().err
+    assert main(["export", "--data", str(tmp_path / "none"), str(tmp_path / "log.csv")]) == 2
+    assert not (tmp_path / "log.csv").exists()
 
 
 def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:

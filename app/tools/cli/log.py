@@ -2,8 +2,10 @@
 
 `log verify`: exit status 0 nothing was changed, 1 an entry was changed, removed, reordered or inserted,
 2 the log can't be read. `log panel`: 1 if the log or the kept files have no answer, 0 and 2 as above.
+`log export`: 1 if the file can't be written, 0 and 2 as above.
 """
 
+import os
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace
@@ -13,8 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.records.copy import Comparison, read_copy
+from app.records.database import Filter, as_log_error, entry_count, open_read_only
 from app.records.verify import Signed, verify
 from app.system.errors import KioskError, LogError
+from app.system.texts.catalogue import ENGLISH, files
 from app.tools.cli.arguments import add_data_folder, data_folder
 from app.tools.cli.output import terminal_progress
 from app.tools.cli.parser import Parser
@@ -142,6 +146,40 @@ def _write_files(folder: Path, run: "Run", to: Path) -> int:
     return 1 if missing else 0
 
 
+def _export(options: Namespace) -> int:
+    """Writes the whole log as CSV: beside the file first, so that there is never a part of it."""
+    from app.records.reader import export, gzipped
+    from app.system.csv_text import ROWS_AT_ONCE
+
+    folder, file = data_folder(options), options.file
+    db = open_read_only(folder)
+    try:
+        with as_log_error():
+            total = entry_count(db)
+    finally:
+        db.close()
+    draft = file.with_name(f".{file.name}.{os.getpid()}")
+    with terminal_progress("entries exported") as progress:
+
+        def counted() -> Iterator[bytes]:
+            pieces = export(folder, Filter(every=True), None, language=options.language)
+            for number, piece in enumerate(pieces, 1):
+                yield piece
+                progress(min(number * ROWS_AT_ONCE, total), total)
+
+        try:
+            with open(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as target:
+                target.writelines(gzipped(counted()) if file.suffix == ".gz" else counted())
+            draft.replace(file)
+        except OSError as error:
+            print(f"{file} can't be written: {error.strerror}", file=sys.stderr)
+            return 1
+        finally:
+            draft.unlink(missing_ok=True)
+    print(f"{total} entries written to {file}", file=sys.stderr)
+    return 0
+
+
 def _time(text: str) -> int:
     """Milliseconds since 1970; of two times that the clock shows twice, the first."""
     try:
@@ -179,6 +217,13 @@ def make_parser(prog: str) -> Parser:
     key = commands.add_parser("key", help="print the public key that signs the log")
     key.set_defaults(run=_key)
     add_data_folder(key)
+    csv = commands.add_parser("export", help="write the whole log to a file, as CSV")
+    csv.set_defaults(run=_export)
+    add_data_folder(csv)
+    csv.add_argument(
+        "file", type=Path, metavar="FILE", help="such as log.csv; log.csv.gz is compressed"
+    )
+    csv.add_argument("--language", choices=files(), default=ENGLISH, help="of the reasons; default: en")
     panel = commands.add_parser("panel", help="print the panel file that was shown at a time")
     panel.set_defaults(run=_panel)
     add_data_folder(panel)
