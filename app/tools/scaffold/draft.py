@@ -12,6 +12,14 @@ from app.ros.messages import Interfaces
 from app.ros.messages.names import GLOBAL
 from app.system.errors import InterfaceError
 from app.tools.scaffold import widgets
+from app.tools.scaffold.mobile import (
+    MAP_PAGE,
+    OF_NAV2,
+    is_internal,
+    map_widgets,
+    of_map,
+    on_map_page,
+)
 from app.tools.scaffold.parts import GENERAL, OF_NAMES, Draft, DraftWidget, Omission, with_own_labels
 from app.tools.scaffold.widgets import (
     NODES_PAGE,
@@ -29,7 +37,8 @@ MOST_PENS: Final = 4
 TREND_GAP_S: Final = 5  # the max_age_s of a trend that has none
 TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "format")
 CONTROLS_ONLY: Final = "The controls of this page are in the panel file, commented out"
-ORDER: Final = ("indicator", "gauge", "readout", "joints", "camera", "table", "log")
+ORDER: Final = ("map", "indicator", "gauge", "readout", "joints", "camera", "table", "log")
+OWN_PAGES: Final = (MAP_PAGE, NODES_PAGE)  # they are never left out
 Place = tuple[str, ...]
 
 
@@ -43,7 +52,7 @@ def make_pages(
     for pages in arranged:
         if len(pages) <= MOST_PAGES:
             break
-    fullest = sorted(pages, key=lambda page: (page != NODES_PAGE, -len(pages[page])))[:MOST_PAGES]
+    fullest = sorted(pages, key=lambda page: (page not in OWN_PAGES, -len(pages[page])))[:MOST_PAGES]
     rest = [entry for page, part in pages.items() if page not in fullest for entry in part]
     kept: dict[str, Sequence[DraftWidget]] = {
         page: _whole(page, part) for page, part in pages.items() if page in fullest
@@ -55,7 +64,7 @@ def _arranged(entries: Sequence[DraftWidget], own: int, live: bool) -> dict[str,
     """The entries by the titles of pages: the `own` largest places have pages of their own."""
     pages: dict[str, list[DraftWidget]] = {}
     by_place = _by_place(entries, own)
-    for place in sorted(by_place, key=lambda place: (place == (NODES_PAGE,), place)):
+    for place in sorted(by_place, key=_page_order):
         is_general = place == (GENERAL,)
         for part in _parts(by_place[place], 0 if is_general else 1, live):
             title = " ".join(place if is_general else _common(part))
@@ -64,10 +73,16 @@ def _arranged(entries: Sequence[DraftWidget], own: int, live: bool) -> dict[str,
     return pages
 
 
+def _page_order(place: Place) -> tuple[bool, bool, Place]:
+    """The map comes first, the nodes last."""
+    return place != (MAP_PAGE,), place == (NODES_PAGE,), place
+
+
 def _by_place(entries: Sequence[DraftWidget], own: int) -> dict[Place, list[DraftWidget]]:
     """The entries by the first part of their places. Small places are put together."""
     sizes = Counter(entry.place[:1] for entry in entries)
-    kept = {place for place, size in sizes.most_common(own) if size > 1} | {(NODES_PAGE,)}
+    kept = {place for place, size in sizes.most_common(own) if size > 1}
+    kept |= {(NODES_PAGE,), (MAP_PAGE,)}
     by_place: defaultdict[Place, list[DraftWidget]] = defaultdict(list)
     for entry in entries:
         place = entry.place[:1]
@@ -135,7 +150,7 @@ def _trend(entries: Sequence[DraftWidget], page: str) -> Iterator[DraftWidget]:
         gauge for gauge in gauges if gauge.keys.get("unit", "") == max(units, key=units.__getitem__)
     ]
     pens = [{k: gauge.keys[k] for k in TREND_KEYS if k in gauge.keys} for gauge in same[:MOST_PENS]]
-    if pens:
+    if pens and page != MAP_PAGE:
         keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
         longest = max(gauge.keys.get("max_age_s", 0) for gauge in same[:MOST_PENS])
         keys |= {"max_age_s": longest} if longest > TREND_GAP_S else {}
@@ -221,12 +236,15 @@ def make_draft(
     ]
     entries: list[DraftWidget] = []
     remarks: list[str] = []
-    for topic in (topic for topic in known.topics if topic.announced):
+    announced = [topic for topic in known.topics if topic.announced]
+    mapped = of_map(announced)
+    for topic in (topic for topic in announced if topic.name not in mapped):
         for item in _of_topic(topic, interfaces, known):
             if isinstance(item, DraftWidget):
                 entries.append(item)
             else:
                 remarks.append(f"{item.name}: {item.why}")
+    entries += map_widgets(announced)
     remarks += [f"{name}: {DENIED}" for name in known.denied if _is_public_name(name)]
     remarks += [f"{name}: {LOST}" for name in lost_names(known)]
     for server in (*known.services, *known.actions):
@@ -235,7 +253,7 @@ def make_draft(
         entries += widgets.parameter(parameter)
     remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unreadable]
     remarks += [f"{name} ({kind}): {why}" for (kind, name), why in left_out.items()]
-    entries = [entry for entry in entries if (entry.kind, entry.name) not in left_out]
+    entries = [entry for entry in on_map_page(entries) if (entry.kind, entry.name) not in left_out]
     acting = [
         replace(label, interlock=interlock_for(label, interlocks))
         for label in with_own_labels([entry for entry in entries if entry.control])
@@ -283,6 +301,9 @@ def _of_topic(
 
 
 def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> list[DraftWidget]:
+    if is_internal(server):
+        remarks.append(f"{server.name} ({server.type}): {OF_NAV2}")
+        return []
     make = widgets.goals if "/action/" in server.type else widgets.calls
     try:
         drafts = list(make(server, interfaces))

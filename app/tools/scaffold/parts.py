@@ -200,12 +200,13 @@ OF_NAMES: Final[Mapping[str, str]] = {
     "/diagnostics_agg": "it has what /diagnostics has",
 }
 OF_TYPES: Final[Mapping[str, str]] = {
+    "nav_msgs/msg/OccupancyGrid": 'it is not named map; kind = "map" shows it if it is one',
+} | {
     name: _FOR_TOOLS.format(noun)
     for name, noun in {
         "map_msgs/msg/OccupancyGridUpdate": "a map",
         "nav_msgs/msg/GridCells": "a map",
         "nav_msgs/msg/MapMetaData": "a map",
-        "nav_msgs/msg/OccupancyGrid": "a map",
         "nav_msgs/msg/Path": "a path",
         "sensor_msgs/msg/LaserScan": "a laser scan",
         "sensor_msgs/msg/MultiEchoLaserScan": "a laser scan",

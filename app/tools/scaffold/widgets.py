@@ -13,6 +13,7 @@ from app.ros.graph.model import Server, SurveyedTopic
 from app.ros.graph.node_services import NodeParameter
 from app.ros.messages import Interfaces
 from app.ros.messages.definitions import FLOAT_TYPES
+from app.tools.scaffold.mobile import nav2_goal
 from app.tools.scaffold.parts import (
     NEGATIVE,
     NO_JOINTS,
@@ -307,11 +308,14 @@ def calls(service: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
 
 def goals(action: Server, interfaces: Interfaces) -> Iterator[DraftWidget]:
     """A key that sends a goal with default values."""
-    goal = interfaces.action_types(action.type).goal
-    fields = interfaces.structures[goal].fields
-    plain = {field.name: field.default_value for field in fields if not field.type.is_nested}
-    keys = {"label": label_of(action.name), "action": action.name, "type": action.type, "goal": plain}
-    comment = "Fill in the goal." if fields else ""
+    keys: dict[str, Any] = {"label": label_of(action.name)}
+    keys |= {"action": action.name, "type": action.type}
+    if (of_nav2 := nav2_goal(action, interfaces)) is not None:
+        keys, comment = {**keys, **of_nav2[0]}, of_nav2[1]
+    else:
+        fields = interfaces.structures[interfaces.action_types(action.type).goal].fields
+        plain = {field.name: field.default_value for field in fields if not field.type.is_nested}
+        keys, comment = {**keys, "goal": plain}, "Fill in the goal." if fields else ""
     yield _control("action", action.name, action.nodes, keys, comment)
 
 

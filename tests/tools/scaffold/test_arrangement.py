@@ -201,7 +201,7 @@ def test_widget_without_room_is_named() -> None:
     ("name", "type_name", "why"),
     [
         ("/tf", "tf2_msgs/msg/TFMessage", "/tf: the tree of frames is drawn by tools such as RViz"),
-        ("/map", "nav_msgs/msg/OccupancyGrid", "/map (nav_msgs/msg/OccupancyGrid): a map is drawn by"),
+        ("/costmap", "nav_msgs/msg/OccupancyGrid", "/costmap (nav_msgs/msg/OccupancyGrid): it is not"),
         ("/scan", "sensor_msgs/msg/LaserScan", "/scan (sensor_msgs/msg/LaserScan): a laser scan is dr"),
         (
             "/robot_description",

@@ -1,0 +1,123 @@
+"""The page of a robot that drives: its map, battery, places and the actions of Nav2. Pure."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+from app.panel.widgets.map_view import POSE_PATHS, TF_TYPE
+from app.ros.graph.model import Server, SurveyedTopic
+from app.ros.messages import Interfaces
+from app.tools.scaffold.parts import DraftWidget, label_of, words_of
+
+MAP_PAGE: Final = "map"
+GRID: Final = "nav_msgs/msg/OccupancyGrid"
+BATTERY: Final = "sensor_msgs/msg/BatteryState"
+NAV2: Final = "nav2_msgs/action/"
+MAP_TOPIC: Final = "/map"  # that a map shows if it names none
+# Of several poses the one that a localization corrects comes first.
+POSE_NAMES: Final = ("amcl_pose", "pose")
+# The actions of Nav2 that are for operators. The others are those of its own servers.
+ACTIONS: Final[Mapping[str, str]] = {
+    f"{NAV2}{name}": comment
+    for name, comment in {
+        "NavigateToPose": "Drives to a pose. Fill in the pose, in the frame of the map.",
+        "NavigateThroughPoses": "Drives through poses. Fill in the poses, in the frame of the map.",
+        "FollowWaypoints": "Drives to poses, one after the other. Fill in the poses.",
+        "DockRobot": "Drives to a dock. Give the name that it has in the file of docks.",
+        "UndockRobot": "Leaves the dock.",
+    }.items()
+}
+OF_NAV2: Final = "an action between Nav2's own servers: send goals to its navigator"
+GOALS: Final[Mapping[str, Mapping[str, Any]]] = {
+    f"{NAV2}NavigateToPose": {
+        "goal": {"pose": {"header": {"frame_id": "map", "stamp": "{now}"}}},
+        "progress": "distance_remaining",
+        "progress_falls": True,
+        "feedback": "{distance_remaining:.1f} m left",
+    },
+    f"{NAV2}DockRobot": {"goal": {"dock_id": "dock"}},
+}
+
+
+def main_map(topics: Iterable[SurveyedTopic]) -> SurveyedTopic | None:
+    """The map that the robot drives on: a grid with the word `map` at the end of its name, the
+    shortest; None of a robot without one."""
+    maps = [
+        topic
+        for topic in topics
+        if topic.publishers and topic.types == (GRID,) and words_of(topic.name)[-1:] == ["map"]
+    ]
+    return min(maps, key=lambda topic: (len(topic.name), topic.name), default=None)
+
+
+def map_widgets(topics: Sequence[SurveyedTopic]) -> Iterator[DraftWidget]:
+    """The map of a robot that drives; nothing without a map."""
+    chosen = main_map(topics)
+    if chosen is None:
+        return
+    keys: dict[str, Any] = {"label": label_of(chosen.name)}
+    keys |= {"topic": chosen.name} if chosen.name != MAP_TOPIC else {}
+    pose = None if _has_transforms(topics) else _pose_topic(topics)
+    if pose is not None:
+        keys["pose"] = {"topic": pose.name, "type": pose.type}
+    comment = (
+        f"The robot is where {pose.name} says."
+        if pose is not None
+        else "The robot is where its transforms say: base_link, or what base_frame names."
+    )
+    yield DraftWidget(
+        kind="map", name=chosen.name, place=(MAP_PAGE,), keys={**keys, "span": 12}, comment=comment
+    )
+
+
+def of_map(topics: Sequence[SurveyedTopic]) -> Collection[str]:
+    """The names of the topics that the map shows: no other widget needs them."""
+    chosen = main_map(topics)
+    transforms = (topic.name for topic in topics if topic.types == (TF_TYPE,))
+    return () if chosen is None else (chosen.name, *transforms)
+
+
+def _has_transforms(topics: Iterable[SurveyedTopic]) -> bool:
+    return any(topic.types == (TF_TYPE,) and topic.publishers for topic in topics)
+
+
+def _pose_topic(topics: Iterable[SurveyedTopic]) -> SurveyedTopic | None:
+    """A pose of the robot; odometry only if there is no other, as its frame is seldom the map's."""
+
+    def rank(topic: SurveyedTopic) -> tuple[int, str]:
+        last = topic.name.rpartition("/")[2]
+        own = POSE_NAMES.index(last) if last in POSE_NAMES else len(POSE_NAMES)
+        return own + (topic.type == "nav_msgs/msg/Odometry"), topic.name
+
+    poses = (topic for topic in topics if topic.publishers and {*topic.types} <= {*POSE_PATHS})
+    return min(poses, key=rank, default=None)
+
+
+def is_of_map_page(entry: DraftWidget) -> bool:
+    """Whether a widget belongs beside the map: the battery, the joystick, the actions of Nav2."""
+    kind = entry.keys.get("type", "")
+    return entry.kind in ("map", "joystick") or kind == BATTERY or kind in ACTIONS
+
+
+def on_map_page(entries: Iterable[DraftWidget]) -> Iterator[DraftWidget]:
+    """The entries; those that belong beside the map are on its page, if there is one."""
+    entries = list(entries)
+    if not any(entry.kind == "map" for entry in entries):
+        yield from entries
+        return
+    for entry in entries:
+        yield replace(entry, place=(MAP_PAGE,)) if is_of_map_page(entry) else entry
+
+
+def nav2_goal(action: Server, interfaces: Interfaces) -> tuple[Mapping[str, Any], str] | None:
+    """The keys of a goal of Nav2, and a comment; None for any other action. InterfaceError of a type
+    that is not known."""
+    if action.type not in ACTIONS:
+        return None
+    interfaces.action_types(action.type)
+    return GOALS.get(action.type, {}), ACTIONS[action.type]
+
+
+def is_internal(action: Server) -> bool:
+    """Whether an action is one between Nav2's own servers."""
+    return action.type.startswith(NAV2) and action.type not in ACTIONS
