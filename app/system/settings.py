@@ -53,7 +53,7 @@ SHIPPED_PANELS = {"mobile-robot": "docs/examples/mobile-robot/panel.toml"}
 
 def panel_path(name: str) -> Path:
     """The path of a panel file, or of a shipped panel by its name, if no file has that name."""
-    path = Path(name).expanduser().resolve()
+    path = Path(name).expanduser()
     is_shipped = name in SHIPPED_PANELS and not path.is_file()
     return shipped_path(SHIPPED_PANELS[name]) if is_shipped else path
 
@@ -90,7 +90,7 @@ class Settings:
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
         return cls(
-            panel=panel_path(panel) if (panel := env.get("KIOSK_PANEL")) else PACKAGE / "panel.toml",
+            panel=panel_path(panel).resolve() if (panel := env.get("KIOSK_PANEL")) else PACKAGE / "panel.toml",
             zenoh=_parse_path(env, "KIOSK_ZENOH", shipped_path("zenoh.json5")),
             mode=_parse_mode(env.get("KIOSK_MODE", "")),
             hosts=(*LOOPBACK_HOSTS, *_parse_hosts(env.get("KIOSK_HOSTS", ""))),

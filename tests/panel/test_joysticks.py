@@ -73,3 +73,11 @@ def test_an_input_may_not_have_an_axis_name(tmp_path: Path) -> None:
 
 def test_joystick_needs_an_interlock(tmp_path: Path) -> None:
     assert fault(tmp_path, without(STICK, "interlock"))[0] == "interlock"
+
+
+def test_a_gamepads_stick_moves_one_joystick_of_a_page(tmp_path: Path) -> None:
+    left, right = STICK | {"gamepad": "left"}, STICK | {"id": "turret", "topic": "/turret"}
+    assert len(list(loaded(tmp_path, left, right | {"gamepad": "right"}).widgets())) == 2
+    with pytest.raises(PanelError) as raised:
+        loaded(tmp_path, left, right | {"gamepad": "left"})
+    assert '"stick" has it already: the left stick moves one joystick of a page' in str(raised.value)

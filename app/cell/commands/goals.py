@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from app.cell.commands.nav2_errors import CODE, code_path, sentence_of
 from app.cell.commands.press import PressHandle
 from app.cell.commands.services import LATE_S, with_fields, with_reply
 from app.cell.commands.transport import Transport
@@ -24,6 +23,7 @@ from app.cell.robot.state import Reading, RobotState, Sample
 from app.cell.robot.topics import Topic
 from app.panel.model import Panel
 from app.panel.response_text import response_paths
+from app.panel.known_values import ERROR_CODE, NAV2, known_value
 from app.panel.robot_texts import NO_TEXTS, RobotTexts
 from app.panel.widgets.service_action import Action
 from app.records import OpenPress
@@ -99,7 +99,7 @@ class Goal:
             progress = message.get(FEEDBACK + widget.progress)
             done = math.nan if progress is None else self._done(float(progress))
             self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        self.feedback_text = with_fields(widget.feedback, message, FEEDBACK, texts)
+        self.feedback_text = with_fields(widget.feedback, message, FEEDBACK, texts, widget.type)
 
     def _done(self, progress: float) -> float:
         """The part of the goal that is done; NaN while it is not known from where the progress
@@ -149,6 +149,14 @@ RESULT: Final = "result."  # prefix of the result's fields in the response of `g
 NO_SUCH_GOAL: Final = frozenset({2, 3})  # ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
+
+
+def error_paths(action: Action, interfaces: Interfaces) -> tuple[str, ...]:
+    """The field of a result with Nav2's error code, unless `result` shows it or its message itself."""
+    if not action.type.startswith(NAV2) or {ERROR_CODE, "error_msg"} & {*response_paths(action.result)}:
+        return ()
+    result = interfaces.structures[interfaces.action_types(action.type).result]
+    return tuple(field.name for field in result.fields if field.name == ERROR_CODE)
 
 
 class ActionClient:
@@ -231,8 +239,7 @@ class ActionClient:
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
         """The response of `get_result`: the status, and the result fields that the widget shows."""
-        code = code_path(widget, self._interfaces)
-        shown = (*response_paths(widget.result), *(() if code is None else (code,)))
+        shown = (*response_paths(widget.result), *error_paths(widget, self._interfaces))
         paths = (STATUS, *(RESULT + path for path in shown))
         response = self._interfaces.action_types(widget.type).get_result_response
         try:
@@ -341,8 +348,9 @@ class ResultWaiter:
             return Outcome("unknown", say("goal_forgotten") if goal.is_known else say("goal_not_known"))
         outcome, ended, had_ended = ENDS[status]
         sentence = had_ended if goal.doubt else ended
-        error = sentence_of(fields.get(RESULT + CODE)) if outcome == "aborted" else None
-        text = error or with_fields(goal.widget.result, fields, RESULT, self._robot.texts)
+        widget, code = goal.widget, fields.get(RESULT + ERROR_CODE)
+        error = known_value(widget.type, ERROR_CODE, code) if outcome == "aborted" else None
+        text = error or with_fields(widget.result, fields, RESULT, self._robot.texts, widget.type)
         return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), text))
 
     async def _result(self, goal: Goal) -> bytes | None:

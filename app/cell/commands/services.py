@@ -15,6 +15,7 @@ from app.cell.permission.verdict import server_offered
 from app.cell.robot.definitions import timeout_hint
 from app.cell.robot.option_list import OptionList
 from app.cell.robot.state import RobotState
+from app.panel.known_values import known_value
 from app.panel.model import Panel
 from app.panel.response_text import ResponseField, is_number, pieces, response_paths
 from app.panel.robot_texts import NO_TEXTS, RobotTexts, robot_text
@@ -206,7 +207,9 @@ def _read_call(
     without."""
     success, message = names
     words = [with_fields(f"{{{message}}}", fields, texts=texts)] if message else []
-    words += [with_fields(widget.answer, fields, texts=texts)] if widget.answer else []
+    words += (
+        [with_fields(widget.answer, fields, texts=texts, kind=widget.type)] if widget.answer else []
+    )
     several = [part for word in words if word for part in (" – ", word)]
     reply = together(several[1:])
     now = format_time(time.time())
@@ -235,15 +238,22 @@ def value_in_words(value: Any, texts: RobotTexts) -> TextLike:
 
 
 def with_fields(
-    template: str | PanelText, fields: Fields, within: str = "", texts: RobotTexts = NO_TEXTS
+    template: str | PanelText,
+    fields: Fields,
+    within: str = "",
+    texts: RobotTexts = NO_TEXTS,
+    kind: str = "",
 ) -> TextLike:
     """The template with each `{path}` (relative to `within`) replaced by the field's value, shortened
-    if it is long, "—" if the message has no such element. `texts` are those of the panel file."""
+    if it is long, "—" if the message has no such element. `texts` are those of the panel file, `kind`
+    is the type of the service or action, whose known numbers are sentences."""
 
     def shown(field: ResponseField) -> TextLike:
         value = fields.get(within + field.path)
         if value is None:
             return NO_VALUE
+        if not field.is_written and (known := known_value(kind, field.path, value)):
+            return known
         if is_number(value):
             return number(field.text(value))
         return value_in_words(value, texts)

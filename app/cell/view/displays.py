@@ -19,6 +19,7 @@ from app.cell.robot.state import Reading, RobotState
 from app.cell.robot.topics import kept_s
 from app.cell.view.times import stamp_seconds, time_style, time_text
 from app.panel.base import HasTopic, TopicQos
+from app.panel.known_values import known_value
 from app.panel.numbers import Scaled, WrittenNumber, formatted, is_beyond_battery, shown_number
 from app.panel.robot_texts import NO_TEXTS, RobotTexts, robot_text
 from app.panel.shared_keys import stale_at
@@ -229,6 +230,9 @@ def lamp_of(
 
 
 def _value(widget: Readout, value: Any, robot: RobotState) -> TextLike:
+    is_plain = widget.constants is None and widget.format is None
+    if is_plain and (known := known_value(widget.type, widget.field, value)):
+        return known
     constants = NO_CONSTANTS if widget.constants is None else robot.constants(widget)
     return cell_text(widget, value, constants, robot.texts)
 

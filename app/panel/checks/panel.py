@@ -43,6 +43,7 @@ from app.panel.widgets.families import (
     TopicSource,
     TopicWidget,
 )
+from app.panel.widgets.hold import Joystick
 from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.key_parts import confirmation_of
 from app.panel.widgets.parameter import Parameter, type_faults
@@ -232,7 +233,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _record_faults(panel)
     yield from _trend_faults(panel)
     yield from page_template_faults(panel)
-    yield from _scan_faults(panel)
+    yield from _page_faults(panel)
     yield from grow_faults(panel)
     yield from label_faults(panel)
     yield from needs_faults(panel)
@@ -255,13 +256,27 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
             yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_RULE}: choose another id')
 
 
-def _scan_faults(panel: Panel) -> Iterator[Fault]:
-    """A bar code goes to one input of the page that is open."""
+def _page_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of devices that one widget of the open page has: a bar code reader, a gamepad's stick."""
     for p, page in enumerate(panel.pages):
-        asking = [(at, w) for at, w in page.placed() if isinstance(w, TextInput) and w.scan]
-        for place, _ in asking[1:]:
-            message = f'"{asking[0][1].id}" has it already: a bar code goes to one input of a page'
-            yield Fault(f"page[{p}].{place}.scan", message)
+        firsts: dict[str, str] = {}
+        for place, widget in page.placed():
+            if (taken := _taken(widget)) is None:
+                continue
+            key, device, rule = taken
+            first = firsts.setdefault(device, widget.id)
+            if first != widget.id:
+                message = f'"{first}" has it already: {rule} of a page'
+                yield Fault(f"page[{p}].{place}.{key}", message)
+
+
+def _taken(widget: BaseWidget) -> tuple[str, str, str] | None:
+    """(key, the device that it takes, the rule) of a widget that takes one."""
+    if isinstance(widget, TextInput) and widget.scan:
+        return "scan", "reader", "a bar code goes to one input"
+    if isinstance(widget, Joystick) and widget.gamepad:
+        return "gamepad", widget.gamepad, f"the {widget.gamepad} stick moves one joystick"
+    return None
 
 
 def _ids_at(panel: Panel, places: Sequence[str]) -> Iterator[str]:

@@ -219,6 +219,7 @@ class Joystick(HoldCommand):
     dead_zone: Annotated[float, Field(ge=0, le=0.9)] = 0.1
     ramp_s: Annotated[float, Field(ge=0, le=10)] = 0.0
     frame_id: Annotated[str, Field(max_length=100)] = "base_link"
+    gamepad: Literal["left", "right"] | None = None
     rows: Rows = 3
 
     @property

@@ -60,6 +60,7 @@ END_REASONS: Final[Mapping[str, str]] = {
     "leaving": "hold_by_leaving",
     "lock": "hold_by_lock",
     "escape": "hold_by_escape",
+    "gamepad": "hold_by_gamepad",
     "silence": "hold_by_no_response",
 }
 Deflected = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]

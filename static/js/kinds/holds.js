@@ -355,6 +355,7 @@ class Joystick extends Holding {
     this.button.addEventListener("pointermove", (event) => event.pointerId === this.pointer && this.#moveTo(event));
     this.button.addEventListener("keydown", (event) => this.#keyDown(event));
     window.addEventListener("keyup", (event) => this.#keyUp(event), { capture: true });
+    if (root.dataset.gamepad) new GamepadStick(this, root.dataset.gamepad);
   }
 
   heartbeatData() {
@@ -386,8 +387,16 @@ class Joystick extends Holding {
   #moveTo({ clientX, clientY }) {
     const { left, top, width, height } = find(this.root, ".pad").getBoundingClientRect();
     const reach = (Math.min(width, height) - this.#knob.offsetWidth) / 2;
-    this.#deflect((clientX - left - width / 2) / reach, (top + height / 2 - clientY) / reach);
-    if (performance.now() - this.#beatAt < APART_MS) return;
+    this.deflect((clientX - left - width / 2) / reach, (top + height / 2 - clientY) / reach);
+  }
+
+  // Moves the knob, and says so in the next heartbeat, which comes sooner for it.
+  /** @param {number} x @param {number} y */
+  deflect(x, y) {
+    const before = [this.#x, this.#y];
+    this.#deflect(x, y);
+    const isSame = before[0] === this.#x && before[1] === this.#y;
+    if (isSame || performance.now() - this.#beatAt < APART_MS) return;
     this.#beatAt = performance.now();
     this.beat();
   }
@@ -429,6 +438,82 @@ class Joystick extends Holding {
     const sum = (axis) => held.reduce((all, arrow) => all + arrow[axis], 0);
     this.#deflect(sum(0), sum(1));
     this.beat();
+  }
+}
+
+// A gamepad moves a joystick while its grip key is held, the one above the stick. Only a new press of that key begins
+// a hold: not one from before a lock, a page or the focus of another window.
+
+const LOOK_MS = 20; // between two looks at a gamepad: browsers tell of no change
+/** @type {Record<string, { axes: [number, number], grip: number }>} */
+const STICKS = { left: { axes: [0, 1], grip: 4 }, right: { axes: [2, 3], grip: 5 } }; // of the standard mapping
+
+class GamepadStick {
+  #joystick;
+  #stick;
+  #timer = 0;
+  /** @type {number | null} */
+  #holder = null; // the gamepad whose grip key has begun the hold
+  /** @type {Map<number, boolean>} */
+  #grips = new Map(); // gamepad → whether its grip key was down at the last look
+
+  /** @param {Joystick} joystick @param {string} side */
+  constructor(joystick, side) {
+    this.#joystick = joystick;
+    this.#stick = STICKS[side];
+    for (const name of ["gamepadconnected", "gamepaddisconnected"]) addEventListener(name, () => this.#changed());
+    this.#changed();
+  }
+
+  get #pads() {
+    return navigator.getGamepads().filter((pad) => pad?.connected);
+  }
+
+  // Looks while there is a gamepad.
+  #changed() {
+    const pads = this.#pads;
+    clearInterval(this.#timer);
+    if (pads.length) this.#timer = setInterval(() => this.#look(), LOOK_MS);
+    else this.#look();
+    const { root } = this.#joystick;
+    const isKnown = pads.some((pad) => pad?.mapping === "standard");
+    find(root, ".gamepad-known").hidden = !isKnown;
+    find(root, ".gamepad-unknown").hidden = isKnown || !pads.length;
+  }
+
+  #look() {
+    const joystick = this.#joystick;
+    const pads = this.#pads.filter((pad) => pad?.mapping === "standard");
+    if (!joystick.isHeld) this.#holder = null; // ended by something else
+    if (this.#holder !== null && !pads.some((pad) => pad?.index === this.#holder)) joystick.end("gamepad");
+    const before = this.#grips;
+    this.#grips = new Map();
+    for (const pad of pads) {
+      if (!pad) continue;
+      const isDown = pad.buttons[this.#stick.grip]?.pressed === true;
+      this.#grips.set(pad.index, isDown || !document.hasFocus());
+      if (this.#holder === pad.index) this.#follow(pad, isDown);
+      else if (isDown && before.get(pad.index) === false) this.#begin(pad);
+    }
+  }
+
+  /** @param {Gamepad} pad */
+  #begin(pad) {
+    const joystick = this.#joystick;
+    if (!document.hasFocus() || joystick.isHeld || joystick.busy) return;
+    if (!joystick.button.checkVisibility()) return; // its group is not the one shown
+    joystick.begin();
+    if (!joystick.isHeld) return; // a person has to confirm first
+    this.#holder = pad.index;
+    this.#follow(pad, true);
+  }
+
+  /** @param {Gamepad} pad @param {boolean} isDown */
+  #follow(pad, isDown) {
+    const [right, back] = this.#stick.axes.map((axis) => pad.axes[axis]);
+    if (!isDown) this.#joystick.end("released");
+    else if (!Number.isFinite(right) || !Number.isFinite(back)) this.#joystick.end("gamepad");
+    else this.#joystick.deflect(right, -back);
   }
 }
 

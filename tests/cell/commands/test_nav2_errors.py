@@ -5,7 +5,8 @@ from typing import Any, Final
 
 import pytest
 
-from app.cell.commands.nav2_errors import CODE, SENTENCES, code_path, sentence_of
+from app.cell.commands.goals import error_paths
+from app.panel.known_values import ERROR_CODE, NAV2_ERRORS, known_value
 from app.panel.widgets.service_action import Action
 from app.ros.messages import load_interfaces
 from app.system.settings import panel_path
@@ -20,13 +21,13 @@ def action(type_name: str, **keys: Any) -> Action:
     return Action.model_validate({**about, **keys})
 
 
-def path_of(widget: Action, folders: tuple[Path, ...] = FOLDERS) -> str | None:
-    return code_path(widget, load_interfaces("jazzy", folders))
+def paths_of(widget: Action, folders: tuple[Path, ...] = FOLDERS) -> tuple[str, ...]:
+    return error_paths(widget, load_interfaces("jazzy", folders))
 
 
-@pytest.mark.parametrize("code", SENTENCES)
+@pytest.mark.parametrize("code", NAV2_ERRORS)
 def test_each_code_has_a_sentence_with_the_code_and_what_to_do(code: int) -> None:
-    sentence = sentence_of(code)
+    sentence = known_value(NAVIGATE, ERROR_CODE, code)
     assert sentence is not None
     assert f"({code}). " in render(sentence)
     assert sentence.code in sentences(ENGLISH)
@@ -34,22 +35,22 @@ def test_each_code_has_a_sentence_with_the_code_and_what_to_do(code: int) -> Non
 
 @pytest.mark.parametrize("code", [0, 100, 200, 999, 9000, 65535, None, "105"])
 def test_code_that_says_nothing_has_none(code: object) -> None:
-    assert sentence_of(code) is None
+    assert known_value(NAVIGATE, ERROR_CODE, code) is None
 
 
 def test_planner_has_the_same_sentences_for_one_pose_and_for_several() -> None:
-    assert [SENTENCES[200 + code] for code in range(1, 9)] == [SENTENCES[300 + n] for n in range(1, 9)]
+    assert [NAV2_ERRORS[200 + n] for n in range(1, 9)] == [NAV2_ERRORS[300 + n] for n in range(1, 9)]
 
 
 def test_only_actions_of_nav2_with_a_code_are_read() -> None:
-    assert path_of(action(NAVIGATE)) == CODE
-    assert path_of(action(NAVIGATE, result="arrived")) == CODE
-    assert path_of(action(NAVIGATE, result="error {error_code}")) is None
-    assert path_of(action("example_interfaces/action/Fibonacci")) is None
+    assert paths_of(action(NAVIGATE)) == (ERROR_CODE,)
+    assert paths_of(action(NAVIGATE, result="arrived")) == (ERROR_CODE,)
+    assert paths_of(action(NAVIGATE, result="error {error_code}")) == ()
+    assert paths_of(action("example_interfaces/action/Fibonacci")) == ()
 
 
 def test_result_without_a_code_is_not_read(tmp_path: Path) -> None:
     folder = tmp_path / "nav2_msgs/action"
     folder.mkdir(parents=True)
     (folder / "NavigateToPose.action").write_text("geometry_msgs/PoseStamped pose\n---\n---\n")
-    assert path_of(action(NAVIGATE), (tmp_path,)) is None
+    assert paths_of(action(NAVIGATE), (tmp_path,)) == ()
