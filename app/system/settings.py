@@ -89,8 +89,9 @@ class Settings:
         level = (env.get("KIOSK_LOG_LEVEL") or "info").lower()
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
+        panel = env.get("KIOSK_PANEL")
         return cls(
-            panel=panel_path(panel).resolve() if (panel := env.get("KIOSK_PANEL")) else PACKAGE / "panel.toml",
+            panel=panel_path(panel).resolve() if panel else PACKAGE / "panel.toml",
             zenoh=_parse_path(env, "KIOSK_ZENOH", shipped_path("zenoh.json5")),
             mode=_parse_mode(env.get("KIOSK_MODE", "")),
             hosts=(*LOOPBACK_HOSTS, *_parse_hosts(env.get("KIOSK_HOSTS", ""))),

@@ -21,9 +21,9 @@ from app.cell.robot.definitions import timeout_hint
 from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.cell.robot.state import Reading, RobotState, Sample
 from app.cell.robot.topics import Topic
+from app.panel.known_values import ERROR_CODE, NAV2, known_value
 from app.panel.model import Panel
 from app.panel.response_text import response_paths
-from app.panel.known_values import ERROR_CODE, NAV2, known_value
 from app.panel.robot_texts import NO_TEXTS, RobotTexts
 from app.panel.widgets.service_action import Action
 from app.records import OpenPress

@@ -123,7 +123,7 @@ class MapView {
   }
 
   // Where an event is in the map's frame, in metres; null without a map.
-  /** @param {PointerEvent | MouseEvent} event @returns {Point | null} */
+  /** @param {MouseEvent} event @returns {Point | null} */
   pointAt(event) {
     if (!this.#grid || !this.#perMetre) return null;
     const { clientWidth, clientHeight } = this.#view;
@@ -242,7 +242,7 @@ class MapView {
     this.#draw();
   }
 
-  /** @param {PointerEvent} event @returns {Point} */
+  /** @param {MouseEvent} event @returns {Point} */
   #point({ clientX, clientY }) {
     const { left, top } = this.#view.getBoundingClientRect();
     return { x: clientX - left, y: clientY - top };
