@@ -9,6 +9,7 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
+from tests.docs.test_palletizing import PANELS as QUOTED_PANELS
 from tests.support.beside_panel import put_named_fonts
 from tests.support.parts import ROOT, Server
 from tests.support.processes import command
@@ -28,7 +29,11 @@ def examples(name: str) -> list[str]:
 
 
 GUIDE: Final = examples("panel-file.md")
-HOW_TOS: Final = [f"how-to/{path.name}" for path in sorted((DOCS / "how-to").glob("*.md"))]
+HOW_TOS: Final = [
+    f"how-to/{path.name}"
+    for path in sorted((DOCS / "how-to").glob("*.md"))
+    if f"docs/how-to/{path.name}" not in QUOTED_PANELS  # its examples are of that panel
+]
 
 
 @pytest.fixture
