@@ -12,6 +12,7 @@ from app.panel.keys import SUMS, PanelKeys
 from app.panel.keys import RobotEntry as RobotEntry
 from app.panel.layout import FRAMES, Page
 from app.panel.needs import PanelNeeds, needs_of
+from app.panel.template import uses_now
 from app.panel.texts import panel_texts
 from app.panel.widgets.displays import LogView
 from app.panel.widgets.families import (
@@ -57,6 +58,8 @@ def uniform_buttons(commands: Iterable[Command], alarms: Iterable[Alarm]) -> Uni
     groups: UniformButtons = {}
     for widget in commands:
         if not isinstance(widget, PublishPress) or widget.shows_more:
+            continue
+        if any(map(uses_now, widget.templates())):  # a simulated time that is not known locks them
             continue
         if widget.id not in inhibited and not widget.confirmation:
             key = widget.interlocks, widget.role == "stop"

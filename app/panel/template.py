@@ -3,7 +3,7 @@
 
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from string import Formatter
 from typing import Any, Final
@@ -17,10 +17,21 @@ TIME: Final = "builtin_interfaces/msg/Time"
 NS_PER_S: Final = 10**9
 
 
-def add_now(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of inputs with the current time as `{now}`."""
-    seconds, rest = divmod(time.time_ns(), NS_PER_S)
+def add_now(values: Mapping[str, Any], now_ns: int | None = None) -> dict[str, Any]:
+    """The values of inputs with a time as `{now}`, in nanoseconds; by default the panel's clock."""
+    seconds, rest = divmod(time.time_ns() if now_ns is None else now_ns, NS_PER_S)
     return {**values, NOW: {"sec": seconds, "nanosec": rest}}
+
+
+def uses_now(template: Any) -> bool:
+    """Whether a template contains `{now}`."""
+    return any(name == NOW for _, name in placeholders(template))
+
+
+def fill_to_send(template: Any, values: Mapping[str, Any], now_ns: Callable[[], int]) -> Any:
+    """The template filled with the values of inputs, and `{now}` by a clock, which is read only for
+    it."""
+    return fill(template, add_now(values, now_ns()) if uses_now(template) else values)
 
 
 def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:

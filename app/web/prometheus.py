@@ -105,15 +105,26 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
         "1 while the robot's list of options is known",
         labels=["robot", "select"],
     )
+    skews = GaugeMetricFamily(
+        "kiosk_clock_skew_seconds",
+        "How far the robot's clock is ahead of the panel's",
+        labels=["robot"],
+    )
+    simulated = GaugeMetricFamily(
+        "kiosk_simulated_time", "1 while the robot runs on simulated time", labels=["robot"]
+    )
     for session in fleet.sessions:
         robot, name = session.robot, session.entry.id if session.entry else ""
         up.add_metric([name], int(robot.link_up))
         bridges.add_metric([name], len(robot.graph.peers))
         ready.add_metric([name], int(session.link_verdict.permitted))
+        simulated.add_metric([name], int(robot.clock.simulated is not None))
+        if robot.clock.skew is not None:
+            skews.add_metric([name], robot.clock.skew.seconds)
         for key, count in robot.traffic.undecodable.items():
             unreadable.add_metric([name, key], count)
         for select in session.panel.listed_selects:
             if select.options_from is not None:
                 now = options_now(select, select.options_from, robot, time.monotonic())
                 listed.add_metric([name, select.id], int(now.verdict.permitted))
-    yield from (up, bridges, ready, unreadable, listed)
+    yield from (up, bridges, ready, skews, simulated, unreadable, listed)

@@ -18,7 +18,7 @@ from app.cell.robot.state import RobotState
 from app.cell.view.displays import field_state
 from app.panel.constants import resolve_at
 from app.panel.model import Panel
-from app.panel.template import add_now, fill, input_ids
+from app.panel.template import fill, fill_to_send, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.kinds import find_row, require_rows
@@ -27,6 +27,7 @@ from app.panel.widgets.publish import Confirm, Publish, PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.switch import Switch
+from app.panel.widgets.templated import is_stop
 from app.records.entry import FinalCheck, Outcome
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
@@ -175,7 +176,7 @@ class Dispatcher:
         be sent, PressRefused from the handle's `final_check`.
         """
         values = self._checked_inputs(press)
-        fields = fill(press.widget.template, add_now(values))
+        fields = self._filled(press.widget, values)
         dispatch = find_row(self.dispatches, press.widget)
         return await dispatch.send(press.widget, PreparedPress(values, fields, handle))
 
@@ -183,7 +184,12 @@ class Dispatcher:
         """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
         widget, values = press.widget, self._checked_inputs(press)
         dispatch = find_row(self.dispatches, widget)
-        return dispatch.refusal(widget, fill(widget.template, add_now(values)))
+        return dispatch.refusal(widget, self._filled(widget, values))
+
+    def _filled(self, widget: PressCommand, values: Mapping[str, Any]) -> Any:
+        clock = self._robot.clock
+        now_ns = clock.stop_ns if is_stop(widget) else clock.now_ns
+        return fill_to_send(widget.template, values, now_ns)
 
     def _checked_inputs(self, press: Press[PressCommand]) -> dict[str, Any]:
         return self.check_inputs(self._input_ids[press.widget.id], press.inputs)

@@ -32,7 +32,7 @@ from app.cell.commands.transport import Transport
 from app.cell.permission.interlocks import link_verdict
 from app.cell.robot.state import RobotState
 from app.panel.model import Panel
-from app.panel.template import add_now, fill, input_ids
+from app.panel.template import fill_to_send, input_ids
 from app.panel.widgets.hold import HoldCommand, Joystick, fill_own_fields
 from app.records.entry import FinalCheck, Outcome, OutcomeCode, no_check
 from app.ros.dialects.peer_traits import PeerSentences
@@ -129,7 +129,7 @@ class HoldMessages:
         """The checked values for both messages; FieldError or InputError for bad input."""
         values = self._check(input_ids(widget), inputs)
         for template in widget.templates():
-            fields = fill(template, add_now(values))
+            fields = fill_to_send(template, values, self._robot.clock.stop_ns)
             self._interfaces.encode(widget.type, fill_own_fields(widget, fields, 0, 0))
         return values
 
@@ -142,7 +142,8 @@ class HoldMessages:
     ) -> None:
         """Publishes one message, with the values of a joystick's axes; LinkError if it could not be
         sent, PressRefused from `final_check`."""
-        self._put(widget, widget.moving(*axes), values, widget.deadline_ms, final_check)
+        now_ns = self._robot.clock.now_ns
+        self._put(widget, widget.moving(*axes), values, widget.deadline_ms, final_check, now_ns)
 
     def put_last(self, widget: HoldCommand, values: Values, now: float) -> TextLike:
         """Publishes the stop message if the link is up, even without permission: an extra stop does no
@@ -150,7 +151,7 @@ class HoldMessages:
         if not self._robot.link_up or not self._robot.graph.peers:
             return link_verdict(self._robot, now).reason or ""
         try:
-            self._put(widget, widget.stopping(), values, 0, no_check)
+            self._put(widget, widget.stopping(), values, 0, no_check, self._robot.clock.stop_ns)
         except LinkError as error:
             return say("with_stop", said=error.text)
         return ""
@@ -162,12 +163,13 @@ class HoldMessages:
         values: Values,
         deadline_ms: int,
         final_check: FinalCheck,
+        now_ns: Callable[[], int],
     ) -> None:
         count = self._counts.get(widget.id, 0) + 1
         if widget.counter_field is not None:
             kind = self._interfaces.field_type(widget.type, widget.counter_field)
             count %= INTEGER_RANGES[kind][1] + 1
-        fields = fill(template, add_now(values))
+        fields = fill_to_send(template, values, now_ns)
         whole = fill_own_fields(widget, fields, deadline_ms, count)
         payload = self._interfaces.encode(widget.type, whole)
         final_check()

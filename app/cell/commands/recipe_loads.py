@@ -24,7 +24,7 @@ from app.cell.recipes.reported import (
     unknown_reason,
 )
 from app.cell.robot.state import RobotState
-from app.panel.template import add_now, fill
+from app.panel.template import fill_to_send
 from app.panel.values import same_value
 from app.panel.widgets.families import Input
 from app.panel.widgets.parameter import Parameter, Value
@@ -105,7 +105,9 @@ class RecipeLoader:
     def message(self, widget: RecipeLoad, chosen: ChosenRecipe) -> dict[str, Any]:
         """The fields of the message or request that loads it."""
         sent = _sent_values(widget, chosen)
-        filled: dict[str, Any] = fill(widget.parts[0].templates()[0], add_now(sent))
+        filled: dict[str, Any] = fill_to_send(
+            widget.parts[0].templates()[0], sent, self._robot.clock.now_ns
+        )
         return filled
 
     async def load(self, widget: RecipeLoad, prepared: Prepared, send: Send) -> Outcome:

@@ -129,7 +129,8 @@ class TrendRecorder:
         if not pending.whole:
             self._interrupt(pending.key)
         try:
-            values = self._readers[pending.key].read(pending.data, pending.wall)
+            received = self._robot.clock.time_at(pending.wall)
+            values = self._readers[pending.key].read(pending.data, received)
         except DecodeError:  # the topic's state counts and logs it
             self._interrupt(pending.key)
             return

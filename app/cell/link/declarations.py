@@ -3,8 +3,10 @@ liveliness tokens."""
 
 import logging
 from collections.abc import Callable, Iterator
+from typing import Final
 
 from app.cell.link.rosout import LOG_TYPE
+from app.cell.robot.clocks import CLOCK, CLOCK_TYPE
 from app.cell.robot.state import RobotState
 from app.panel.model import Panel
 from app.panel.widgets.hold import HoldCommand
@@ -77,6 +79,8 @@ def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
 
 log = logging.getLogger("kiosk.tokens")
 
+CLOCK_QOS: Final = Qos(reliable=False, depth=1)  # rclcpp's ClockQoS: it reads what any publisher offers
+
 
 class LivelinessTokens:
     """The tokens of one robot's panel, from one join to the next."""
@@ -110,6 +114,8 @@ class LivelinessTokens:
             ),
             ("MP", ROSOUT_TOPIC, LOG_TYPE, ROSOUT),
         ]
+        if self._robot.clock.simulated is not None and CLOCK not in self._panel.listened():
+            wanted.append(("MS", CLOCK, CLOCK_TYPE, CLOCK_QOS))
         own = []
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)

@@ -39,6 +39,7 @@ ABSENCES: Final[Mapping[Absence, Text]] = {
     "no_rotation": say("absence_no_rotation"),
     "no_time": say("absence_no_time"),
     "other_clock": say("absence_other_clock"),
+    "other_time": say("absence_other_time"),
 }
 
 HOLDS: Final[Mapping[str, Callable[[Any, Any], bool]]] = {

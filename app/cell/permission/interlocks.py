@@ -35,6 +35,7 @@ from app.cell.robot.state import RobotState
 from app.cell.robot.topics import kept_s
 from app.panel.condition import Interlock, NamedCondition
 from app.panel.shared_keys import stale_at
+from app.panel.template import uses_now
 from app.panel.values import number_text
 from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row, require_rows
@@ -43,6 +44,7 @@ from app.panel.widgets.publish import PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.switch import Switch
+from app.panel.widgets.templated import is_stop
 from app.records.entry import IDLE
 from app.ros.dialects.peer_traits import EVERY_SENTENCES, PeerSentences
 from app.ros.messages import has_key
@@ -171,6 +173,8 @@ def _with_publishers(verdict: Verdict, interlock: Interlock, robot: RobotState) 
 def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:
     """Why a command may not be sent, beside the link and its interlocks; None where nothing locks
     it."""
+    if robot.clock.is_awaited and not is_stop(widget) and any(map(uses_now, widget.templates())):
+        return locked("clock_awaited_lock")
     return find_row(COMMAND_CHECKS, widget)(widget, robot, now)
 
 

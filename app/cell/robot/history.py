@@ -221,6 +221,11 @@ class History:
         if abs(shift - self.shift) > CLOCK_SET_S:
             self.shift = shift
 
+    def interrupt(self) -> None:
+        """Marks a gap in all fields before the next value."""
+        for field in self.fields.values():
+            field.interrupt()
+
     def begin_after(self, at: float) -> None:
         """This run begins after a time of the run before, whatever the clock says."""
         if at >= self.start:

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Literal
 
 from app.cell.robot.alarmed import NO_ALARMED, AlarmAction, AlarmSelection
+from app.cell.robot.clocks import CLOCK, LARGEST_BYTES, RobotClock, begins_with_stamp, first_stamp
 from app.cell.robot.definitions import DefinitionDifference, difference
 from app.cell.robot.graph import EndpointPresence, LiveGraph, required_endpoints
 from app.cell.robot.history import History
@@ -94,7 +95,7 @@ class RobotState:
         # A node is there while its parameter services are.
         nodes = [f"{alarm.node}/{GET[0]}" for alarm in panel.alarms if alarm.node]
         listed = (*panel.listened(), *panel.publications(), *(name for _, name in needed))
-        named = (*nodes, *listed, *panel.services(), ROSOUT_TOPIC)
+        named = (*nodes, *listed, *panel.services(), ROSOUT_TOPIC, CLOCK)
         self.required_keys = frozenset(key for name in named for key in self.possible_keys(name))
         self._global_keys = frozenset(self.key(name) for name in named if name.startswith(GLOBAL))
         self.graph = LiveGraph(dialect, own_zid, self._own_namespace, self.required_keys)
@@ -125,9 +126,16 @@ class RobotState:
         self.traffic, self.round_trips = Traffic(self._log), RoundTrips()
         self.slices = slices or Slices()
         self._on_late_reading, self._interfaces = on_late_reading, interfaces
+        self.clock = RobotClock()
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
+        self._stamped = frozenset(
+            key
+            for topic, type_name in panel.subscriptions().items()
+            if begins_with_stamp(type_name, interfaces.structures)
+            for key in self.possible_keys(topic)
+        )
         self.table_entries = TableEntries(panel, interfaces, self.key, self.slices, on_entries_decoded)
         self.log_lines = {
             key: lines
@@ -155,6 +163,7 @@ class RobotState:
                 on_late_reading=partial(self._on_late_reading, key),
                 keyed=[path for path in dict.fromkeys(paths) if has_key(path)],
                 timed=[panel.state.field] if panel.state and panel.state.topic == topic else (),
+                time_at=self.clock.time_at,
             )
             yield key, made
 
@@ -197,6 +206,24 @@ class RobotState:
         """Whether a message of a topic would be decoded by a definition that is not its own."""
         return self.difference("MP", key) is not None
 
+    def measure_clock(self, key: str, sample: Sample) -> None:
+        """Compares the stamps of a topic's newest sample with the panel's clock, once a second."""
+        source, clock = sample.source, self.clock
+        if sample.sent is not None and source in self.graph.peers and source is not None:
+            clock.record_peer(source, sample.sent, sample.wall, sample.at)
+        if key not in self._stamped or sample.cached or len(sample.payload) > LARGEST_BYTES:
+            return
+        if self.is_foreign(source) or self.is_misread(key) or not clock.is_due(key, sample.at):
+            return
+        if (stamp := first_stamp(bytes(sample.payload))) is not None:
+            clock.record_topic(key, stamp, sample.wall, sample.at)
+
+    def restart_time(self) -> None:
+        """The simulated time went back: what was received before is of another run of it."""
+        self.clock.forget_stamps()
+        self.transforms.restart()
+        self.history.interrupt()
+
     def update(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
         if self.is_misread(key):
@@ -211,6 +238,7 @@ class RobotState:
         """A peer was lost at `seq`: its earlier samples are no longer valid. Without a bridge it is a
         process of the robot's, which has ended."""
         self.silent_publishers.remove_peer(peer)
+        self.clock.forget_peer(peer)
         status: Literal["cut", "ended"] = "cut" if self.traits.stamped_by_peer else "ended"
         if self.traits.stamped_by_peer:
             self._cut_maps()
@@ -269,6 +297,7 @@ class RobotState:
     def mark_link_lost(self) -> None:
         """The link was lost: the graph is empty, and no sample is valid."""
         self.link_up, self.settled_at = False, math.inf
+        self.clock.forget()
         self.graph = LiveGraph(self.dialect, "", self._own_namespace, self.required_keys)
         self.silent_publishers = SilentPublishers(self._condition_keys, self.traits)
         self.topic_publishers = TopicPublishers()

@@ -308,11 +308,14 @@ class Topic:
         on_late_reading: Callable[[Reading], None],
         keyed: Collection[str] = (),
         timed: Collection[str] = (),
+        time_at: Callable[[float], float] = lambda wall: wall,
     ) -> None:
         """Of a `lossless` topic each message counts, and of one with the paths `keyed` each message
         that has arrived. The changes of the fields `timed` are timed. `on_late_reading` takes a reading
-        that needed more than one turn; `on_unreadable` a sample that can't be decoded."""
+        that needed more than one turn; `on_unreadable` a sample that can't be decoded. `time_at` is the
+        robot's, see `RobotClock`: ages of stamps are by it."""
         self._reader = reader
+        self._time_at = time_at
         self._slices = slices
         self._on_unreadable = on_unreadable
         self._on_late_reading = on_late_reading
@@ -405,7 +408,7 @@ class Topic:
         if len(newest.payload) > SMALL_BYTES:
             return
         try:
-            fields = self._reader.read(bytes(newest.payload), newest.wall)
+            fields = self._reader.read(bytes(newest.payload), self._time_at(newest.wall))
         except DecodeError:
             return
         if all(fields.get(path) is not None for path in self._keyed):
@@ -417,7 +420,8 @@ class Topic:
         if self._walk is None and self._unread:
             sample = self._unread.take()
             data = bytes(sample.payload)
-            self._walk = _PendingRead(sample, self._reader.walk(data, sample.wall), len(data))
+            walk = self._reader.walk(data, self._time_at(sample.wall))
+            self._walk = _PendingRead(sample, walk, len(data))
         return self._walk
 
     def _read_one(self, walked: "_PendingRead", read: Callable[[], Fields | None]) -> Reading | None:

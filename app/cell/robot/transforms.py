@@ -167,6 +167,7 @@ class _Frame:
 
     parent: str
     is_cut: bool = False  # it is from before the link was lost
+    has_restarted: bool = False  # the robot's time went back: its stamps are of before
     static: Transform | None = None
     at: float = -math.inf
     stamps: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))
@@ -175,9 +176,10 @@ class _Frame:
     def add(self, stamp: float, transform: Transform, at: float) -> None:
         """Takes one with a newer stamp: a robot whose stamps do not go on gets old."""
         # Further back, a recording or a simulation has begun again.
-        if self.stamps and stamp < self.stamps[-1] - BACK_S:
+        if self.stamps and (self.has_restarted or stamp < self.stamps[-1] - BACK_S):
             self.stamps.clear()
             self.transforms.clear()
+        self.has_restarted = False
         if not self.stamps or stamp > self.stamps[-1]:
             if len(self.stamps) > 1 and stamp - self.stamps[-2] < STEP_S:
                 self.stamps.pop()
@@ -265,6 +267,11 @@ class TransformTree:
             frame.is_cut = True
         self.is_full = False
         self._problems.clear()
+
+    def restart(self) -> None:
+        """The robot's time went back: the next transforms that move count, whatever their stamps."""
+        for frame in self._frames.values():
+            frame.has_restarted = True
 
     def locate(self, base: str, fixed: str, wanted: float | None = None) -> LocatedFrame | TextLike:
         """Where the frame `base` is in the frame `fixed`, at the newest common time, or at the robot's

@@ -99,6 +99,7 @@ class Ingest:
             for key in listener.keys:
                 self._by_key.setdefault(key, []).append(listener)
         self.recorded = frozenset(self._by_key)
+        self._clock_version = robot.clock.version
         judged = {topic for alarm in panel.alarms for topic in alarm.evaluated_topics}
         judged |= {topic for recipes in panel.recipes for topic in recipes.readback_topics}
         self._judged = frozenset(key for topic in judged for key in robot.possible_keys(topic))
@@ -121,6 +122,7 @@ class Ingest:
             sample = self._with_peer(sample)
             updates.topics.add(key)
             self._robot.traffic.record(key, sample)
+            self._robot.measure_clock(key, sample)
             if sample.overrun and key in self._interlocks:
                 self._robot.invalidate(key)
                 yield updates.step()
@@ -137,6 +139,8 @@ class Ingest:
                 updates.other = True
             else:
                 updates.values.add(key)
+        updates.urgent |= self._clock_version != self._robot.clock.version
+        self._clock_version = self._robot.clock.version
         self._notify(changes)
         self._apply_tokens(changes.tokens, updates)
         yield updates

@@ -35,6 +35,7 @@ from app.cell.robot.log_lines import LogListener
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import Slices
 from app.cell.session.alarms import Alarms
+from app.cell.session.clock import ClockListener
 from app.cell.session.frames import Frames
 from app.cell.session.ingest import Ingest, SampleListener
 from app.cell.session.looks import GraphSurvey, NodeRoundTrips, TopicPreviews
@@ -145,6 +146,7 @@ class RobotSession:
     looks: TopicPreviews
     renewal: Renewal
     rosout: Rosout
+    clock: ClockListener
     recorders: Sequence[SessionRecorder]
     _listeners: ExitStack = field(default_factory=ExitStack, init=False)
 
@@ -209,6 +211,7 @@ class RobotSession:
         self.turn.stop()
         self._listeners.close()
         self.rosout.stop()
+        self.clock.stop()
         self.refresher.stop()
         self.press_guard.close()
         await self.looks.stop()
@@ -421,6 +424,7 @@ def wire_session(
         looks=TopicPreviews(context),
         renewal=Renewal(link, robot),
         rosout=Rosout(robot, context.interfaces, link, asyncio.get_running_loop(), own_line),
+        clock=ClockListener(context, partial(peer.on_graph_change, False)),
         recorders=recorders,
     )
     _connect(signals, robot_alarms, session)
@@ -455,6 +459,7 @@ def _connect(signals: RobotSignals, robot_alarms: RobotAlarms, session: RobotSes
     turn, refresher = session.turn, session.refresher
     signals.arrived.connect(turn.wake)
     signals.judging.connect(turn.run)
+    signals.ran.connect(session.clock.update)
     signals.changed.connect(turn.changed)
     signals.status_set.connect(turn.status_set)
     robot_alarms.rows_changed.connect(refresher.refresh_alarms)

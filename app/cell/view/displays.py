@@ -174,7 +174,7 @@ def readout(widget: Readout, robot: RobotState, now: float) -> tuple[dict[str, A
     field = field_state(widget, robot, now)
     if style := time_style(widget.format, field.value):
         reading = robot.reading(widget.topic).of_field(widget.field, math.inf)
-        wall = reading.wall + now - reading.at
+        wall = robot.clock.time_at(reading.wall + now - reading.at)
         text, changes_in = shown_time(widget, style, field.value, wall)
         until = min(field.until, now + changes_in)
         return {"state": field.state, "text": text, "note": field.note}, until

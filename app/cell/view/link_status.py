@@ -15,6 +15,7 @@ from app.cell.permission.verdict import PERMITTED, Verdict, topic_mismatch
 from app.cell.robot.definitions import DefinitionDifference, is_unhashed, uncallable_dds
 from app.cell.robot.graph import LiveGraph, cached_until_change
 from app.cell.robot.state import RobotState
+from app.cell.view.clock_status import clock_note
 from app.panel.model import Panel
 from app.panel.shared_keys import stale_at
 from app.ros.dialects.dialect import Role
@@ -94,6 +95,7 @@ NODE: Final = GONE.union(sentences.uncallable for sentences in EVERY_SENTENCES) 
     "interlock_not_a_number",
     "interlock_field_ambiguous",
     "interlock_field_no_value",
+    "clock_awaited_lock",
     "topic_wrong_type",
     "topic_definition_differs",
     "qos_robot_best_effort",
@@ -154,7 +156,8 @@ def link_statuses(
     silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
     peer_reason = passable.reason or _first(verdicts, PEER).reason or ""
     node_state, node_text, node_reason = _node(robot, passable, verdicts, silence)
-    node_reason = joined([node_reason, definition_notes(robot)], "between_lines")
+    notes = [node_reason, definition_notes(robot), clock_note(robot, now)]
+    node_reason = joined(notes, "between_lines")
     links = {
         "server": _link("server", "ok", "ok", ""),
         "bridge": _link(sentences.lamp, state, text, peer_reason, *labels(panel, verdicts, PEER)),

@@ -1,7 +1,7 @@
 """What a table shows: pure, from (widget, robot, time)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from app.cell.robot.state import RobotState
@@ -25,7 +25,8 @@ def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any],
     rows = robot.table_entries.rows(widget.id)
     constants = _constants(widget, robot)
     ages = [_age(widget, entry, now) for entry in rows.first]
-    cells = [_cells(widget, entry, constants, robot.texts, now) for entry in rows.first]
+    time_at = robot.clock.time_at
+    cells = [_cells(widget, entry, constants, robot.texts, time_at, now) for entry in rows.first]
     attributes = {
         "state": whole.state,
         "note": whole.note,
@@ -86,9 +87,10 @@ def _cells(
     entry: TableEntry,
     columns: list[tuple[Column, ColumnField, Mapping[str, Any]]],
     texts: RobotTexts,
+    time_at: Callable[[float], float],
     now: float,
 ) -> tuple[list[dict[str, TextLike]], float]:
-    """The cells of a row, and when they change."""
+    """The cells of a row, and when they change. `time_at` is that of the robot's clock."""
     cells: list[dict[str, TextLike]] = []
     until = math.inf
     for column, field, constants in columns:
@@ -97,7 +99,8 @@ def _cells(
         if value is not None and field.states:
             cell = lamp_of(field.states, value, texts)
         elif style := time_style(field.format, value):
-            text, changes_in = shown_time(field, style, value, entry.wall + now - entry.at)
+            wall = time_at(entry.wall + now - entry.at)
+            text, changes_in = shown_time(field, style, value, wall)
             cell, until = (text, "", ""), min(until, now + changes_in)
         elif value is not None:
             cell = (cell_text(field, value, constants, texts), "", "")

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from app.panel.times import DEFAULT_FORMATS, TIME_FORMATS
 from app.records.entry import GOOD_OUTCOMES, CommandStatus
+from app.ros.messages.field_path import EARLIEST_S
 from app.system.clock import format_age, format_datetime, format_time
 from app.system.texts import Text, TextLike, number, say
 
@@ -34,8 +35,8 @@ def stamp_seconds(value: Any) -> float | None:
 
 
 def time_text(style: str, seconds: float, wall: float) -> tuple[TextLike, float]:
-    """The text, and the seconds after which it changes; `wall` is the server's clock, in seconds since
-    the epoch, as is a time."""
+    """The text, and the seconds after which it changes; `wall` is the robot's time in seconds, NaN
+    where times can't be compared with it (`RobotClock.time_at`)."""
     if style == "duration":
         return duration_text(seconds), math.inf
     if seconds == 0:
@@ -44,6 +45,8 @@ def time_text(style: str, seconds: float, wall: float) -> tuple[TextLike, float]
         return say("time_beyond"), math.inf
     if style == "time":
         return format_datetime(seconds), math.inf
+    if math.isnan(wall) or seconds < EARLIEST_S <= wall:
+        return say("time_other"), math.inf
     return _age(wall - seconds), _age_changes_in(wall - seconds)
 
 

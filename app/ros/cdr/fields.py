@@ -179,7 +179,7 @@ class FieldReader(_Program):
         self.calls = calls or {}
 
     def walk(self, data: bytes, received: float = math.nan) -> Walk[Fields]:
-        """Starts to decode a message that the server received at a time, in seconds since the epoch."""
+        """Starts to decode a message that arrived at a time, in seconds, see `computed`."""
         return _FieldWalk(self, data, received)
 
     def read(self, data: bytes, received: float = math.nan) -> Fields:

@@ -152,13 +152,13 @@ def field_name(path: str) -> str:
 
 Structures = Mapping[str, Structure]
 # Why a function has no value: the list has no elements; the quaternion is no rotation; the time is
-# zero; it is of another clock than the server's.
-Absence = Literal["empty", "no_rotation", "no_time", "other_clock"]
+# zero; it is ahead of the robot's clock; it is of another time, as that of a recording.
+Absence = Literal["empty", "no_rotation", "no_time", "other_clock", "other_time"]
 
 TIME: Final = "builtin_interfaces/msg/Time"
 ROTATION: Final = 0.1  # by which the squared length of a quaternion may differ from 1
 AHEAD_S: Final = 0.1  # a stamp that is further ahead is of another clock
-EARLIEST_S: Final = 1_000_000_000.0  # 2001; an earlier stamp is of a simulation's clock
+EARLIEST_S: Final = 1_000_000_000.0  # 2001; an earlier time is that of a simulation
 SLICE_NUMBERS: Final = 20_000  # compared at once
 DEPTH: Final = 3  # how deep a fitting field is looked for
 MOST_FITTING: Final = 3  # that are named
@@ -286,8 +286,8 @@ def _fitting(
 
 
 def computed(name: str, values: Sequence[Any], received: float) -> Iterator[Any]:
-    """The result as the last item, with None after each slice before it. `received` is when the server
-    received the message, in seconds since the epoch; NaN if that is not known."""
+    """The result as the last item, with None after each slice before it. `received` is when the message
+    arrived, in seconds, by the clock that its stamps are of; NaN if that is not known."""
     if any(value is None for value in values):
         yield None
     elif name in ("min", "max"):
@@ -344,7 +344,7 @@ def _age(stamp: Any, received: float) -> float | NoValue:
     seconds: float = stamp.sec + stamp.nanosec / 1e9
     if not seconds:
         return NoValue("no_time")
+    if math.isnan(received) or (seconds < EARLIEST_S <= received):
+        return NoValue("other_time")
     age = received - seconds
-    if seconds < EARLIEST_S or not age >= -AHEAD_S:
-        return NoValue("other_clock")
-    return max(age, 0.0)
+    return NoValue("other_clock") if age < -AHEAD_S else max(age, 0.0)

@@ -5,6 +5,7 @@ inbox. Knows nothing of Zenoh.
 """
 
 import itertools
+import math
 import threading
 import time
 from collections.abc import Callable, Collection
@@ -16,6 +17,7 @@ from app.system.limits import BoundedQueue
 
 UNSEEN_MOST: Final = 256  # changes of a lossless topic that are kept from one drain to the next
 UNSEEN_BYTES: Final = 1_000_000  # and their bytes
+TIMED_EVERY_S: Final = 1.0  # between two drains with the sender's time of samples
 KEPT_MOST: Final = 4_000  # samples of all recorded topics that are kept from one drain to the next
 KEPT_BYTES: Final = 32_000_000  # and their bytes
 
@@ -89,10 +91,10 @@ class _Arrived:
     skipped: int = 0
     unseen: Superseded | None = None
 
-    def sample(self, kept: bool = False) -> Sample:
-        """`sent` is set for kept samples only: reading a stamp's time is slow."""
+    def sample(self, timed: bool = False) -> Sample:
+        """`sent` is set for `timed` samples only: reading a stamp's time is slow."""
         source = None if self.stamp is None else str(self.stamp.get_id())
-        sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
+        sent = self.stamp.get_time().timestamp() if timed and self.stamp is not None else None
         sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
         if self.cached:
             sample = sample._replace(cached=True)
@@ -117,6 +119,7 @@ class Inbox:
         self._seq = itertools.count(1)
         self._session = 0
         self._immediate = self._lossless = self._recorded = self._idle = NO_KEYS
+        self._timed_until = -math.inf  # until then samples have no `sent`
         self._forget()
 
     def _forget(self) -> None:
@@ -192,11 +195,14 @@ class Inbox:
             caches, self._caches = self._caches, []
             kept, self._kept = self._kept, _kept_samples()
             link_up = bool(self._transports)
+        is_due = bool(samples) and time.monotonic() >= self._timed_until
+        if is_due:
+            self._timed_until = time.monotonic() + TIMED_EVERY_S
         return Changes(
-            {key: arrived.sample() for key, arrived in samples.items()},
+            {key: arrived.sample(timed=is_due) for key, arrived in samples.items()},
             tokens,
             link_up,
-            [(key, arrived.sample(kept=True)) for key, arrived in kept] if kept else (),
+            [(key, arrived.sample(timed=True)) for key, arrived in kept] if kept else (),
             caches,
         )
 

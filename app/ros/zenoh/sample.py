@@ -23,10 +23,11 @@ class Sample(NamedTuple):
 
     `source` is the zid of the peer that sent it (from its timestamp), None if unknown. `seq` orders
     samples and losses of peers as this session received them. `sent` is the timestamp of the sender's
-    clock, in seconds since the epoch. `skipped` is the number of messages just before it that were not
-    read; for lossless topics `skipped_payloads` are their payloads, and `overrun` is true if there were
-    even more. `cached`: it is from a cache, published at an unknown time. `sender` is set for a sample
-    that no peer has stamped: the zid in its timestamp, "" without one.
+    clock, in seconds since the epoch, None without one and where it was not read. `skipped` is the
+    number of messages just before it that were not read; for lossless topics `skipped_payloads` are
+    their payloads, and `overrun` is true if there were even more. `cached`: it is from a cache,
+    published at an unknown time. `sender` is set for a sample that no peer has stamped: the zid in its
+    timestamp, "" without one.
     """
 
     payload: Buffer

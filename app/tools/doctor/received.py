@@ -5,9 +5,10 @@ import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Final
 
+from app.cell.robot.clocks import RobotClock, first_stamp
 from app.ros.dialects.dialect import Dialect
 from app.ros.zenoh.declarations import Declarations
 from app.ros.zenoh.inbox import Changes
@@ -38,6 +39,19 @@ class ReceivedSamples:
     def live(self, key: str) -> list[Sample]:
         """The samples of a topic without those from a publisher's cache."""
         return [sample for sample in self.samples[key] if not sample.cached]
+
+    def clock(self, key: str, *, is_stamped: bool) -> RobotClock:
+        """The robot's clock, by the time stamps of its peers on all topics and, where the messages of a
+        topic begin with a stamp, by those."""
+        clock = RobotClock()
+        samples = sorted(chain.from_iterable(map(self.live, self.samples)), key=lambda each: each.seq)
+        for sample in samples:
+            if sample.sent is not None:
+                clock.record_peer(sample.source or "", sample.sent, sample.wall, sample.at)
+        for sample in self.live(key) if is_stamped else ():
+            if (stamp := first_stamp(bytes(sample.payload))) is not None:
+                clock.record_topic(key, stamp, sample.wall, sample.at)
+        return clock
 
     def longest_gap(self, key: str) -> float:
         """The longest time without a message in seconds: between two, or from the last to the end."""

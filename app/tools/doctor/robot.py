@@ -9,20 +9,29 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 from typing import Final, Protocol
 
 from app.cell.link.peer import RobotAccess
 from app.cell.link.robot_access import ROBOT_ACCESS, detect_access
+from app.cell.robot.clocks import (
+    APART_S,
+    CLOCK,
+    OTHER_TIME_S,
+    are_apart,
+    begins_with_stamp,
+    first_stamp,
+    is_other_time,
+)
 from app.ros.dialects.dialect import DEFAULT_DIALECT, DEMO_VERSION, Dialect, any_hash
 from app.ros.graph.model import Bridge, GraphSnapshot
 from app.ros.messages import Interfaces, load_interfaces
+from app.ros.messages.field_path import EARLIEST_S
 from app.ros.zenoh.answers import AdminSpace, neighbour_queries
 from app.ros.zenoh.config import config_from, endpoints_of, tls_files
 from app.ros.zenoh.sample import Sample
 from app.ros.zenoh.session import ZenohSession
-from app.system.errors import DecodeError, InterfaceError, LinkError, SettingsError
-from app.system.texts import say
+from app.system.errors import LinkError, SettingsError
+from app.system.texts import Text, say
 from app.tools.doctor.findings import Report, few
 from app.tools.doctor.maps import MapChecks
 from app.tools.doctor.names import PanelNames, PanelRobot
@@ -223,14 +232,16 @@ def _is_limited(bridge: Bridge) -> bool:
 # The robot's clocks against this machine's: that of the bridge's machine, by Zenoh's time stamps, and
 # that of the nodes, by the stamps in their headers. Pure.
 
-APART_S: Final = 1.0
-FIRST_REAL_S: Final = 1e9  # 2001: a stamp before that is of simulated time
-STAMP: Final = ("header.stamp.sec", "header.stamp.nanosec")
-
 
 def check_clocks(
-    report: Report, robot: PanelRobot, observed: ReceivedSamples, interfaces: Interfaces
+    report: Report,
+    robot: PanelRobot,
+    observed: ReceivedSamples,
+    interfaces: Interfaces,
+    *,
+    has_clock: bool = False,
 ) -> None:
+    """`has_clock`: a node publishes `/clock`, so the stamps are not of a wall clock."""
     types = robot.panel.subscriptions()
     live = {
         topic: [sample for key in robot.possible_keys(topic) for sample in observed.live(key)]
@@ -240,43 +251,47 @@ def check_clocks(
     if not sent:
         report.find("clock_unknown", robot=robot.id, window=f"{observed.window_s:.1f}")
         return
-    if _compare(report, robot.id, "the bridge's machine", sent):
-        return  # the nodes' stamps would only say it again
+    is_apart = _compare(report, robot.id, "the bridge's machine", sent)
+    if has_clock:
+        report.find("simulated_clock", CLOCK, robot=robot.id)
+    if has_clock or is_apart:
+        return  # the nodes' stamps are of that time, or would only say it again
     for topic, samples in live.items():
-        stamps = list(_stamps(types[topic], samples, interfaces))
-        if stamps and max(stamp for stamp, _ in stamps) < FIRST_REAL_S:
+        stamps = [*_stamps(types[topic], samples, interfaces)]
+        offsets = [stamp - wall for stamp, wall in stamps]
+        if stamps and max(stamp for stamp, _ in stamps) < EARLIEST_S:
             report.find("simulated_time", topic, robot=robot.id)
+        elif stamps and is_other_time(max(offsets)):
+            days = f"{abs(max(offsets)) // OTHER_TIME_S:.0f}"
+            direction = _direction(max(offsets))
+            report.find("other_time", topic, robot=robot.id, days=days, direction=direction)
         elif stamps:
-            _compare(report, robot.id, f"the stamps on {topic}", [s - wall for s, wall in stamps])
+            _compare(report, robot.id, f"the stamps on {topic}", offsets)
 
 
 def _compare(report: Report, robot: str, about: str, offsets: Iterable[float]) -> bool:
-    """Whether a clock differs."""
-    seconds = median(offsets)
-    if abs(seconds) < APART_S:
+    """Whether a clock differs: delay only makes an offset smaller."""
+    seconds = max(offsets)
+    if not are_apart(seconds):
         report.fact(f"the clock of {about} is within {APART_S:g} s of this machine's")
         return False
-    direction = say("finding_ahead" if seconds > 0 else "finding_behind")
-    report.find("clock_differs", about, robot=robot, seconds=f"{abs(seconds):.1f}", direction=direction)
+    about_s = {"seconds": f"{abs(seconds):.1f}", "direction": _direction(seconds)}
+    report.find("clock_differs", about, robot=robot, **about_s)
     return True
+
+
+def _direction(seconds: float) -> Text:
+    return say("finding_ahead" if seconds > 0 else "finding_behind")
 
 
 def _stamps(
     type_name: str, samples: Iterable[Sample], interfaces: Interfaces
 ) -> Iterator[tuple[float, float]]:
-    """(stamp, when it came) of messages with a header that is stamped; seconds since the epoch."""
-    try:
-        reader = interfaces.field_reader(type_name, STAMP)
-    except InterfaceError:
-        return
-    for sample in samples:
-        try:
-            fields = reader.read(bytes(sample.payload))
-        except DecodeError:  # another type, which is said of the topic
-            continue
-        seconds, nanoseconds = (fields.get(path) for path in STAMP)
-        if seconds or nanoseconds:
-            yield seconds + nanoseconds / 1e9, sample.wall
+    """(stamp, when it came) of messages that begin with a stamp; seconds since the epoch."""
+    if begins_with_stamp(type_name, interfaces.structures):
+        for sample in samples:
+            if (stamp := first_stamp(bytes(sample.payload))) is not None:
+                yield stamp, sample.wall
 
 
 LISTEN_S: Final = 5.0
@@ -367,7 +382,8 @@ async def _inspect(
     check_permissions(report, behind, received, interfaces)
     TopicChecks(report, behind, interfaces, PanelNames.for_robot(robot, before)).check()
     MapChecks(report, behind, received, interfaces).check()
-    check_clocks(report, robot, received, interfaces)
+    has_clock = any(behind.publishers(CLOCK))
+    check_clocks(report, robot, received, interfaces, has_clock=has_clock)
     if graph.bridges:
         check_copies(report, robot, received)
     return graph

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from app.cell.permission.conditions import permits, refusal
+from app.cell.robot.clocks import RobotClock, begins_with_stamp
 from app.cell.robot.definitions import differs, own_hash
 from app.panel.condition import Interlock
 from app.panel.widgets.parameter import EVENTS, SERVICES
@@ -246,11 +247,13 @@ def _check_value(
     interfaces: Interfaces,
 ) -> None:
     """Whether the last value permits; nothing is said of one that is unknown."""
-    samples = observed.samples[behind.robot.key(interlock.topic)]
+    key = behind.robot.key(interlock.topic)
+    samples = observed.samples[key]
     if not samples:
         return
     try:
-        value = _last_value(samples, interlock, interfaces)
+        clock = observed.clock(key, is_stamped=begins_with_stamp(interlock.type, interfaces.structures))
+        value = _last_value(samples, interlock, interfaces, clock)
     except DecodeError:  # another type, which is said of the topic
         return
     if permits(interlock, value):
@@ -259,9 +262,12 @@ def _check_value(
     report.find("permission_refused", interlock.topic, robot=behind.robot.id, detail=render(reason))
 
 
-def _last_value(samples: Sequence[Sample], interlock: Interlock, interfaces: Interfaces) -> Any:
+def _last_value(
+    samples: Sequence[Sample], interlock: Interlock, interfaces: Interfaces, clock: RobotClock
+) -> Any:
     """The newest value; of a field with a key, that of the newest message which has it."""
     reader = interfaces.field_reader(interlock.type, [interlock.field])
     newest = samples[::-1] if has_key(interlock.field) else samples[-1:]
-    values = (reader.read(bytes(sample.payload), sample.wall).get(interlock.field) for sample in newest)
+    fields = (reader.read(bytes(each.payload), clock.time_at(each.wall)) for each in newest)
+    values = (each.get(interlock.field) for each in fields)
     return next((value for value in values if value is not None), None)

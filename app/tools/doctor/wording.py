@@ -69,6 +69,7 @@ WARNINGS: Final = (
     "bridge_piled_readers",
     "robot_elsewhere",
     "clock_differs",
+    "other_time",
     "topic_no_publisher",
     "topic_no_subscriber",
     "map_not_latched",
@@ -81,6 +82,7 @@ NOTES: Final = (
     "demo_mode",
     "permission_refused",
     "simulated_time",
+    "simulated_clock",
     "clock_unknown",
     "screen_unknown",
 )

@@ -14,6 +14,7 @@ from app.cell.robot.traffic import MAX_COLUMNS, RoundTripSummary
 from app.cell.session.doctor_process import DoctorProcess, FoundFault
 from app.cell.session.looks import Look, NodeRoundTrips, Survey
 from app.cell.session.session import RobotSession
+from app.cell.view.clock_status import ClockStatus, ClockWord, clock_status
 from app.cell.view.diagnostics import (
     GraphTopicRow,
     NodeRow,
@@ -81,6 +82,15 @@ def trip_note(
     if trips is not None:
         return ""
     return word("trip_of_page") if name == "server" else word("trip_no_answer")
+
+
+def clock_mark(status: ClockStatus) -> str:
+    """The mark of the row of the clock."""
+    if status.state in ("unknown", "simulated_awaited"):
+        return "unknown"
+    if status.state == "simulated":
+        return "note"
+    return "ok" if status.state == "even" else "problem"
 
 
 def rate_text(rate_hz: float | None) -> TextLike:
@@ -158,6 +168,7 @@ TEXTS: Final[dict[str, Any]] = {
     "word": word,
     "look_word": look_word,
     "rate_text": rate_text,
+    "clock_mark": clock_mark,
     "size_text": size_text,
     "age_text": age_text,
     "qos_words": qos_words,
@@ -233,6 +244,19 @@ class LinkAnswer(BaseModel):
     reason: str
     round_trips: RoundTripsAnswer | None = None
     trip_note: str = ""
+
+
+class ClockAnswer(BaseModel):
+    """The robot's clock. `skew_s` is by how many seconds it is ahead of the panel's (negative: behind),
+    `within_s` how exact that is; null where it is not known, or time is simulated. `reason` is what is
+    wrong, "" for nothing."""
+
+    state: ClockWord
+    text: str
+    about: str
+    reason: str
+    skew_s: float | None
+    within_s: float | None
 
 
 class UndecodableAnswer(BaseModel):
@@ -365,6 +389,7 @@ class DiagnosticsAnswer(BaseModel):
 
     versions: dict[str, str]
     links: list[LinkAnswer]
+    clock: ClockAnswer
     topics: list[TopicAnswer]
     servers: list[ServerAnswer]
     parameters: list[ParameterAnswer]
@@ -435,6 +460,7 @@ class DiagnosticsContext(TypedDict):
 
     query: DiagnosticsQuery
     links: list[LinkRow]
+    clock: ClockStatus
     findings: list[FoundFault]
     doctor: DoctorProcess
     doctor_at: TextLike
@@ -487,6 +513,7 @@ def diagnostics_context(
     return DiagnosticsContext(
         query=query,
         links=link_rows(session, survey, behind, page_trips, now),
+        clock=clock_status(robot, now),
         findings=_findings(doctor),
         doctor=doctor,
         doctor_at=format_time(doctor.wall) if doctor.wall else "",

@@ -18,6 +18,7 @@ from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.doctor_process import DoctorProcess
 from app.cell.session.looks import Look, Survey, TopicPreview
 from app.cell.session.session import RobotSession
+from app.cell.view.clock_status import clock_status
 from app.cell.view.diagnostics import (
     TopicRow,
     graph_topic_rows,
@@ -77,6 +78,7 @@ def diagnostics_json(
             | {"trip_note": trip_note(name, link, trips.get(name), session.node_trips)}
             for name, link in session.publisher.view["link"].items()
         ],
+        "clock": fields_of(clock_status(robot, now)),
         "topics": [_topic(row) for row in topics],
         "servers": [fields_of(row) for row in server_rows(panel, robot, now)],
         "parameters": [

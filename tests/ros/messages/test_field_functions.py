@@ -61,8 +61,8 @@ def test_without_a_value_there_is_a_reason() -> None:
     assert result(QUATERNION, "yaw(quaternion)", {"quaternion": {"w": 0.0}}) == "no_rotation"
     assert result(ODOMETRY, "age(header.stamp)", {}) == "no_time"
     assert result(ODOMETRY, "age(header.stamp)", stamp(int(RECEIVED) + 2)) == "other_clock"
-    assert result(ODOMETRY, "age(header.stamp)", stamp(12)) == "other_clock"  # of a simulation
-    assert result(ODOMETRY, "age(header.stamp)", stamp(int(RECEIVED)), math.nan) == "other_clock"
+    assert result(ODOMETRY, "age(header.stamp)", stamp(12)) == "other_time"  # of a simulation
+    assert result(ODOMETRY, "age(header.stamp)", stamp(int(RECEIVED)), math.nan) == "other_time"
     assert result(ARRAY, "diff(data[0], data[1])", {"data": [1.5]}) is None
 
 

@@ -47,8 +47,11 @@ def test_a_sample_has_its_source_and_its_time_there(inbox: Inbox) -> None:
     inbox.put("heard", b"", Sent(7.5))
     inbox.put("unstamped", b"", None)
     samples = inbox.drain().samples
-    assert (samples["heard"].source, samples["heard"].sent) == ("b1", None)  # asked for recordings only
+    assert (samples["heard"].source, samples["heard"].sent) == ("b1", 7.5)
     assert (samples["unstamped"].source, samples["unstamped"].sent) == (None, None)
+    inbox.put("heard", b"", Sent(7.6))
+    again = inbox.drain().samples["heard"]
+    assert (again.source, again.sent) == ("b1", None)  # read once a second, and for recordings
 
 
 def test_values_wake_the_loop_once_until_they_are_taken(inbox: Inbox, woken: list[bool]) -> None:

@@ -268,6 +268,34 @@ def test_a_clock_that_nothing_is_known_of(tmp_path: Path) -> None:
     assert report.codes() == ["clock_unknown"]
 
 
+JOINTS = "sensor_msgs/msg/JointState"
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "has_clock", "expected"),
+    [
+        (-0.3, False, []),
+        (-41.0, False, [("clock_differs", "the stamps on /joints")]),
+        (-200 * 86_400.0, False, [("other_time", "/joints")]),
+        (-1.8e9, False, [("simulated_time", "/joints")]),
+        (-1.8e9, True, [("simulated_clock", "/clock")]),
+        (0.0, True, [("simulated_clock", "/clock")]),
+    ],
+)
+def test_the_stamps_of_a_topic(
+    ahead_s: float, has_clock: bool, expected: list[tuple[str, str]], tmp_path: Path
+) -> None:
+    received = ReceivedSamples(began=0.0, ended=3.0)
+    for at in (1.8e9 + 0.1, 1.8e9 + 1.1):
+        seconds, rest = divmod(at + ahead_s, 1)
+        stamp = {"sec": int(seconds), "nanosec": int(rest * 1e9)}
+        data = INTERFACES.encode(JOINTS, {"header": {"stamp": stamp}})
+        received.samples["joints"].append(Sample(data, 0, at, at, "b1", sent=at))
+    report, here = Report(), robot(tmp_path, panel_of(readout("/joints", JOINTS, field="position[0]")))
+    check_clocks(report, here, received, INTERFACES, has_clock=has_clock)
+    assert named(report.findings) == expected
+
+
 def test_readers_that_a_bridge_has_piled_up(tmp_path: Path) -> None:
     report = Report()
     here = robot(tmp_path, panel_of(readout("/words")))
