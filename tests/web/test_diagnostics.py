@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.cell.robot.clocks import APART_S
 from app.cell.session.looks import LINGER_S, MOST_AT_ONCE
 from app.system.texts import render, say
 from app.web.pages.diagnostics import DiagnosticsAnswer, LookAnswer
@@ -138,6 +139,13 @@ def test_links_have_round_trips_and_the_sentences_of_the_lamps(cell: Server) -> 
 
 
 @pytest.mark.long("detail")
+def test_the_robots_clock_is_measured_by_its_peer(cell: Server) -> None:
+    until(lambda: diagnostics(cell)["clock"]["state"] == "even", "the clock is measured")
+    clock = diagnostics(cell)["clock"]
+    assert abs(clock["skew_s"]) < APART_S
+    assert (clock["within_s"] > 0, clock["reason"]) == (True, "")
+
+
 def test_the_round_trip_to_a_node_is_measured_while_someone_asks(cell: Server) -> None:
     def node() -> Any:
         return diagnostics(cell)["links"][2]

@@ -68,6 +68,21 @@ def test_a_kiosk_that_can_send_is_ready() -> None:
     assert samples["kiosk_ready", ("",)] == 1
 
 
+def test_the_clock_of_the_robot_is_a_metric_once_it_is_known() -> None:
+    samples = of_kiosk(lambda kiosk: None)
+    assert ("kiosk_clock_skew_seconds", ("",)) not in samples
+    assert samples["kiosk_simulated_time", ("",)] == 0
+
+    def measure(session: RobotSession) -> None:
+        for at in (0.0, 1.0):
+            session.robot.clock.record_peer(BRIDGE, at - 41.0, at, at)
+        session.robot.clock.begin_simulated()
+
+    samples = of_kiosk(measure)
+    assert samples["kiosk_clock_skew_seconds", ("",)] == -41.0
+    assert samples["kiosk_simulated_time", ("",)] == 1
+
+
 def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
     def hear(session: RobotSession) -> None:
         for seq in (1, 2):

@@ -460,7 +460,7 @@ class DiagnosticsContext(TypedDict):
 
     query: DiagnosticsQuery
     links: list[LinkRow]
-    clock: ClockStatus
+    robot_clock: ClockStatus
     findings: list[FoundFault]
     doctor: DoctorProcess
     doctor_at: TextLike
@@ -513,7 +513,7 @@ def diagnostics_context(
     return DiagnosticsContext(
         query=query,
         links=link_rows(session, survey, behind, page_trips, now),
-        clock=clock_status(robot, now),
+        robot_clock=clock_status(robot, now),
         findings=_findings(doctor),
         doctor=doctor,
         doctor_at=format_time(doctor.wall) if doctor.wall else "",
