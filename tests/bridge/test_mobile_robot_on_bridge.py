@@ -89,7 +89,7 @@ def test_scaffold_has_a_page_with_the_map_that_is_alive_at_once(
         assert kiosk.widget("map")["grid"]["width"] == 2
 
 
-def found(bridge: Bridge, folder: Path, text: str) -> list[tuple[str, str]]:
+def findings_of(bridge: Bridge, folder: Path, text: str) -> list[tuple[str, str]]:
     panel = folder / "doctored.toml"
     panel.write_text(text)
     zenoh = str(zenoh_file(folder, bridge.endpoint))
@@ -101,15 +101,15 @@ def test_doctor_finds_a_volatile_map_and_a_missing_way(
     own_bridge: Bridge, robot: dict[str, RosNode], tmp_path: Path
 ) -> None:
     text = scaffolded(own_bridge, tmp_path)
-    by_pose = found(own_bridge, tmp_path, text)
+    by_pose = findings_of(own_bridge, tmp_path, text)
     assert not [finding for finding in by_pose if finding[0].startswith("map_")]
     by_transforms = "".join(line for line in text.splitlines(True) if not line.startswith("pose ="))
-    assert ("map_no_transform", "/map") in found(own_bridge, tmp_path, by_transforms)
+    assert ("map_no_transform", "/map") in findings_of(own_bridge, tmp_path, by_transforms)
     volatile = RosNode(own_bridge.domain, "slam")
     try:
         volatile.advertise("/map", GRID)
         until(
-            lambda: ("map_not_latched", "/map") in found(own_bridge, tmp_path, text),
+            lambda: ("map_not_latched", "/map") in findings_of(own_bridge, tmp_path, text),
             "the volatile map is found",
         )
     finally:
