@@ -24,6 +24,7 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.map_layers import GRID_TYPE
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import (
     EVENT_TYPE,
@@ -302,9 +303,20 @@ class Panel(PanelKeys):
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """The topics of the maps that the panel shows."""
-        shown = (widget for widget in self.widgets() if isinstance(widget, MapView))
-        return tuple(dict.fromkeys(widget.topic for widget in shown))
+        """The topics of the maps that the panel shows, and of costmaps over them."""
+        grids = (topic for view in self.map_views.values() for topic in view.grids)
+        return tuple(dict.fromkeys(grids))
+
+    @cached_property
+    def map_views(self) -> dict[str, MapView]:
+        """The maps by their ids."""
+        return {str(w.id): w for w in self.widgets() if isinstance(w, MapView)}
+
+    @property
+    def map_shapes(self) -> dict[str, str]:
+        """Topic → type of the layers of maps that are shapes, not grids."""
+        layers = (layer for view in self.map_views.values() for layer in view.layers)
+        return {layer.topic: layer.type for layer in layers if layer.type != GRID_TYPE}
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""

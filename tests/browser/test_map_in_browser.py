@@ -186,3 +186,90 @@ def test_another_script_can_take_a_finger_until_a_second_one_enlarges_the_map(
     assert seen["at"]["x"] == pytest.approx(x - 50 - box["x"], abs=1)
     assert seen["draws"] > 0
     assert VERSION.fullmatch(seen["version"])
+
+
+LAYERS: Final = """
+[[page.widget.layer]]
+shows = "scan"
+topic = "/scan"
+[[page.widget.layer]]
+shows = "path"
+topic = "/plan"
+[[page.widget.layer]]
+shows = "costmap"
+topic = "/costmap"
+[[page.widget.layer]]
+shows = "covariance"
+topic = "/amcl_pose"
+[demo]
+"/amcl_pose" = { silent = true }
+"""
+# How many pixels of the canvas are drawn on.
+DRAWN_PIXELS: Final = """(canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return data.reduce((drawn, value, at) => drawn + (at % 4 === 3 && value > 0), 0);
+}"""
+
+
+@pytest.fixture(scope="module")
+def layered(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with demo_server(tmp_path_factory.mktemp("layered"), PANEL + LAYERS) as server:
+        yield server
+
+
+def pixels(page: Page) -> int:
+    page.evaluate(DRAWN)
+    return int(page.locator("canvas.map-points").evaluate(DRAWN_PIXELS))
+
+
+def test_layers_are_drawn_and_what_is_missing_is_named(layered: Server, page: Page) -> None:
+    opened(page, layered)
+    root = widget(page, "hall")
+    expect(root.locator(".map-shapes polyline")).to_have_attribute("points", re.compile(r"^\d+ \d+ "))
+    expect(root.locator(".map-costs img")).to_have_count(1)
+    until(lambda: pixels(page) > 100, "the scan is drawn")
+    expect(root.locator(".map-note")).to_have_text("Position uncertainty: waiting for data")
+
+
+def test_a_layer_that_the_operator_hides_stays_hidden_in_this_browser(
+    layered: Server, page: Page
+) -> None:
+    opened(page, layered)
+    root = widget(page, "hall")
+    until(lambda: pixels(page) > 100, "the scan is drawn")
+    root.get_by_role("button", name="Layers").click()
+    for name in ("Laser scan", "Costmap", "Position uncertainty"):
+        row = root.get_by_role("group", name="Layers").get_by_role("button", name=name)
+        expect(row).to_have_attribute("aria-pressed", "true")
+        assert place(row)["height"] >= 44
+        row.click()
+        expect(row).to_have_attribute("aria-pressed", "false")
+    until(lambda: pixels(page) == 0, "the scan is hidden")
+    expect(root.locator(".map-costs img")).to_be_hidden()
+    expect(root.locator(".map-note")).to_be_hidden()
+    page.reload()
+    expect(root).to_have_attribute("data-version", VERSION)
+    expect(root.locator(".map-shapes polyline")).to_have_count(1)
+    assert pixels(page) == 0
+    expect(root.locator(".map-note")).to_be_hidden()
+    root.get_by_role("button", name="Layers").click()
+    root.get_by_role("button", name="Laser scan").click()
+    until(lambda: pixels(page) > 100, "the scan is drawn again")
+
+
+def test_the_list_of_layers_is_used_by_keys(layered: Server, page: Page) -> None:
+    opened(page, layered)
+    root = widget(page, "hall")
+    opener = root.get_by_role("button", name="Layers")
+    expect(opener).to_have_attribute("aria-expanded", "false")
+    opener.focus()
+    page.keyboard.press("Enter")
+    expect(opener).to_have_attribute("aria-expanded", "true")
+    page.keyboard.press("Tab")
+    scan = root.get_by_role("button", name="Laser scan")
+    expect(scan).to_be_focused()
+    page.keyboard.press("Space")
+    expect(scan).to_have_attribute("aria-pressed", "false")
+    page.keyboard.press("Escape")
+    expect(opener).to_be_focused()
+    expect(scan).to_be_hidden()

@@ -103,10 +103,22 @@ CAMERAS: Final = (
     ),
 )
 MAP: Final[Table] = {"label": texts.HALL.table}
-NOWHERE: Final = {"grid": None, "pose": None, "about": ""}
+NOWHERE: Final = {"grid": None, "pose": None, "about": "", "detail": "", "layer_note": ""}
+LAYER: Final = {"shows": "scan", "topic": "/scan"}
+NO_WAY: Final = say("transform_unknown", base="laser", fixed="map", name="laser")
+NO_SCAN: Final = {"label": say("map_layer_scan"), "state": "unplaced", "note": NO_WAY}
 MAPS: Final = (
     Example("waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting")} | NOWHERE),
     Example("unreadable", "map", MAP, {"state": "unreadable", "note": say("map_empty")} | NOWHERE),
+    Example(
+        "a layer without a place",
+        "map",
+        MAP | {"layer": [LAYER]},
+        {"state": "live", "note": ""}
+        | NOWHERE
+        | {"layer_0": NO_SCAN}
+        | {"layer_note": say("map_layer_note", layer=say("map_layer_scan"), note=NO_WAY)},
+    ),
 )
 LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}
 LOGS: Final = (

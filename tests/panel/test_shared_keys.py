@@ -17,6 +17,7 @@ from app.cell.alarms.sources import read_source, read_suppression
 from app.cell.permission.conditions import condition_state, condition_verdict
 from app.cell.permission.interlocks import link_verdict
 from app.cell.recipes.reported import reported_fields
+from app.cell.robot.map_layers import read_shape
 from app.cell.robot.maps import read_grid
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import CameraTopicState
@@ -438,6 +439,7 @@ JOINTS: Final = "sensor_msgs/msg/JointState"
 LIST: Final = "std_msgs/msg/Float64MultiArray"
 IMAGE: Final = "sensor_msgs/msg/Image"
 GRID: Final = "nav_msgs/msg/OccupancyGrid"
+PATH: Final = "nav_msgs/msg/Path"
 AGED: Final[Mapping[str, Row]] = {
     **{name: row for name, row in ROWS.items() if "max_age_s" in MODELS[name].model_fields},
     "trend": Row(
@@ -453,6 +455,13 @@ AGED: Final[Mapping[str, Row]] = {
     ),
     "camera": Row(widget("camera"), type=IMAGE),
     "map": Row(widget("map"), type=GRID),
+    "layer": Row(
+        lambda keys: widget(
+            "map",
+            layer=[{"shows": "path", "topic": keys["topic"], "max_age_s": keys["max_age_s"]}],
+        )({}),
+        type=PATH,
+    ),
     "options_from": Row(within("options_from", "select"), type=JOINTS),
     "readback": Row(
         lambda keys: on_page(
@@ -472,6 +481,7 @@ SENT: Final[Mapping[str, Any]] = {
     INT: {"data": 0},
     IMAGE: {},
     GRID: {"header": {"frame_id": "map"}, "info": INFO, "data": [0, 100]},
+    PATH: {"header": {"frame_id": "map"}, "poses": [{}, {}]},
 }
 MORE: Final[Mapping[str, Keys]] = {"options_from": {"field": "name"}}
 
@@ -507,6 +517,10 @@ def cell(folder: Path, name: str, **keys: Any) -> tuple[Panel, RobotState]:
         if kind == GRID:
             robot.maps[robot.key(topic)].grid = read_grid(INTERFACES, bytes(sample.payload))
             moved(robot, 1.0)
+        if kind == PATH:
+            robot.maps["map"].grid = read_grid(INTERFACES, INTERFACES.encode(GRID, SENT[GRID]))
+            layer = robot.map_layers[robot.key(topic)]
+            layer.shape, layer.at = read_shape(INTERFACES, PATH, bytes(sample.payload)), NOW
     robot.camera_topics[robot.key("/air")] = CameraTopicState(NOW, 0.0)
     return panel, robot
 
@@ -550,6 +564,7 @@ KNOWN: Final[Mapping[str, Known]] = {
     "target": lambda panel, robot, now: shown(panel, robot, now)["part"] is not None,
     "line": lambda panel, robot, now: shown(panel, robot, now)["line0"] == "2 left",
     "setpoint": lambda panel, robot, now: shown(panel, robot, now)["setpoint"] is not None,
+    "layer": lambda panel, robot, now: shown(panel, robot, now)["layer_0"]["state"] == "live",
     "reported": lambda panel, robot, now: shown(panel, robot, now)["at"] == "on",
     "readback": lambda panel, robot, now: reported_fields(panel.recipe_loads[0], robot, now)[
         "length"

@@ -82,4 +82,4 @@ def map_doubt(state: MapState, robot: RobotState) -> TextLike:
         return say("readout_before_disconnect", time=format_time(state.wall))
     if robot.is_foreign(state.source):
         return say("readout_foreign", time=format_time(state.wall))
-    return ""
+    return state.doubt

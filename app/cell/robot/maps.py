@@ -7,10 +7,13 @@ tile is made when a browser asks for it. The tiles of 4000 x 4000 cells have 0.2
 import hashlib
 import io
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from app.cell.robot.transforms import Pose, yaw_of
+from app.panel.widgets.map_layers import GRID_TYPE as GRID_TYPE
+from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.ros.messages import Interfaces
 from app.system.errors import DecodeError
 from app.system.texts import TextLike, number, say
@@ -18,7 +21,6 @@ from app.system.texts import TextLike, number, say
 if TYPE_CHECKING:
     from PIL.Image import Image  # takes 60 ms to load, and few panels show maps
 
-GRID_TYPE: Final = "nav_msgs/msg/OccupancyGrid"
 TILE: Final = 512  # cells a side
 MAX_CELLS: Final = 64_000_000  # 8000 x 8000
 OCCUPIED: Final = 65  # percent and more, as Nav2's map server has it
@@ -35,6 +37,22 @@ COLOURS: Final = bytes(
     else UNKNOWN_COLOUR  # -1, and what has no meaning
     for cell in range(256)
 )  # fmt: skip
+# A costmap is drawn over the map: what costs nothing, or is unknown, is transparent. Nav2 publishes 99
+# where the robot's middle may not be, and 100 for an obstacle.
+NO_COST, LOW_COST, HIGH_COST, LETHAL = range(4)
+COSTS: Final = bytes(
+    NO_COST if cell == 0 or cell > 100
+    else LOW_COST if cell < 50
+    else HIGH_COST if cell < 99
+    else LETHAL
+    for cell in range(256)
+)  # fmt: skip
+COST_ALPHA: Final = bytes((0, 50, 90, 150))
+COST_PALETTES: Final = {
+    "light": (0, 0, 0, *3 * (130, 80, 20)),
+    "dark": (0, 0, 0, *3 * (240, 190, 110)),
+    "contrast": (0, 0, 0, *3 * (130, 60, 0)),
+}
 PALETTES: Final = {
     "light": (0, 0, 0, 247, 249, 250, 176, 184, 192, 18, 23, 27),
     "dark": (0, 0, 0, 56, 64, 72, 112, 122, 132, 222, 228, 232),
@@ -85,15 +103,14 @@ class Grid:
 
 
 @dataclass(slots=True)
-class MapState:
-    """The newest map of a topic.
+class Arrival:
+    """When the newest message of a topic came, and what is wrong with it.
 
-    `wall` (seconds since the epoch) is when the newest message arrived; `problem` is why that has no
-    map, "" if it has one. `source` is the zid of the peer that sent it, None if unknown. `at` is when
-    it arrived, `cut_at` when the link was lost last (monotonic seconds).
+    `wall` (seconds since the epoch) is when it arrived; `problem` is why it can't be shown, "" if it
+    can. `source` is the zid of the peer that sent it, None if unknown. `at` is when it arrived,
+    `cut_at` when the link was lost last (monotonic seconds).
     """
 
-    grid: Grid | None = None
     wall: float = 0.0
     problem: TextLike = ""
     source: str | None = None
@@ -102,8 +119,18 @@ class MapState:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the map is from before the link was lost."""
+        """Whether it is from before the link was lost."""
         return self.at < self.cut_at
+
+
+@dataclass(slots=True)
+class MapState(Arrival):
+    """The newest map of a topic. `updated_at` (monotonic seconds) is when its newest update arrived,
+    `doubt` why cells may not be the robot's of now although the map is: updates were lost."""
+
+    grid: Grid | None = None
+    updated_at: float = -math.inf
+    doubt: TextLike = ""
 
 
 def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:
@@ -126,10 +153,45 @@ def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:
     if origin is None:
         raise NoMap(say("map_origin"))
     geometry = Geometry(message.header.frame_id.lstrip("/"), width, height, float(resolution), origin)
-    cells = memoryview(message.data).cast("B")
+    return _grid_of(geometry, memoryview(message.data).cast("B"))
+
+
+def _grid_of(geometry: Geometry, cells: memoryview) -> Grid:
     digest = hashlib.sha256(repr(geometry).encode())
     digest.update(cells)
     return Grid(geometry, cells, digest.hexdigest())
+
+
+def updated(interfaces: Interfaces, grid: Grid, payloads: Iterable[bytes]) -> tuple[Grid, TextLike]:
+    """A map after updates (`map_msgs/msg/OccupancyGridUpdate`), in their order; and what was wrong with
+    the last that could not be applied, "" if all were. An update is applied whole or not at all."""
+    cells = bytearray(grid.cells)
+    problem: TextLike = ""
+    for payload in payloads:
+        try:
+            _apply(interfaces, grid.geometry, cells, payload)
+        except NoMap as error:
+            problem = error.reason
+    return _grid_of(grid.geometry, memoryview(bytes(cells))), problem
+
+
+def _apply(interfaces: Interfaces, geometry: Geometry, cells: bytearray, payload: bytes) -> None:
+    try:
+        update = interfaces.decode(UPDATE_TYPE, payload)
+    except DecodeError:
+        raise NoMap(say("map_update_incomplete")) from None
+    frame = update.header.frame_id.lstrip("/")
+    if frame != geometry.frame:
+        raise NoMap(say("map_update_frame", frame=frame, map=geometry.frame))
+    left, bottom, width, height = update.x, update.y, update.width, update.height
+    if len(update.data) != width * height:
+        raise NoMap(say("map_update_cells", cells=len(update.data), width=width, height=height))
+    if min(left, bottom) < 0 or left + width > geometry.width or bottom + height > geometry.height:
+        raise NoMap(say("map_update_outside"))
+    data = memoryview(update.data).cast("B")
+    for row in range(height):
+        start = (bottom + row) * geometry.width + left
+        cells[start : start + width] = data[row * width : (row + 1) * width]
 
 
 def _origin(pose: Any) -> Pose | None:
@@ -139,14 +201,18 @@ def _origin(pose: Any) -> Pose | None:
     return Pose(x, y, yaw) if yaw is not None and math.isfinite(x) and math.isfinite(y) else None
 
 
-def tile(grid: Grid, column: int, row: int, theme: str) -> bytes:
+def tile(grid: Grid, column: int, row: int, theme: str, *, costs: bool = False) -> bytes:
     """A tile as a PNG file with the colours of a theme: `TILE` cells a side, fewer at the map's end.
-    Column 0 begins at the map's origin, and row 0 at its upper edge."""
+    Column 0 begins at the map's origin, and row 0 at its upper edge. `costs`: as a costmap."""
     width, height = grid.geometry.width, grid.geometry.height
     left, right = column * TILE, min((column + 1) * TILE, width)
     top, bottom = height - row * TILE, max(height - (row + 1) * TILE, 0)
     lines = (grid.cells[y * width + left : y * width + right] for y in range(top - 1, bottom - 1, -1))
-    return _png(b"".join(lines), right - left, top - bottom, theme)
+    cells = b"".join(lines)
+    if costs:
+        pixels, palette, alpha = cells.translate(COSTS), COST_PALETTES[theme], COST_ALPHA
+        return _png(pixels, right - left, top - bottom, palette, alpha)
+    return _png(cells.translate(COLOURS), right - left, top - bottom, PALETTES[theme])
 
 
 def reduced(grid: Grid) -> bytes:
@@ -180,7 +246,7 @@ def overview(pixels: bytes, grid: Grid, theme: str, pose: Pose | None, radius: f
     image = Image.frombytes("L", size, pixels)
     if pose is not None:
         _draw_robot(image, grid.geometry, pose, radius, factor)
-    return _png(image.tobytes(), *size, theme, is_translated=True)
+    return _png(image.tobytes(), *size, PALETTES[theme])
 
 
 def _draw_robot(image: "Image", geometry: Geometry, pose: Pose, radius: float, factor: int) -> None:
@@ -199,12 +265,19 @@ def _draw_robot(image: "Image", geometry: Geometry, pose: Pose, radius: float, f
     ImageDraw.Draw(image).polygon(corners, fill=OCCUPIED_COLOUR)
 
 
-def _png(cells: bytes, width: int, height: int, theme: str, is_translated: bool = False) -> bytes:
+def _png(
+    pixels: bytes,
+    width: int,
+    height: int,
+    palette: tuple[int, ...],
+    transparency: int | bytes = UNKNOWN_COLOUR,
+) -> bytes:
+    """`pixels` are numbers of colours of the palette. `transparency` is the colour that is transparent,
+    or how opaque each is."""
     from PIL import Image
 
-    pixels = cells if is_translated else cells.translate(COLOURS)
     image = Image.frombytes("P", (width, height), pixels)
-    image.putpalette(PALETTES[theme])
+    image.putpalette(palette)
     file = io.BytesIO()
-    image.save(file, "PNG", bits=2, transparency=UNKNOWN_COLOUR, optimize=False, compress_level=6)
+    image.save(file, "PNG", bits=2, transparency=transparency, optimize=False, compress_level=6)
     return file.getvalue()

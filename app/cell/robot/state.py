@@ -17,6 +17,7 @@ from app.cell.robot.definitions import DefinitionDifference, difference
 from app.cell.robot.graph import EndpointPresence, LiveGraph, required_endpoints
 from app.cell.robot.history import History
 from app.cell.robot.log_lines import LogLines
+from app.cell.robot.map_layers import LayerState
 from app.cell.robot.maps import MapState
 from app.cell.robot.option_list import OptionList
 from app.cell.robot.parameter_state import ParameterState
@@ -144,6 +145,7 @@ class RobotState:
             for key in self.possible_keys(topic)
         }
         self.maps = {self.key(topic): MapState() for topic in panel.maps}
+        self.map_layers = {self.key(topic): LayerState() for topic in panel.map_shapes}
         self.transforms = TransformTree()
         self.history = History(time.monotonic(), time.time())
 
@@ -252,7 +254,7 @@ class RobotState:
     def _cut_maps(self) -> None:
         now = time.monotonic()
         self.transforms.cut(now)
-        for state in self.maps.values():
+        for state in (*self.maps.values(), *self.map_layers.values()):
             state.cut_at = now
 
     def update_publishers(self, before: float = math.inf) -> None:

@@ -9,15 +9,13 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from struct import Struct
 from typing import Any, Final, NamedTuple
 
-from app.ros.cdr.reader import ByteOrder, check_end, split_header
-from app.system.errors import DecodeError
+from app.ros.cdr.stamped import TRANSFORMS_TYPE, StampedTransform, read_transforms
 from app.system.limits import BoundedDict
 from app.system.texts import TextLike, say
 
-TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
+TF_TYPE: Final = TRANSFORMS_TYPE
 TF, TF_STATIC = "/tf", "/tf_static"
 MAX_FRAMES: Final = 500
 MAX_FRAME_NAME: Final = 200  # characters
@@ -105,56 +103,6 @@ class Transform(NamedTuple):
 
     def is_finite(self) -> bool:
         return all(map(math.isfinite, (*self.place, *self.turned)))
-
-
-class StampedTransform(NamedTuple):
-    """A `geometry_msgs/msg/TransformStamped`: `stamp` in seconds, `place` in metres, `turned` as x, y,
-    z, w of its quaternion."""
-
-    parent: str
-    child: str
-    stamp: float
-    place: tuple[float, float, float]
-    turned: tuple[float, float, float, float]
-
-
-# Transforms come often: their bytes are read without an object for each part.
-_FORMS: Final[Mapping[ByteOrder, tuple[Struct, Struct, Struct]]] = {
-    order: (Struct(f"{order}I"), Struct(f"{order}iI"), Struct(f"{order}7d")) for order in ("<", ">")
-}
-
-
-def read_transforms(payload: bytes) -> list[StampedTransform]:
-    """Those of a `tf2_msgs/msg/TFMessage`; DecodeError if the bytes are none."""
-    try:
-        body, order = split_header(payload)
-        size_form, stamp_form, numbers_form = _FORMS[order]
-
-        def text(at: int) -> tuple[str, int]:
-            at += -at % 4
-            (size,), at = size_form.unpack_from(body, at), at + 4
-            end = at + size
-            if not size or end > len(body) or body[end - 1]:
-                raise ValueError(f"a text of {size} bytes at {at} is cut off or has no end")
-            return str(body[at : end - 1], "utf-8"), end
-
-        (count,), at = size_form.unpack_from(body, 0), 4
-        transforms = []
-        for _ in range(count):
-            at += -at % 4
-            sec, nanosec = stamp_form.unpack_from(body, at)
-            parent, at = text(at + stamp_form.size)
-            child, at = text(at)
-            at += -at % 8
-            numbers = numbers_form.unpack_from(body, at)
-            at += numbers_form.size
-            transforms.append(
-                StampedTransform(parent, child, sec + nanosec / 1e9, numbers[:3], numbers[3:])
-            )
-        check_end(body, at)
-    except Exception as error:  # no received bytes may stop the panel
-        raise DecodeError(f"{len(payload)} bytes are not a {TF_TYPE}: {error}") from error
-    return transforms
 
 
 IDENTITY: Final = Transform((0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))

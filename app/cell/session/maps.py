@@ -1,5 +1,5 @@
-"""What the maps of one robot are drawn from: maps, read beside the event loop, and transforms. And the
-pictures of maps, made one after the other."""
+"""What the maps of one robot are drawn from: maps and their layers, read beside the event loop, and
+transforms. And the pictures of maps, made one after the other."""
 
 import asyncio
 import logging
@@ -9,19 +9,23 @@ from functools import partial
 from typing import Final
 
 from app.cell.link.peer import RobotContext
-from app.cell.robot.maps import NoMap, read_grid
+from app.cell.robot.map_layers import read_shape
+from app.cell.robot.maps import MapState, NoMap, read_grid, updated
 from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.cell.robot.transforms import TF, TF_STATIC
-from app.panel.widgets.map_view import MapView
+from app.panel.widgets.map_layers import updates_of
 from app.ros.zenoh.sample import Sample
 from app.system.concurrency import spawn_logged
 from app.system.errors import DecodeError, TooMany
-from app.system.limits import BoundedDict
+from app.system.limits import BoundedDict, BoundedQueue
 from app.system.texts import say
 
 log = logging.getLogger("kiosk.maps")
 
 PAUSE_S: Final = 0.5  # between two maps of a topic
+LAYER_PAUSE_S: Final = 0.2  # between two shapes of a topic
+MAX_UPDATES: Final = 100  # of a map that are not applied yet
+MAX_UPDATE_BYTES: Final = 32_000_000
 TILES_PER_S: Final = 30  # that a browser fetches of maps that change
 KEPT_PICTURES: Final = 256
 MAX_WAITING: Final = 128  # all tiles of a large map, for two browsers
@@ -29,33 +33,42 @@ AGAIN_S: Final = 2
 
 
 class MapListener:
-    """The `SampleListener` of a robot's maps and transforms. Used on the event loop only."""
+    """The `SampleListener` of a robot's maps, layers and transforms. Used on the event loop only."""
 
     def __init__(self, context: RobotContext, changed: Callable[[str], None]) -> None:
-        """`changed` is called with the key of a topic whose map was read."""
+        """`changed` is called with the key of a topic whose map or layer was read."""
         robot, panel = context.robot, context.panel
-        views = [widget for widget in panel.widgets() if isinstance(widget, MapView)]
         self._robot = robot
         self._interfaces = context.interfaces
         self._changed = changed
         self._newest: dict[str, Sample] = {}  # not read yet
         self._reading: set[str] = set()
-        uses_transforms = any(view.pose is None for view in views)
+        uses_transforms = any(view.uses_transforms for view in panel.map_views.values())
         topics = (TF, TF_STATIC) if uses_transforms else ()
         self._static = {robot.key(topic): topic == TF_STATIC for topic in topics}
+        self._shapes = {robot.key(topic): kind for topic, kind in panel.map_shapes.items()}
+        # The key of a grid's updates → that of the grid.
+        self._updated = {robot.key(updates_of(topic).topic): robot.key(topic) for topic in panel.maps}
+        self._updates = {key: BoundedQueue[Sample](MAX_UPDATES, MAX_UPDATE_BYTES) for key in robot.maps}
 
     @property
     def keys(self) -> frozenset[str]:
-        """The topics of transforms. Of a map the newest counts: it is not recorded with the others."""
-        return frozenset(self._static)
+        """The topics of which each message counts: transforms, and the updates of maps. Of a map the
+        newest counts: it is not recorded with the others."""
+        return frozenset((*self._static, *self._updated))
 
     def register(self, handlers: SampleHandlers) -> None:
         for key in self._robot.maps:
             handlers.add(key, SampleHandler(partial(self.take_map, key)))
+        for key in self._shapes:  # others may read the same topic
+            handlers.add(key, SampleHandler(partial(self.take_map, key), is_stored=True))
 
     def record_sample(self, key: str, sample: Sample) -> None:
-        """Transforms."""
+        """Transforms, or an update of a map."""
         if self._robot.is_foreign(sample.source):
+            return
+        if key in self._updated:
+            self._take_update(self._updated[key], sample)
             return
         transforms, is_static = self._robot.transforms, self._static[key]
         try:
@@ -64,28 +77,61 @@ class MapListener:
             self._robot.traffic.count_undecodable(key, sample, error)
 
     def take_map(self, key: str, sample: Sample) -> None:
-        """A map; the one before it is not read if it waits."""
+        """A map or a layer; the one before it is not read if it waits."""
         self._newest[key] = sample
+        self._begin(key)
+
+    def _take_update(self, key: str, sample: Sample) -> None:
+        """An update of a map: all count that came after it."""
+        state = self._robot.maps[key]
+        has_map = key in self._newest or (state.grid is not None and not state.is_cut)
+        if not has_map and key not in self._reading:
+            return
+        if self._updates[key].add(sample, len(sample.payload)):
+            state.doubt = say("map_updates_lost")
+        self._begin(key)
+
+    def _begin(self, key: str) -> None:
         if key not in self._reading:
             self._reading.add(key)
             spawn_logged(self._read(key), log, "reading a map failed")
 
     async def _read(self, key: str) -> None:
-        """Reads the newest map until there is no newer one, with a pause between two."""
+        """Reads the newest message until there is no newer one, with a pause between two."""
         try:
-            while (sample := self._newest.pop(key, None)) is not None:
+            while key in self._newest or (key in self._updates and len(self._updates[key])):
                 began = time.monotonic()
-                await self._read_one(key, sample)
-                grid = self._robot.maps[key].grid
-                tiles = grid.columns * grid.rows if grid is not None else 0
-                took_s = time.monotonic() - began
-                await asyncio.sleep(max(PAUSE_S, 4 * took_s, tiles / TILES_PER_S))
+                if key in self._shapes:
+                    await self._read_shape(key, self._newest.pop(key))
+                    pause_s = LAYER_PAUSE_S
+                else:
+                    await self._read_map(key)
+                    grid = self._robot.maps[key].grid
+                    tiles = grid.columns * grid.rows if grid is not None else 0
+                    pause_s = max(PAUSE_S, tiles / TILES_PER_S)
+                self._changed(key)
+                await asyncio.sleep(max(pause_s, 4 * (time.monotonic() - began)))
         finally:
             self._reading.discard(key)
 
-    async def _read_one(self, key: str, sample: Sample) -> None:
-        state = self._robot.maps[key]
+    async def _read_map(self, key: str) -> None:
+        """The newest map if there is one, then the updates that came after it."""
+        state, updates = self._robot.maps[key], self._updates[key]
+        if (sample := self._newest.pop(key, None)) is not None:
+            await self._read_grid(state, sample)
+        waiting = [updates.take() for _ in range(len(updates))]
+        newer = [update for update in waiting if update.at >= state.at]
+        if not newer or state.grid is None or state.is_cut:
+            return
+        grid, payloads = state.grid, [bytes(update.payload) for update in newer]
+        state.grid, problem = await asyncio.to_thread(updated, self._interfaces, grid, payloads)
+        state.updated_at = newer[-1].at
+        if problem:
+            state.doubt = problem
+
+    async def _read_grid(self, state: MapState, sample: Sample) -> None:
         state.wall, state.at, state.source = sample.wall, sample.at, sample.source
+        state.doubt = ""
         try:
             grid = await asyncio.to_thread(lambda: read_grid(self._interfaces, bytes(sample.payload)))
         except NoMap as error:
@@ -94,7 +140,16 @@ class MapListener:
             before, state.problem = state.grid, ""
             if before is None or before.digest != grid.digest:
                 state.grid = grid
-        self._changed(key)
+
+    async def _read_shape(self, key: str, sample: Sample) -> None:
+        state, payload = self._robot.map_layers[key], bytes(sample.payload)
+        try:
+            shape = await asyncio.to_thread(read_shape, self._interfaces, self._shapes[key], payload)
+        except NoMap as error:
+            state.shape, state.problem = None, error.reason
+        else:
+            state.shape, state.problem = shape, ""
+        state.wall, state.at, state.source = sample.wall, sample.at, sample.source
 
 
 class MapPictures:

@@ -5,53 +5,73 @@ from typing import Any, Final
 
 from app.cell.permission.robot_pose import locate, map_doubt
 from app.cell.permission.verdict import topic_mismatch
-from app.cell.robot.maps import Grid
+from app.cell.robot.maps import Geometry
 from app.cell.robot.state import RobotState
+from app.cell.view.map_layer_values import grid_values, map_layer, no_layer
 from app.panel.widgets.map_view import MapView
 from app.system.clock import format_time
-from app.system.texts import TextLike, say
+from app.system.texts import TextLike, number, say
 
 PLACES: Final = 2  # decimals of metres and radians that a page gets
+ROTATED: Final = 1e-3  # radians: an origin that is turned by more is rotated
 
 
 def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` (live, old, waiting, unreadable), `note`, `grid` (the map's geometry and
     version; None without one), `pose` ([x, y, yaw] in metres and radians in the map's frame, None if
-    unknown) and `about`, the time of the map; and when they change."""
+    unknown), `about`, the time of the map and how precise the pose is, `detail`, `layer_0` and so on,
+    and `layer_note`, what is wrong with the first layer that is not drawn; and when they change."""
     state = robot.maps[robot.key(widget.topic)]
     if mismatch := topic_mismatch("MS", widget, robot):
-        return _without_map("unreadable", mismatch.reason or ""), math.inf
+        return _without_map(widget, "unreadable", mismatch.reason or ""), math.inf
     if state.problem:
-        return _without_map("unreadable", state.problem), math.inf
+        return _without_map(widget, "unreadable", state.problem), math.inf
     if state.grid is None:
-        return _without_map("waiting", say("map_waiting")), math.inf
+        return _without_map(widget, "waiting", say("map_waiting")), math.inf
     geometry = state.grid.geometry
     shown = locate(widget, robot, geometry, now)
     note = map_doubt(state, robot) or shown.note
     if not robot.link_up or not robot.graph.peers:
         note = say("map_no_connection") if shown.pose is None else note or say("map_no_connection")
+    layers = [map_layer(widget, layer, robot, geometry, now) for layer in widget.layers]
+    warnings = [layer.attributes["warning"] for layer in layers]
+    ellipses = [layer.attributes["ellipse"] for layer in layers if "ellipse" in layer.attributes]
     return {
         "state": "old" if note else "live",
         "note": note,
-        "grid": _grid(state.grid),
+        "grid": grid_values(geometry, state.grid.version, geometry.origin),
         "pose": None if shown.pose is None else [round(part, PLACES) for part in shown.pose],
-        "about": say("map_about", time=format_time(state.wall)),
-    }, shown.until
+        "about": _about(state.wall, ellipses if shown.pose is not None and not shown.note else []),
+        "detail": _detail(geometry),
+        "layer_note": next(filter(None, warnings), ""),
+        **{f"layer_{number}": dict(layer.attributes) for number, layer in enumerate(layers)},
+    }, min([shown.until, *(layer.until for layer in layers)])
 
 
-def _without_map(state: str, note: TextLike) -> dict[str, Any]:
-    return {"state": state, "note": note, "grid": None, "pose": None, "about": ""}
+def _about(wall: float, ellipses: list[list[float]]) -> TextLike:
+    """When the map came; and how far the robot may be from where it is drawn."""
+    if not ellipses:
+        return say("map_about", time=format_time(wall))
+    metres = ellipses[0][0]
+    within = number(f"{metres:.1f}", "m") if metres >= 1 else number(f"{100 * metres:.0f}", "cm")
+    return say("map_about_within", time=format_time(wall), within=within)
 
 
-def _grid(grid: Grid) -> dict[str, Any]:
-    geometry = grid.geometry
-    origin = geometry.origin
+def _detail(geometry: Geometry) -> TextLike:
+    """What the map's origin means for Nav2."""
+    if abs(geometry.origin.yaw) <= ROTATED:
+        return ""
+    return say("map_rotated", degrees=number(f"{math.degrees(geometry.origin.yaw):.1f}", "°"))
+
+
+def _without_map(widget: MapView, state: str, note: TextLike) -> dict[str, Any]:
     return {
-        "version": grid.version,
-        "width": geometry.width,
-        "height": geometry.height,
-        "resolution": geometry.resolution,
-        "x": origin.x,
-        "y": origin.y,
-        "yaw": origin.yaw,
+        "state": state,
+        "note": note,
+        "grid": None,
+        "pose": None,
+        "about": "",
+        "detail": "",
+        "layer_note": "",
+        **{f"layer_{number}": no_layer(layer) for number, layer in enumerate(widget.layers)},
     }

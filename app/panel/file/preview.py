@@ -10,6 +10,7 @@ from app.panel.constants import resolve_names
 from app.panel.model import Panel
 from app.panel.template import NOW, placeholders
 from app.panel.widgets.families import Command, Input
+from app.panel.widgets.map_view import MapView
 from app.ros.messages import Interfaces, Type
 from app.system.errors import FieldError, Remark
 
@@ -18,7 +19,7 @@ Comments = Mapping[str, str]  # by input ids ("speed"), and by places of fields 
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
-    """A remark for each widget that can be pressed or held."""
+    """A remark for each widget that can be pressed or held, and for each map."""
     for p, page in enumerate(panel.pages):
         comments = {w.id: w.comment for w in page.widgets if isinstance(w, Input)}
         comments[NOW] = "the time of sending"
@@ -26,6 +27,8 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
             if isinstance(widget, Command) and f"page[{p}].{place}" not in panel.copies:
                 lines = _preview_lines(widget, interfaces, comments)
                 yield Remark(f"page[{p}].{place}", "\n".join(lines))
+            elif isinstance(widget, MapView):
+                yield Remark(f"page[{p}].{place}", _map_line(widget))
     for w, widget in enumerate(panel.frame.widgets):
         if isinstance(widget, Command):
             yield Remark(f"frame.widget[{w}]", "\n".join(_preview_lines(widget, interfaces, {})))
@@ -33,6 +36,12 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
         comments = {field.id: field.comment for field in load.fields}
         comments[NOW] = "the time of sending"
         yield Remark(f"recipe[{r}]", "\n".join(_preview_lines(load, interfaces, comments)))
+
+
+def _map_line(widget: MapView) -> str:
+    """What its origin means, which only the robot's message says."""
+    drawn = f"shows {widget.topic} with the rotation of its origin"
+    return f"{drawn}; Nav2's costmap and AMCL ignore that rotation"
 
 
 def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:

@@ -7,7 +7,10 @@ from pydantic import Field
 
 from app.panel.base import Rows, Seconds, Span, TopicName, TopicQos
 from app.panel.shared_keys import AgeKey, TopicKeys
-from app.panel.widgets.families import DisplayWidget, TopicSource, TopicWidget
+from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
+from app.panel.widgets.map_layers import GRID_TYPE, MAX_LAYERS, Corners, MapLayer, updates_of
+from app.ros.dialects.dialect import Role
+from app.system.errors import Fault
 
 POSE_PATHS: Final = {
     "geometry_msgs/msg/PoseStamped": "pose",
@@ -38,7 +41,8 @@ class PoseTopic(TopicKeys):
 class MapView(AgeKey, TopicWidget, DisplayWidget):
     """Shows a map (`nav_msgs/msg/OccupancyGrid`) with the robot: by its transforms from the map's frame
     to `base_frame`, or by a topic with its pose. A pose older than `max_age_s` is drawn as old, where
-    the robot was last seen."""
+    the robot was last seen. `layers` are drawn over the map; `footprint` has the robot's corners in
+    `base_frame`, in metres."""
 
     kind: Literal["map"]
     topic: TopicName = "/map"
@@ -46,14 +50,42 @@ class MapView(AgeKey, TopicWidget, DisplayWidget):
     pose: PoseTopic | None = None
     base_frame: FrameName = "base_link"
     radius: Annotated[float, Field(gt=0, le=100)] = 0.3
+    footprint: Corners | None = None
+    layers: Annotated[tuple[MapLayer, ...], Field(strict=False, max_length=MAX_LAYERS)] = Field(
+        default=(), alias="layer"
+    )
     max_age_s: Seconds = 2.0
     span: Span = 8
     rows: Rows = 4
 
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """The topics of the map and of its costmaps."""
+        costmaps = (layer.topic for layer in self.layers if layer.type == GRID_TYPE)
+        return tuple(dict.fromkeys((self.topic, *costmaps)))
+
+    @property
+    def uses_transforms(self) -> bool:
+        """Whether the robot's transforms are needed: for its pose, or to place a layer."""
+        return self.pose is None or bool(self.layers)
+
     def sources(self) -> Iterator[TopicSource]:
         yield TopicSource(self.topic, self.type, self.qos, ())
+        yield updates_of(self.topic)
+        for number, layer in enumerate(self.layers):
+            yield from layer.sources(f"layer[{number}]")
         if self.pose is not None:
             yield TopicSource(self.pose.topic, self.pose.type, self.pose.qos, self.pose.paths, "pose")
-        else:
+        if self.uses_transforms:
             for topic in ("/tf", "/tf_static"):
                 yield TopicSource(topic, TF_TYPE, TopicQos(), ())
+
+    def endpoints(self) -> Iterator[tuple[Role, str]]:
+        """Without the updates: few robots publish those of a map."""
+        updates = {updates_of(topic).topic for topic in self.grids}
+        yield from (each for each in super().endpoints() if each[1] not in updates)
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        yield from super().faults(place, checking)
+        for number, layer in enumerate(self.layers):
+            yield from layer.faults(f"{place}.layer[{number}]")

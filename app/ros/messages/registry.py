@@ -32,7 +32,7 @@ MAX_SUGGESTIONS: Final = 3
 FILE_PARTS: Final = 3  # of a definition's file that are shown: package, folder, name
 NO_DEFINITIONS: Final = Definitions()
 PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
-MISSPELT_PACKAGE: Final = 0.8  # so similar is a name only by mistake
+MISSPELT_PACKAGE: Final = 0.81  # so similar is a name only by mistake; "my_msgs" is not like "map_msgs"
 
 
 class Interfaces:

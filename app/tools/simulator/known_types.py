@@ -215,7 +215,7 @@ def _scan(moment: Moment, _: Collection[str]) -> Fields:
         wall = min(3 / max(x, 1e-6), 2 / max(y, 1e-6))
         ranges.append(1.4 if (beam - walker) % BEAMS < 6 else wall)
     return {
-        "header": header(moment),
+        "header": {**header(moment), "frame_id": "base_link"},
         "angle_min": 0.0,
         "angle_max": 2 * math.pi - step,
         "angle_increment": step,
@@ -277,6 +277,32 @@ def _on_map(moment: Moment, pose: Fields) -> Fields:
     return {"header": {**header(moment), "frame_id": "map"}, "pose": pose}
 
 
+def _path(moment: Moment, wanted: Collection[str]) -> Fields:
+    """Ahead of where a robot is."""
+    here = _point(moment, wanted)
+    places = [{"x": here["x"] + 0.1 * step, "y": here["y"] + 0.002 * step**2} for step in range(25)]
+    poses = [_on_map(moment, {"position": place, "orientation": {"w": 1.0}}) for place in places]
+    return {"header": {**header(moment), "frame_id": "map"}, "poses": poses}
+
+
+def _polygon(moment: Moment, _: Collection[str]) -> Fields:
+    """The corners of a robot."""
+    corners = [{"x": x, "y": y} for x, y in ((0.4, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.4, -0.3))]
+    return {"header": {**header(moment), "frame_id": "base_link"}, "polygon": {"points": corners}}
+
+
+def _map_update(moment: Moment, _: Collection[str]) -> Fields:
+    """Nothing of a map changes."""
+    return {"header": {**header(moment), "frame_id": "map"}}
+
+
+def _located(moment: Moment, wanted: Collection[str]) -> Fields:
+    """A pose that is known to within some centimetres."""
+    covariance = [0.0] * 36
+    covariance[0], covariance[7] = 0.006, 0.003
+    return _on_map(moment, {"pose": _pose(moment, wanted), "covariance": covariance})
+
+
 def _transforms(moment: Moment, wanted: Collection[str]) -> Fields:
     """From the map to the robot, as its localization and its wheels have it."""
     moved = {"translation": _point(moment, wanted), "rotation": _quaternion(moment, wanted)}
@@ -332,9 +358,9 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "geometry_msgs/msg/Twist": _twist,
     "geometry_msgs/msg/Wrench": _wrench,
     "geometry_msgs/msg/PoseStamped": lambda moment, wanted: _on_map(moment, _pose(moment, wanted)),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda moment, wanted: _on_map(
-        moment, {"pose": _pose(moment, wanted)}
-    ),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _located,
+    "geometry_msgs/msg/PolygonStamped": _polygon,
+    "map_msgs/msg/OccupancyGridUpdate": _map_update,
     "tf2_msgs/msg/TFMessage": _transforms,
     "sensor_msgs/msg/JointState": _joints,
     "sensor_msgs/msg/BatteryState": _battery,
@@ -347,6 +373,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "sensor_msgs/msg/Image": _image,
     "sensor_msgs/msg/CompressedImage": _compressed,
     "nav_msgs/msg/OccupancyGrid": _map,
+    "nav_msgs/msg/Path": _path,
     "diagnostic_msgs/msg/DiagnosticArray": _diagnostics,
     "rcl_interfaces/msg/Log": _log,
     "lifecycle_msgs/msg/State": lambda *_: {"id": 3, "label": "active"},

@@ -83,6 +83,7 @@ WORDS: Final = (
     "map_follow",
     "map_whole",
     "map_not_loaded",
+    "map_layers",
     "rosout_level",
     "rosout_node",
     "rosout_search",

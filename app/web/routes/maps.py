@@ -9,6 +9,7 @@ from fastapi.responses import Response
 from app.cell.robot.maps import Grid, overview, reduced, tile
 from app.cell.robot.transforms import Pose
 from app.cell.session.session import RobotSession
+from app.cell.view.map_layer_values import COSTMAP
 from app.cell.view.map_values import map_view
 from app.panel.widgets.map_view import MapView
 from app.system.errors import NotFound
@@ -29,7 +30,7 @@ KEPT: Final = "private, max-age=31536000, immutable"  # another map has another 
 @router.get(
     "/widgets/{widget}/map/{version}/{column}-{row}.png",
     response_class=Response,
-    summary="A tile of a map: 512 cells a side, from the upper left; unknown cells are transparent",
+    summary="A tile of a map or of a costmap over it: 512 cells a side, from the upper left",
     responses=errors(403, 404, 422, 429) | PNG,
 )
 async def map_tile(
@@ -41,11 +42,17 @@ async def map_tile(
     state: CurrentState,
     theme: Theme = "light",
 ) -> Response:
-    _, grid = _grid(session, widget)
-    if grid.version != version or column >= grid.columns or row >= grid.rows:
+    costs = version.startswith(COSTMAP)
+    grid = _costmap(session, widget, version) if costs else _grid(session, widget)[1]
+    if (
+        grid is None
+        or version.removeprefix(COSTMAP) != grid.version
+        or column >= grid.columns
+        or row >= grid.rows
+    ):
         raise NotFound(say("map_changed"))
     picture = await state.fleet.map_pictures.picture(
-        (version, column, row, theme), lambda: tile(grid, column, row, theme)
+        (version, column, row, theme), lambda: tile(grid, column, row, theme, costs=costs)
     )
     return _picture(picture, KEPT)
 
@@ -76,6 +83,13 @@ def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:
     if grid is None:
         raise NotFound(say("map_waiting"))
     return view, grid
+
+
+def _costmap(session: RobotSession, widget: str, version: str) -> Grid | None:
+    """The costmap over a map with this version; None if there is none now."""
+    view, maps = session.panel.widget(widget, MapView), session.robot.maps
+    grids = (maps[session.robot.key(topic)].grid for topic in view.grids)
+    return next((grid for grid in grids if grid and COSTMAP + grid.version == version), None)
 
 
 def _picture(data: bytes, cache_control: str) -> Response:

@@ -13,13 +13,21 @@ const MARGIN = 0.04; // of the view, around the whole map
 const MOST_PX_PER_CELL = 24;
 const SCALE_PX = 140; // at most
 const AGAIN_MS = 3000; // until tiles that did not come are asked for again
+const MOST_LAYERS = 8;
 
 /** @type {WeakMap<HTMLElement, MapView>} */
 const views = new WeakMap();
 
 // Called for each widget of this kind.
 /** @param {HTMLElement} root */
-export const equip = (root) => views.set(root, new MapView(root));
+export const equip = (root) => {
+  const view = new MapView(root);
+  views.set(root, view);
+  if (root.querySelector(".map-list") || root.dataset.footprint) layers(root, view);
+};
+
+/** @param {HTMLElement} root @param {MapView} view */
+const layers = async (root, view) => (await import("./map-layers.js")).layersOf(root, view);
 
 // The view of a map, for other scripts; undefined until the widget is equipped.
 /** @param {HTMLElement} root @returns {MapView | undefined} */
@@ -29,9 +37,18 @@ export const viewOf = (root) => views.get(root);
 export const show = {
   grid: (root, grid) => views.get(root)?.showGrid(grid),
   pose: (root, pose) => views.get(root)?.showPose(pose),
+  ...Object.fromEntries(Array.from({ length: MOST_LAYERS }, (_, index) => [`layer_${index}`, showLayer(index)])),
 };
 
-class MapView {
+/** @param {number} index @returns {Show} */
+function showLayer(index) {
+  return async (root, layer) => {
+    const view = views.get(root);
+    if (view) (await layers(root, view)).show(index, layer);
+  };
+}
+
+export class MapView {
   /** @type {HTMLElement} */
   #root;
   /** @type {HTMLElement} */
@@ -97,6 +114,16 @@ class MapView {
     return this.#grid?.version ?? "";
   }
 
+  // Where the robot is, or was last: x, y and yaw in metres and radians; null if that is not known.
+  get pose() {
+    return this.#pose;
+  }
+
+  // Draws soon.
+  draw() {
+    this.#draw();
+  }
+
   // `call` is called after each draw: positions in the view may be others then.
   /** @param {() => void} call */
   onDraw(call) {
@@ -134,11 +161,9 @@ class MapView {
     };
   }
 
-  // All tiles of a map are shown at once, in place of those before. A map with a tile missing is not shown.
-  async #load() {
-    clearTimeout(this.#again);
-    const grid = this.#newest;
-    if (!grid) return this.#show(null, null);
+  // The tiles of a grid, and whether all of them come.
+  /** @param {Grid} grid @returns {{ layer: HTMLElement, isWhole: Promise<boolean> }} */
+  tilesOf(grid) {
     const layer = document.createElement("div");
     const theme = document.documentElement.dataset.theme;
     const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/map/${grid.version}`;
@@ -149,9 +174,18 @@ class MapView {
         image.style.top = `${row * TILE - grid.height}px`;
         layer.append(image);
       }
-    const tiles = await Promise.allSettled([...layer.querySelectorAll("img")].map((image) => image.decode()));
+    const decoded = Promise.allSettled([...layer.querySelectorAll("img")].map((image) => image.decode()));
+    return { layer, isWhole: decoded.then((tiles) => tiles.every(({ status }) => status === "fulfilled")) };
+  }
+
+  // All tiles of a map are shown at once, in place of those before. A map with a tile missing is not shown.
+  async #load() {
+    clearTimeout(this.#again);
+    const grid = this.#newest;
+    if (!grid) return this.#show(null, null);
+    const { layer, isWhole: arrival } = this.tilesOf(grid);
+    const isWhole = await arrival;
     if (grid.version !== this.#newest?.version) return;
-    const isWhole = tiles.every(({ status }) => status === "fulfilled");
     this.#root.toggleAttribute("data-broken", !isWhole);
     if (isWhole) this.#show(grid, layer);
     else this.#again = setTimeout(() => this.#load(), AGAIN_MS);
@@ -161,7 +195,7 @@ class MapView {
   #show(grid, layer) {
     [this.#grid, this.#layer] = [grid, layer];
     this.#tiles.replaceChildren(...(layer ? [layer] : []));
-    for (const key of this.#root.querySelectorAll("button")) key.disabled = !grid;
+    for (const key of this.#root.querySelectorAll(".map-keys > button")) key.disabled = !grid;
     find(this.#root, ".map-scale").hidden = !grid;
     this.#root.dataset.version = grid?.version ?? "";
     this.#draw();
@@ -180,11 +214,7 @@ class MapView {
     if (!grid || !this.#view.clientWidth) return;
     if (this.#isWhole) this.#fit(grid);
     if (this.#follows && this.#pose) this.#centre = { x: this.#pose[0], y: this.#pose[1] };
-    const { x, y } = this.at(grid.x, grid.y);
-    const perCell = this.#perMetre * grid.resolution;
-    if (this.#layer)
-      this.#layer.style.transform = `translate(${x}px, ${y}px) rotate(${-grid.yaw}rad) scale(${perCell})`;
-    this.#tiles.toggleAttribute("data-large", perCell > 1);
+    if (this.#layer) this.placeTiles(this.#layer, grid);
     if (this.#pose) {
       const place = this.at(this.#pose[0], this.#pose[1]);
       const radius = Math.max(Number(this.#root.dataset.radius) * this.#perMetre, LEAST_ROBOT_PX);
@@ -195,6 +225,15 @@ class MapView {
     this.#drawScale();
     find(this.#root, '[data-do="follow"]').setAttribute("aria-pressed", String(this.#follows));
     for (const call of this.#drawn) call();
+  }
+
+  // Puts tiles where their grid is.
+  /** @param {HTMLElement} layer @param {Grid} grid */
+  placeTiles(layer, grid) {
+    const { x, y } = this.at(grid.x, grid.y);
+    const perCell = this.#perMetre * grid.resolution;
+    layer.style.transform = `translate(${x}px, ${y}px) rotate(${-grid.yaw}rad) scale(${perCell})`;
+    layer.parentElement?.toggleAttribute("data-large", perCell > 1);
   }
 
   #drawScale() {
@@ -315,6 +354,7 @@ class MapView {
 
   /** @param {string | undefined} what */
   #do(what) {
+    if (what === "layers") return;
     if (what === "in") this.#zoom(STEP);
     else if (what === "out") this.#zoom(1 / STEP);
     else if (what === "whole") [this.#isWhole, this.#follows] = [true, false];

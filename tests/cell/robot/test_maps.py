@@ -17,6 +17,7 @@ from app.cell.robot.maps import (
     read_grid,
     reduced,
     tile,
+    updated,
 )
 from app.cell.robot.transforms import Pose
 from app.ros.messages import load_interfaces
@@ -127,3 +128,52 @@ def test_a_message_without_a_map_says_why(data: bytes, code: str) -> None:
     assert isinstance(raised.value.reason, Text)
     assert raised.value.reason.code == code
     assert MAX_CELLS < 2**31
+
+
+UPDATE: Final = "map_msgs/msg/OccupancyGridUpdate"
+
+
+def update_of(cells: list[int], frame: str = "map", **keys: int) -> bytes:
+    return INTERFACES.encode(UPDATE, {"header": {"frame_id": frame}, "data": cells, **keys})
+
+
+def test_an_update_changes_its_part_of_the_map() -> None:
+    grid = grid_of([0] * 12, 4, 3)
+    changed, problem = updated(
+        INTERFACES, grid, [update_of([1, 2, 3, -1], x=1, y=1, width=2, height=2)]
+    )
+    assert problem == ""
+    assert [*changed.cells] == [0, 0, 0, 0, 0, 1, 2, 0, 0, 3, 255, 0]
+    assert changed.version != grid.version
+    assert [*grid.cells] == [0] * 12
+    same, _ = updated(INTERFACES, changed, [update_of([])])
+    assert same.version == changed.version
+
+
+@pytest.mark.parametrize(
+    ("payload", "code"),
+    [
+        (update_of([1], x=4, y=0, width=1, height=1), "map_update_outside"),
+        (update_of([1], x=-1, y=0, width=1, height=1), "map_update_outside"),
+        (update_of([1], x=2**31 - 1, y=2**31 - 1, width=1, height=1), "map_update_outside"),
+        (update_of([1] * 5, x=0, y=0, width=5, height=1), "map_update_outside"),
+        (update_of([1], x=0, y=0, width=2, height=2), "map_update_cells"),
+        (update_of([], x=0, y=0, width=2**32 - 1, height=2**32 - 1), "map_update_cells"),
+        (update_of([1], frame="odom", x=0, y=0, width=1, height=1), "map_update_frame"),
+        (b"\0\1\0\0", "map_update_incomplete"),
+    ],
+)
+def test_an_update_that_does_not_fit_changes_nothing_and_is_named(payload: bytes, code: str) -> None:
+    grid = grid_of([0] * 12, 4, 3)
+    good = update_of([7], x=0, y=0, width=1, height=1)
+    changed, problem = updated(INTERFACES, grid, [payload, good])
+    assert isinstance(problem, Text)
+    assert problem.code == code
+    assert [*changed.cells] == [7] + [0] * 11
+
+
+def test_a_costmap_is_transparent_where_nothing_costs() -> None:
+    grid = grid_of([0, -1, 20, 70, 99, 100], 6, 1)
+    opacity = [*pixels(tile(grid, 0, 0, "light", costs=True)).getchannel("A").tobytes()]
+    assert opacity[:2] == [0, 0]
+    assert 0 < opacity[2] < opacity[3] < opacity[4] == opacity[5] < 255

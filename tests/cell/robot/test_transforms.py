@@ -34,6 +34,11 @@ def transform(
     )
 
 
+def transforms_of(*transforms: Any) -> Any:
+    """A message with these."""
+    return Message(transforms=transforms)
+
+
 def tree_with(*moving: Any, static: tuple[Any, ...] = (), at: float = 100.0) -> TransformTree:
     tree = TransformTree()
     tree.record(Message(transforms=static), at, is_static=True)

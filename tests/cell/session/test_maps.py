@@ -106,6 +106,111 @@ async def test_a_map_that_can_not_be_read_replaces_the_one_before(
     assert (state.grid is not None, state.problem) == (True, "")
 
 
+UPDATE: Final = "map_msgs/msg/OccupancyGridUpdate"
+
+
+def update(value: int, at: float = NOW, frame: str = "map") -> Sample:
+    fields = {"header": {"frame_id": frame}, "width": 1, "height": 1, "data": [value]}
+    return sample(INTERFACES.encode(UPDATE, fields))._replace(at=at)
+
+
+async def cells_are(listening: Listening, cells: list[int]) -> None:
+    async with asyncio.timeout(20):
+        while (grid := listening.robot.maps["map"].grid) is None or [*grid.cells] != cells:
+            await asyncio.sleep(0.005)
+
+
+@in_a_loop
+async def test_updates_count_after_a_whole_map_in_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.0)
+    listening = Listening()
+    listening.listener.record_sample("map_updates", update(9))  # of no map
+    listening.listener.take_map("map", sample(payload(5)))
+    await cells_are(listening, [5])
+    for value in (1, 2, 3):
+        listening.listener.record_sample("map_updates", update(value))
+    await cells_are(listening, [3])
+    listening.listener.take_map("map", sample(payload(6))._replace(at=NOW + 2.0))
+    listening.listener.record_sample("map_updates", update(7, NOW + 1.0))  # from before this map
+    listening.listener.record_sample("map_updates", update(8, NOW + 3.0))
+    await cells_are(listening, [8])
+    assert listening.robot.maps["map"].doubt == ""
+
+
+@in_a_loop
+async def test_an_update_that_does_not_fit_makes_the_map_doubtful_until_a_whole_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.0)
+    listening = Listening()
+    listening.listener.take_map("map", sample(payload(5)))
+    await listening.reported(1)
+    listening.listener.record_sample("map_updates", update(1, frame="odom"))
+    await listening.reported(2)
+    doubt = listening.robot.maps["map"].doubt
+    assert isinstance(doubt, Text)
+    assert doubt.code == "map_update_frame"
+    listening.listener.take_map("map", sample(payload(6)))
+    await cells_are(listening, [6])
+    assert listening.robot.maps["map"].doubt == ""
+
+
+@in_a_loop
+async def test_updates_that_come_too_fast_are_bounded_and_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.0)
+    listening = Listening()
+    listening.listener.take_map("map", sample(payload(5)))
+    await cells_are(listening, [5])
+    for value in range(maps.MAX_UPDATES + 1):
+        listening.listener.record_sample("map_updates", update(value % 100))
+    assert len(listening.listener._updates["map"]) == maps.MAX_UPDATES
+    doubt = listening.robot.maps["map"].doubt
+    assert isinstance(doubt, Text)
+    assert doubt.code == "map_updates_lost"
+
+
+@in_a_loop
+async def test_updates_of_another_session_and_of_before_a_cut_are_not_applied() -> None:
+    listening = Listening()
+    listening.listener.take_map("map", sample(payload(5)))
+    await cells_are(listening, [5])
+    listening.listener.record_sample("map_updates", update(1)._replace(source="0123456789abcdef"))
+    listening.robot.mark_link_lost()
+    async with asyncio.timeout(20):
+        while listening.listener._reading:
+            await asyncio.sleep(0.005)
+    listening.listener.record_sample("map_updates", update(2, time.monotonic()))
+    assert listening.listener._reading == set()
+    assert len(listening.listener._updates["map"]) == 0
+
+
+@in_a_loop
+async def test_of_many_scans_the_newest_is_read_and_others_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "LAYER_PAUSE_S", 0.0)
+    listening = Listening(layer=[{"shows": "scan", "topic": "/scan"}])
+    scan = "sensor_msgs/msg/LaserScan"
+    limits = {"range_max": 9.0, "angle_increment": 0.1}
+    fields = {"header": {"frame_id": "laser"}, "ranges": [1.0], **limits}
+    good = INTERFACES.encode(scan, fields)
+    for _ in range(50):
+        listening.listener.take_map("scan", sample(good[:-4]))
+    listening.listener.take_map("map", sample(payload(5)))
+    await listening.reported(2)
+    state = listening.robot.map_layers["scan"]
+    assert isinstance(state.problem, Text)
+    assert (state.problem.code, state.shape) == ("map_layer_incomplete", None)
+    await cells_are(listening, [5])
+    listening.listener.take_map("scan", sample(good))
+    await listening.reported(3)
+    assert state.problem == ""
+    assert state.shape is not None
+    assert [*state.shape.points] == [1.0, 0.0]
+
+
 @pytest.mark.long("real time")
 @in_a_loop
 async def test_a_large_map_does_not_hold_the_event_loop() -> None:
@@ -135,8 +240,11 @@ def test_transforms_are_those_of_all_messages_and_a_broken_one_is_counted() -> N
 
 
 def test_a_map_with_a_pose_topic_does_not_read_transforms() -> None:
-    assert Listening(pose={"topic": "/pose"}).listener.keys == frozenset()
-    assert Listening().listener.keys == {"tf", "tf_static"}
+    assert Listening(pose={"topic": "/pose"}).listener.keys == {"map_updates"}
+    assert Listening().listener.keys == {"tf", "tf_static", "map_updates"}
+    scan = {"shows": "scan", "topic": "/scan"}
+    placed = Listening(pose={"topic": "/pose"}, layer=[scan])
+    assert placed.listener.keys == {"tf", "tf_static", "map_updates"}
 
 
 def test_transforms_of_another_session_are_not_the_robots() -> None:

@@ -63,7 +63,7 @@ def newest(robot: Stepped, topic: str) -> Any:
 def test_panel_plays_all_that_it_uses_of_the_story(robot: Stepped) -> None:
     used = {**robot.panel.listened(), **robot.panel.publications(), **robot.panel.actions()}
     played = {name for _, name, _ in DRIVING.types}
-    assert used.keys() - played == {"/front_camera/image_raw/compressed"}
+    assert used.keys() - played == {"/front_camera/image_raw/compressed", "/map_updates"}
     assert used.keys() & DRIVING.publishes.keys() <= {*robot.said, "/rosout"}
 
 

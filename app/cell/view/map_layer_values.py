@@ -1,0 +1,183 @@
+"""What the layers of a map show: pure, from (layer, robot, time)."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app.cell.permission.verdict import topic_mismatch
+from app.cell.robot.map_layers import LayerState, Shape, placed
+from app.cell.robot.maps import Arrival, Geometry, Grid
+from app.cell.robot.state import RobotState
+from app.cell.robot.transforms import IDENTITY, LocatedFrame, Pose, Transform
+from app.panel.shared_keys import stale_at
+from app.panel.widgets.map_layers import GRID_TYPE, LayerName, MapLayer
+from app.panel.widgets.map_view import MapView
+from app.system.clock import age_changes_at, format_age, format_time
+from app.system.texts import TextLike, number, say
+
+COSTMAP: Final = "cost-"  # before the version of a costmap
+AHEAD_S: Final = 1.0  # by which a message may be newer than the transforms
+LABELS: Final[Mapping[LayerName, TextLike]] = {
+    "path": say("map_layer_path"),
+    "scan": say("map_layer_scan"),
+    "footprint": say("map_layer_footprint"),
+    "covariance": say("map_layer_covariance"),
+    "costmap": say("map_layer_costmap"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ShownLayer:
+    """A layer's attributes, and when time alone changes them (monotonic seconds)."""
+
+    attributes: Mapping[str, Any]
+    until: float = math.inf
+
+
+def layer_label(layer: MapLayer) -> TextLike:
+    """Its label, or what its kind is called."""
+    return layer.label or LABELS[layer.shows]
+
+
+def map_layer(
+    widget: MapView, layer: MapLayer, robot: RobotState, geometry: Geometry, now: float
+) -> ShownLayer:
+    """Attributes: `label`, `state` (live, old, waiting, unreadable, unplaced), `note`; `warning`, the
+    note with the label where the map has to say it. While it is live also what is drawn: `points` as x,
+    y, x, y … in centimetres of the map's frame, `ellipse` (half axes in metres and turn in radians) or
+    `grid`, as a map's."""
+    key = robot.key(layer.topic)
+    state: Arrival = robot.maps[key] if layer.type == GRID_TYPE else robot.map_layers[key]
+    problem, code, until = _doubt(layer, state, robot, now)
+    if not problem:
+        shown = _drawn(widget, layer, robot, geometry, now)
+        if isinstance(shown, ShownLayer):
+            attributes = {"label": layer_label(layer), **shown.attributes}
+            return ShownLayer(attributes, min(shown.until, until))
+        problem, code, until = shown, "unplaced", _soon(now)
+    label = layer_label(layer)
+    is_usual = layer.row.ends and code in ("old", "waiting")
+    warning = "" if is_usual else say("map_layer_note", layer=label, note=problem)
+    attributes = {"label": label, "state": code, "note": problem, "warning": warning}
+    return ShownLayer(attributes, until)
+
+
+def _doubt(
+    layer: MapLayer, state: Arrival, robot: RobotState, now: float
+) -> tuple[TextLike, str, float]:
+    """Why a layer may not be drawn as what is there now, "" if it may; its state, and until when."""
+    if mismatch := topic_mismatch("MS", layer, robot):
+        return mismatch.reason or "", "unreadable", math.inf
+    if state.problem:
+        return state.problem, "unreadable", math.inf
+    if state.at == -math.inf:
+        return say("map_layer_waiting"), "waiting", math.inf
+    if state.is_cut:
+        return say("readout_before_disconnect", time=format_time(state.wall)), "old", math.inf
+    if robot.is_foreign(state.source):
+        return say("readout_foreign", time=format_time(state.wall)), "old", math.inf
+    at = max(state.at, getattr(state, "updated_at", state.at))
+    if now >= (until := stale_at(at, layer.most_age_s)):
+        return say("map_layer_old", age=format_age(now - at)), "old", age_changes_at(at, now)
+    return getattr(state, "doubt", ""), "old", until
+
+
+def _drawn(
+    widget: MapView, layer: MapLayer, robot: RobotState, geometry: Geometry, now: float
+) -> ShownLayer | TextLike:
+    """What is drawn, or why it has no place on the map."""
+    key = robot.key(layer.topic)
+    if layer.type == GRID_TYPE:
+        grid = robot.maps[key].grid
+        if grid is None:
+            return say("map_layer_waiting")
+        located = _located(widget, grid.geometry.frame, None, robot, geometry, now)
+        if not isinstance(located, LocatedFrame):
+            return located
+        return ShownLayer(_live(grid=costmap_grid(grid, located.transform)), _old_at(widget, located))
+    state = robot.map_layers[key]
+    shape = state.shape
+    if shape is None:
+        return say("map_layer_waiting")
+    if layer.shows == "scan" and state.placed and state.placed[:2] == (shape, geometry.frame):
+        return ShownLayer(_live(points=state.placed[3]))
+    stamp = shape.stamp if layer.shows == "scan" and shape.stamp else None
+    located = _located(widget, shape.frame, stamp, robot, geometry, now)
+    if not isinstance(located, LocatedFrame):
+        return located
+    if stamp is not None and located.stamp is not None and stamp - located.stamp > AHEAD_S:
+        return say("map_layer_ahead", seconds=number(f"{stamp - located.stamp:.1f}"))
+    if shape.ellipse is not None:
+        long, short, turn = shape.ellipse
+        ellipse = [round(long, 3), round(short, 3), round(turn + located.pose.yaw, 3)]
+        return ShownLayer(_live(ellipse=ellipse), _old_at(widget, located))
+    points = _placed(state, shape, geometry.frame, located.transform)
+    return ShownLayer(_live(points=points), _old_at(widget, located))
+
+
+def _placed(state: LayerState, shape: Shape, frame: str, transform: Transform) -> list[int]:
+    """The points in the map's frame: the same list again while nothing moves."""
+    rounded = Transform(*(tuple(round(part, 4) for part in parts) for parts in transform))  # type: ignore[arg-type]
+    if state.placed is None or state.placed[:3] != (shape, frame, rounded):
+        state.placed = shape, frame, rounded, placed(shape, transform)
+    return state.placed[3]
+
+
+def _located(
+    widget: MapView,
+    frame: str,
+    stamp: float | None,
+    robot: RobotState,
+    geometry: Geometry,
+    now: float,
+) -> LocatedFrame | TextLike:
+    """Where a frame is on the map, by transforms that are not old."""
+    if frame == geometry.frame:
+        return LocatedFrame(IDENTITY, math.inf, None)
+    located = robot.transforms.locate(frame, geometry.frame, stamp)
+    if not isinstance(located, LocatedFrame):
+        return located
+    if located.is_cut or now >= _old_at(widget, located):
+        age = format_age(now - located.at)
+        return say("map_layer_transform_old", frame=frame, map=geometry.frame, age=age)
+    return located
+
+
+def _old_at(widget: MapView, located: LocatedFrame) -> float:
+    return stale_at(located.at, widget.max_age_s)
+
+
+def _soon(now: float) -> float:
+    return now + 1.0
+
+
+def _live(**drawn: Any) -> dict[str, Any]:
+    return {"state": "live", "note": "", "warning": "", **drawn}
+
+
+def no_layer(layer: MapLayer) -> dict[str, Any]:
+    """The attributes of a layer over no map."""
+    return {"label": layer_label(layer), "state": "waiting", "note": "", "warning": ""}
+
+
+def costmap_grid(grid: Grid, transform: Transform) -> dict[str, Any]:
+    """The geometry of a costmap in the map's frame, with its version."""
+    geometry, origin = grid.geometry, grid.geometry.origin
+    x, y, _ = transform.place
+    turned = transform.turned.rotated((origin.x, origin.y, 0.0))
+    pose = Pose(turned[0] + x, turned[1] + y, origin.yaw + transform.turned.yaw())
+    return grid_values(geometry, COSTMAP + grid.version, pose)
+
+
+def grid_values(geometry: Geometry, version: str, origin: Pose) -> dict[str, Any]:
+    """What a browser needs to draw a grid."""
+    return {
+        "version": version,
+        "width": geometry.width,
+        "height": geometry.height,
+        "resolution": geometry.resolution,
+        "x": round(origin.x, 3),
+        "y": round(origin.y, 3),
+        "yaw": round(origin.yaw, 4),
+    }
