@@ -101,9 +101,19 @@ def clock_note(robot: RobotState, now: float) -> TextLike:
     return clock_status(robot, now).reason
 
 
-def time_banner(robot: RobotState, now: float) -> TextLike:
-    """What the header says of simulated time; "" for nothing."""
-    if robot.clock.simulated is None:
-        return ""
-    is_paused = robot.clock.simulated.state(now) == "paused"
-    return say("simulated_time_paused" if is_paused else "simulated_time")
+BANNERS: Final[Mapping[tuple[bool, str], str]] = {
+    (True, "no"): "simulated",
+    (False, "runs"): "simulated_time",
+    (False, "paused"): "simulated_time_paused",
+    (True, "runs"): "simulated_robot_time",
+    (True, "paused"): "simulated_robot_time_paused",
+}
+
+
+def simulation_banner(robot: RobotState, now: float, *, is_simulated: bool) -> TextLike:
+    """What the header says of a simulated robot, and of simulated time; "" for neither."""
+    time = "no"
+    if (simulated := robot.clock.simulated) is not None:
+        time = "paused" if simulated.state(now) == "paused" else "runs"
+    code = BANNERS.get((is_simulated, time))
+    return say(code) if code else ""

@@ -23,7 +23,7 @@ from app.cell.permission.press_permission import (
 from app.cell.permission.roles import UNKNOWN_USERS, ConfirmLocks, role_reason, strictest, unmet
 from app.cell.permission.verdict import PERMITTED, Verdict
 from app.cell.robot.state import RobotState
-from app.cell.view.clock_status import time_banner
+from app.cell.view.clock_status import simulation_banner
 from app.cell.view.kinds import Attributes, AttributesUntil, Enabled, attributes_of, enabled
 from app.cell.view.link_status import (
     UNKNOWN,
@@ -214,8 +214,7 @@ def build_view(
         for w in panel.widgets()
     }
     link, until = link_statuses(panel, robot, passable, verdicts, now)
-    simulated = say("simulated") if context.simulated or robot.graph.is_simulated else ""
-    banner = joined([simulated, time_banner(robot, now)], "between_names")
+    banner = simulation_banner(robot, now, is_simulated=context.simulated or robot.graph.is_simulated)
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},

@@ -14,7 +14,7 @@ from app.cell.robot.traffic import MAX_COLUMNS, RoundTripSummary
 from app.cell.session.doctor_process import DoctorProcess, FoundFault
 from app.cell.session.looks import Look, NodeRoundTrips, Survey
 from app.cell.session.session import RobotSession
-from app.cell.view.clock_status import ClockStatus, ClockWord, clock_status
+from app.cell.view.clock_status import ClockStatus, ClockWord, clock_note, clock_status
 from app.cell.view.diagnostics import (
     GraphTopicRow,
     NodeRow,
@@ -614,16 +614,26 @@ def link_rows(
         "bridge": _peer_about(survey, behind),
         "node": _nodes_about(behind),
     }
+    note = clock_note(session.robot, now)  # it has a row to itself
     return [
         _link_row(
             name,
-            link,
+            {**link, "reason": _without(link["reason"], note)},
             about.get(name, ""),
             trips.get(name),
             trip_note(name, link, trips.get(name), session.node_trips),
         )
         for name, link in session.publisher.view["link"].items()
     ]
+
+
+def _without(reason: TextLike, note: TextLike) -> TextLike:
+    """The lines without one of them."""
+    if isinstance(reason, Text) and reason.code == "between_lines":
+        parts = dict(reason.params)["parts"]
+        assert isinstance(parts, tuple)
+        return joined([part for part in parts if part != note], "between_lines")
+    return "" if reason == note else reason
 
 
 def _link_row(

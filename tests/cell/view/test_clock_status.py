@@ -7,7 +7,7 @@ import pytest
 
 from app.cell.robot.clocks import PAUSED_S
 from app.cell.robot.state import RobotState
-from app.cell.view.clock_status import clock_note, clock_status, time_banner
+from app.cell.view.clock_status import clock_note, clock_status, simulation_banner
 from app.system.texts import Text
 from tests.cell.robot.test_clocks import WALL, clock_message, record, record_peer
 from tests.support.builders import robot_there, small_panel
@@ -110,7 +110,9 @@ def test_what_is_said_of_the_clock(
     status = clock_status(robot, NOW)
     assert (status.state, code(status.text), code(status.reason)) == (state, text, reason)
     assert code(clock_note(robot, NOW)) == reason
-    assert code(time_banner(robot, NOW)) == banner
+    assert code(simulation_banner(robot, NOW, is_simulated=False)) == banner
+    both = banner.replace("simulated", "simulated_robot") if banner else "simulated"
+    assert code(simulation_banner(robot, NOW, is_simulated=True)) == both
     assert (status.skew_s is None) == (state not in ("even", "apart"))
 
 
