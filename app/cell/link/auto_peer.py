@@ -110,8 +110,9 @@ class AutoPeer:
 
     async def _look(self) -> None:
         while True:
+            every_s = LOOK_EVERY_S if self._chosen is None else None  # a choice ends with the link
             with suppress(TimeoutError):
-                async with asyncio.timeout(LOOK_EVERY_S):
+                async with asyncio.timeout(every_s):
                     await self._changed.wait()
             self._changed.clear()
             if self._chosen is None and self._robot.link_up:
