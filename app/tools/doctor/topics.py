@@ -9,6 +9,7 @@ from app.cell.permission.conditions import permits, refusal
 from app.cell.robot.clocks import RobotClock, begins_with_stamp
 from app.cell.robot.definitions import differs, own_hash
 from app.panel.condition import Interlock
+from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.panel.widgets.parameter import EVENTS, SERVICES
 from app.ros.graph.model import Forwarding, Server, ServerList, TopicEndpoint, TopicList
 from app.ros.messages import Interfaces, has_key
@@ -67,7 +68,7 @@ class TopicChecks:
     def _check_listened(self, topic: str, wanted: str) -> None:
         publishers = self._behind.publishers(topic)
         if not publishers:
-            if topic not in self._permissions:
+            if topic not in self._permissions and wanted != UPDATE_TYPE:  # few robots publish these
                 hint = self._behind.hint(topic, "topics")
                 self._find("topic_no_publisher", topic, hint=hint)
             return

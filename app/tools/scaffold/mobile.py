@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from app.panel.widgets.map_layers import LAYERS, LayerName
 from app.panel.widgets.map_view import POSE_PATHS, TF_TYPE
 from app.ros.graph.model import Server, SurveyedTopic
 from app.ros.messages import Interfaces
@@ -16,6 +17,13 @@ NAV2: Final = "nav2_msgs/action/"
 MAP_TOPIC: Final = "/map"  # that a map shows if it names none
 # Of several poses the one that a localization corrects comes first.
 POSE_NAMES: Final = ("amcl_pose", "pose")
+# What the name of a layer's topic must have, and how many of a kind there are at most.
+LAYER_WORDS: Final[Mapping[LayerName, str]] = {
+    "footprint": "footprint",
+    "covariance": "pose",
+    "costmap": "costmap",
+}
+MOST_ALIKE: Final[Mapping[LayerName, int]] = {"path": 2, "costmap": 2}
 # The actions of Nav2 that are for operators. The others are those of its own servers.
 ACTIONS: Final[Mapping[str, str]] = {
     f"{NAV2}{name}": comment
@@ -60,6 +68,8 @@ def map_widgets(topics: Sequence[SurveyedTopic]) -> Iterator[DraftWidget]:
     pose = None if _has_transforms(topics) else _pose_topic(topics)
     if pose is not None:
         keys["pose"] = {"topic": pose.name, "type": pose.type}
+    if layers := [_layer(*layer) for layer in _layers(topics)]:
+        keys["layer"] = layers
     comment = (
         f"The robot is where {pose.name} says."
         if pose is not None
@@ -73,8 +83,32 @@ def map_widgets(topics: Sequence[SurveyedTopic]) -> Iterator[DraftWidget]:
 def of_map(topics: Sequence[SurveyedTopic]) -> Collection[str]:
     """The names of the topics that the map shows: no other widget needs them."""
     chosen = main_map(topics)
+    if chosen is None:
+        return ()
     transforms = (topic.name for topic in topics if topic.types == (TF_TYPE,))
-    return () if chosen is None else (chosen.name, *transforms)
+    drawn = (topic.name for topic, _ in _layers(topics))
+    return (chosen.name, *transforms, *drawn)
+
+
+def _layers(topics: Iterable[SurveyedTopic]) -> Iterator[tuple[SurveyedTopic, LayerName]]:
+    """The topics that are drawn over the map, by their types and names; `MOST_ALIKE` of a kind."""
+    published = sorted((topic for topic in topics if topic.publishers), key=lambda topic: topic.name)
+    for name, kind in LAYERS.items():
+        word = LAYER_WORDS.get(name, "")
+        alike = [
+            topic for topic in published if topic.types == (kind.type,) and word in topic.name.lower()
+        ]
+        yield from ((topic, name) for topic in alike[: MOST_ALIKE.get(name, 1)])
+
+
+def _layer(topic: SurveyedTopic, name: LayerName) -> dict[str, Any]:
+    keys = {"shows": name, "topic": topic.name, "label": label_of(_said(topic.name))}
+    return keys if topic.reliable else {**keys, "qos": {"reliability": "best_effort"}}
+
+
+def _said(name: str) -> str:
+    """A costmap is known by the namespace that it is in."""
+    return name.removesuffix("/costmap") if name.endswith("_costmap/costmap") else name
 
 
 def _has_transforms(topics: Iterable[SurveyedTopic]) -> bool:

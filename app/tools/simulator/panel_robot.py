@@ -18,6 +18,7 @@ from app.panel.numbers import Range
 from app.panel.template import NOW, fill, placeholders
 from app.panel.values import same_value
 from app.panel.widgets import parameter as parameter_widgets
+from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.panel.widgets.map_view import TF_TYPE
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.robot_options import EACH
@@ -168,8 +169,8 @@ def simulated_topics(
     fields = PanelFields(panel, interfaces, phase, machine)
     topics = {}
     for topic, type_name in panel.listened().items():
-        if topic in skipped or panel.demo.get(topic, NO_ENTRY).silent:
-            continue
+        if topic in skipped or type_name == UPDATE_TYPE or panel.demo.get(topic, NO_ENTRY).silent:
+            continue  # a robot publishes whole maps, and updates only if one of its nodes does so
         topics[topic] = _topic(fields, topic, type_name, by_topic.get(topic, []))
         for path, value in topics[topic].signals():
             machine.read((topic, path), value)

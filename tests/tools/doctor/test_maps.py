@@ -14,6 +14,7 @@ from app.tools.doctor.findings import Report
 from app.tools.doctor.maps import MapChecks
 from app.tools.doctor.names import PanelNames, PanelRobot
 from app.tools.doctor.received import ReceivedSamples
+from app.tools.doctor.topics import TopicChecks
 from tests.tools.doctor.setups import named, panel_of
 
 pytestmark = pytest.mark.promise("doctor")
@@ -117,3 +118,15 @@ def test_nothing_is_said_of_what_did_not_come_or_has_another_type(tmp_path: Path
     assert judged(tmp_path, WITH_POSE, [topic("/map")], ("/map", MAP)).codes() == []
     another = topic("/map", type_name="std_msgs/msg/String")
     assert judged(tmp_path, VIEW, [another], ("/map", MAP)).codes() == []
+
+
+def test_missing_updates_are_no_finding(tmp_path: Path) -> None:
+    path = tmp_path / "cell1.toml"
+    path.write_text(panel_of(VIEW))
+    graph = GraphSnapshot(
+        robots=(RobotGraph(topics=(topic("/map"), topic("/tf"), topic("/tf_static"))),)
+    )
+    report = Report()
+    behind = PanelNames.for_robot(PanelRobot(load_panel(path)), graph)
+    TopicChecks(report, behind, INTERFACES).check()
+    assert report.codes() == []

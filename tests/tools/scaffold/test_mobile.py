@@ -101,6 +101,28 @@ def test_map_of_another_name_is_named_and_a_costmap_is_none() -> None:
     )
 
 
+def test_map_has_layers_of_what_is_published() -> None:
+    layers = {layer["shows"]: layer for layer in map_of(text_of())["layer"]}
+    assert {name: layer["topic"] for name, layer in layers.items()} == {
+        "path": "/plan",
+        "scan": "/scan",
+        "covariance": "/amcl_pose",
+        "costmap": "/global_costmap/costmap",
+    }
+    assert layers["scan"]["qos"] == {"reliability": "best_effort"}
+    assert "qos" not in layers["path"]
+    assert layers["costmap"]["label"] == "Global costmap"
+    assert not any(line.startswith("# - /scan") for line in text_of().splitlines())
+    few = map_of(text_of(topics=without("/plan", "/scan", "/amcl_pose", "/global_costmap/costmap")))
+    assert "layer" not in few
+
+
+def test_layers_are_few_of_a_kind() -> None:
+    plans = [published(f"/plan_{number}", "nav_msgs/msg/Path") for number in range(5)]
+    layers = map_of(text_of(topics=[*TOPICS, *plans]))["layer"]
+    assert sum(layer["shows"] == "path" for layer in layers) == 2
+
+
 def test_goals_of_nav2_are_comments_with_what_to_fill_in() -> None:
     text = text_of()
     for name in ("/navigate_to_pose", "/dock_robot", "/undock_robot"):

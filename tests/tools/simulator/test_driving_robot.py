@@ -11,6 +11,7 @@ from app.cell.robot.maps import read_grid
 from app.cell.robot.transforms import LocatedFrame, TransformTree
 from app.panel import load_panel
 from app.panel.demo import DRIVING
+from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.system.settings import panel_path
 from app.tools.simulator.driving import (
     FOLLOW_NO_PROGRESS,
@@ -63,7 +64,8 @@ def newest(robot: Stepped, topic: str) -> Any:
 def test_panel_plays_all_that_it_uses_of_the_story(robot: Stepped) -> None:
     used = {**robot.panel.listened(), **robot.panel.publications(), **robot.panel.actions()}
     played = {name for _, name, _ in DRIVING.types}
-    assert used.keys() - played == {"/front_camera/image_raw/compressed", "/map_updates"}
+    updates = {topic for topic, kind in used.items() if kind == UPDATE_TYPE}
+    assert used.keys() - played - updates == {"/front_camera/image_raw/compressed"}
     assert used.keys() & DRIVING.publishes.keys() <= {*robot.said, "/rosout"}
 
 
@@ -188,3 +190,19 @@ def test_robots_of_several_panels_do_not_share_a_pose() -> None:
     first.step(3.0)
     assert second.pose == START
     assert first.pose != START
+
+
+def test_layers_of_the_map_are_in_frames_that_lead_to_it(robot: Stepped) -> None:
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(3)
+    scan, plan = newest(robot, "/scan"), newest(robot, "/plan")
+    assert (scan.header.frame_id, plan.header.frame_id) == ("lidar", "map")
+    assert len(scan.ranges) == round(2 * math.pi / scan.angle_increment)
+    assert min(scan.ranges) > 0.2
+    end_pose = plan.poses[-1].pose.position
+    assert (end_pose.x, end_pose.y) == pytest.approx(PLACES["WRAPPER"][:2], abs=0.01)
+    costmap = read_grid(robot.interfaces, robot.said["/local_costmap/costmap"][-1][1])
+    assert costmap.geometry.frame == "odom"
+    assert max(costmap.cells) <= 100
+    corners = newest(robot, "/local_costmap/published_footprint").polygon.points
+    assert len(corners) == 4
