@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from app.panel.template import add_now, fill, placeholder_ids, placeholders, value_at
+from app.panel.template import add_now, fill, fill_to_send, placeholder_ids, placeholders, value_at
 from app.system.errors import FieldError
 from tests.support.builders import INTERFACES, TEXT
 
@@ -116,6 +116,19 @@ def test_now_is_the_time_of_filling_in() -> None:
     assert before <= stamp["sec"] * 10**9 + stamp["nanosec"] <= time.time_ns()
     assert stamp["nanosec"] < 10**9
     assert values["a"] == 1
+
+
+def test_now_is_by_the_clock_that_is_given_and_read_only_where_it_is_used() -> None:
+    def clock() -> int:
+        return 300_250_000_000
+
+    def no_clock() -> int:
+        raise AssertionError("not read")
+
+    template = {"header": {"stamp": "{now}"}, "x": ["{a}"]}
+    stamped = {"header": {"stamp": {"sec": 300, "nanosec": 250_000_000}}, "x": [1]}
+    assert fill_to_send(template, {"a": 1}, clock) == stamped
+    assert fill_to_send({"x": "{a}"}, {"a": 1}, no_clock) == {"x": 1}
 
 
 def test_now_is_no_input() -> None:

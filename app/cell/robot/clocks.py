@@ -12,11 +12,9 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import median_high
-from struct import Struct
 from typing import Final, Literal
 
-from app.ros.messages.definitions import Structure
-from app.ros.messages.field_path import TIME
+from app.ros.cdr.stamped import NS_PER_S, first_stamp_ns
 from app.system.errors import LinkError
 from app.system.texts import say
 
@@ -29,32 +27,9 @@ SET_BY_S: Final = 0.5  # the panel's wall clock was set if it differs by more fr
 LARGEST_BYTES: Final = 64_000  # the stamp of a larger message is not read: its bytes would be copied
 PAUSED_S: Final = 2.0  # a simulated time that has not gone on for so long stands still
 BACK_NS: Final = 100_000_000  # back by more, it began again: messages may be reordered
-NS_PER_S: Final = 10**9
 
-HEADER: Final = "std_msgs/msg/Header"
 CLOCK: Final = "/clock"
 CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
-
-# The stamp of a message that begins with it: CDR's four bytes of encapsulation, then `sec` (int32) and
-# `nanosec` (uint32) of builtin_interfaces/msg/Time, in the byte order that the second byte names.
-_STAMPS: Final = (Struct(">xxxxiI"), Struct("<xxxxiI"))
-
-
-def begins_with_stamp(type_name: str, structures: Mapping[str, Structure]) -> bool:
-    """Whether messages of a type begin with a stamp: with a `std_msgs/Header`, or a time."""
-    structure = structures.get(type_name)
-    first = structure.fields[0].type if structure is not None and structure.fields else None
-    return first is not None and str(first) in (HEADER, TIME)
-
-
-def first_stamp(data: bytes) -> float | None:
-    """The stamp in seconds with which a message begins; None for one that is not set, or no stamp."""
-    if len(data) < _STAMPS[0].size:
-        return None
-    seconds, nanoseconds = _STAMPS[data[1] & 1].unpack_from(data)
-    if nanoseconds >= NS_PER_S or not (seconds or nanoseconds):
-        return None
-    return float(seconds + nanoseconds / NS_PER_S)
 
 
 def are_apart(offset_s: float) -> bool:
@@ -116,10 +91,9 @@ class SimulatedTime:
 
     def put(self, data: bytes, at: float) -> None:
         """A `rosgraph_msgs/msg/Clock` that arrived at `at` (monotonic seconds). On any thread."""
-        if len(data) < _STAMPS[0].size:
+        ns = first_stamp_ns(data)
+        if ns is None:
             return
-        seconds, nanoseconds = _STAMPS[data[1] & 1].unpack_from(data)
-        ns = seconds * NS_PER_S + nanoseconds
         with self._lock:
             if self._ns is not None and ns < self._ns - BACK_NS:
                 self.jumps += 1

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Literal
 
 from app.cell.robot.alarmed import NO_ALARMED, AlarmAction, AlarmSelection
-from app.cell.robot.clocks import CLOCK, LARGEST_BYTES, RobotClock, begins_with_stamp, first_stamp
+from app.cell.robot.clocks import CLOCK, LARGEST_BYTES, RobotClock
 from app.cell.robot.definitions import DefinitionDifference, difference
 from app.cell.robot.graph import EndpointPresence, LiveGraph, required_endpoints
 from app.cell.robot.history import History
@@ -39,6 +39,7 @@ from app.panel.used import selects_by_command
 from app.panel.widgets.parameter import GET
 from app.panel.widgets.robot_options import ListingService
 from app.records.entry import CommandStatuses
+from app.ros.cdr.stamped import begins_with_stamp, first_stamp
 from app.ros.dialects.dialect import Dialect, Role
 from app.ros.dialects.peer_traits import PeerTraits
 from app.ros.messages import Interfaces, has_key

@@ -1,5 +1,5 @@
-"""Messages with many stamped parts, read from their bytes: without an object for each part, which costs
-more than the part is worth."""
+"""Stamps, and messages with many stamped parts, read from their bytes: without an object for each part,
+which costs more than the part is worth."""
 
 import math
 from array import array
@@ -9,6 +9,8 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 from app.ros.cdr.reader import ByteOrder, check_end, split_header
+from app.ros.messages.definitions import Structure
+from app.ros.messages.field_path import TIME
 from app.system.errors import DecodeError
 
 TRANSFORMS_TYPE: Final = "tf2_msgs/msg/TFMessage"
@@ -22,6 +24,34 @@ _FORMS: Final[Mapping[ByteOrder, tuple[Struct, Struct, Struct, Struct]]] = {
     order: tuple(Struct(order + form) for form in ("I", "iI", "7d", "2d"))  # type: ignore[misc]
     for order in ("<", ">")
 }
+
+
+# The stamp of a message that begins with it: CDR's four bytes of encapsulation, of which the second one
+# names the byte order, then `sec` and `nanosec` of builtin_interfaces/msg/Time.
+_FIRST: Final = (Struct(">4xiI"), Struct("<4xiI"))
+HEADER: Final = "std_msgs/msg/Header"
+NS_PER_S: Final = 10**9
+
+
+def begins_with_stamp(type_name: str, structures: Mapping[str, Structure]) -> bool:
+    """Whether messages of a type begin with a stamp: with a `std_msgs/Header`, or a time."""
+    structure = structures.get(type_name)
+    first = structure.fields[0].type if structure is not None and structure.fields else None
+    return first is not None and str(first) in (HEADER, TIME)
+
+
+def first_stamp_ns(data: bytes) -> int | None:
+    """The stamp in nanoseconds with which a message begins; None for bytes that have none."""
+    if len(data) < _FIRST[0].size:
+        return None
+    seconds, nanoseconds = _FIRST[data[1] & 1].unpack_from(data)
+    return int(seconds * NS_PER_S + nanoseconds) if nanoseconds < NS_PER_S else None
+
+
+def first_stamp(data: bytes) -> float | None:
+    """The same in seconds; None for one that is not set, too."""
+    ns = first_stamp_ns(data)
+    return ns / NS_PER_S if ns else None
 
 
 class StampedTransform(NamedTuple):

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from itertools import chain, pairwise
 from typing import Final
 
-from app.cell.robot.clocks import RobotClock, first_stamp
+from app.cell.robot.clocks import RobotClock
+from app.ros.cdr.stamped import first_stamp
 from app.ros.dialects.dialect import Dialect
 from app.ros.zenoh.declarations import Declarations
 from app.ros.zenoh.inbox import Changes

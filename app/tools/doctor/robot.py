@@ -13,15 +13,8 @@ from typing import Final, Protocol
 
 from app.cell.link.peer import RobotAccess
 from app.cell.link.robot_access import ROBOT_ACCESS, detect_access
-from app.cell.robot.clocks import (
-    APART_S,
-    CLOCK,
-    OTHER_TIME_S,
-    are_apart,
-    begins_with_stamp,
-    first_stamp,
-    is_other_time,
-)
+from app.cell.robot.clocks import APART_S, CLOCK, OTHER_TIME_S, are_apart, is_other_time
+from app.ros.cdr.stamped import begins_with_stamp, first_stamp
 from app.ros.dialects.dialect import DEFAULT_DIALECT, DEMO_VERSION, Dialect, any_hash
 from app.ros.graph.model import Bridge, GraphSnapshot
 from app.ros.messages import Interfaces, load_interfaces

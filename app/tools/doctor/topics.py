@@ -6,11 +6,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from app.cell.permission.conditions import permits, refusal
-from app.cell.robot.clocks import RobotClock, begins_with_stamp
+from app.cell.robot.clocks import RobotClock
 from app.cell.robot.definitions import differs, own_hash
 from app.panel.condition import Interlock
 from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.panel.widgets.parameter import EVENTS, SERVICES
+from app.ros.cdr.stamped import begins_with_stamp
 from app.ros.graph.model import Forwarding, Server, ServerList, TopicEndpoint, TopicList
 from app.ros.messages import Interfaces, has_key
 from app.ros.messages.names import Qos

@@ -25,6 +25,7 @@ from app.cell.commands.holds import (
 from app.cell.commands.judge import PendingSamples, PressJudge
 from app.cell.commands.receipts import Receipt
 from app.cell.permission.interlocks import link_verdict
+from app.cell.robot.clocks import CLOCK_TYPE
 from app.cell.view.view import build_view
 from app.panel.model import Panel
 from app.ros.dialects import bridge_dialect
@@ -265,6 +266,22 @@ def test_each_hold_message_has_its_own_sending_time() -> None:
     assert stamps == sorted(set(stamps))
     assert before <= stamps[0]
     assert stamps[-1] <= after
+
+
+def test_a_hold_has_simulated_time_and_its_stop_is_sent_without_it() -> None:
+    stamped = "geometry_msgs/msg/PointStamped"
+    header = {"header": {"stamp": "{now}"}}
+    jog = {**JOG, "type": stamped, "message": {**header, "point": {"x": "{speed}"}}, "release": header}
+    bench = Bench(jog)
+    clock = bench.robot.clock
+    clock.begin_simulated().put(INTERFACES.encode(CLOCK_TYPE, {"clock": {"sec": 7}}), 0.0)
+    bench.begun()
+    clock.begin_simulated()  # another simulation, of which no time has arrived
+    bench.holds.judge()
+    sent = [INTERFACES.decode(stamped, payload) for payload in bench.way.payloads]
+    assert [(message.point.x, message.header.stamp.sec) for message in sent] == [(0.5, 7), (0.0, 0)]
+    (receipt,) = bench.receipts
+    assert (receipt.outcome, why(receipt.reason)) == ("aborted", say("clock_awaited_lock"))
 
 
 def test_lost_certainty_ends_the_hold_and_still_sends_the_stop_message(bench: Bench) -> None:

@@ -31,7 +31,16 @@ from tests.cell.commands.test_holds import JOG, SPEED
 from tests.cell.commands.test_holds import Bench as HoldBench
 from tests.cell.commands.test_presses import Bench as PressBench
 from tests.cell.commands.test_presses import refused
-from tests.support.builders import FREE, GUARDED, MESSAGE, NOW, panel_of, permits, robot_there
+from tests.support.builders import (
+    FREE,
+    GUARDED,
+    INTERFACES,
+    MESSAGE,
+    NOW,
+    panel_of,
+    permits,
+    robot_there,
+)
 
 pytestmark = pytest.mark.promise("press")
 
@@ -221,3 +230,28 @@ def test_a_hold_needs_control_whatever_its_role() -> None:
     (hold,) = panel.commands
     no_control = ServerConditions(control=locked("control"))
     assert judged(hold, (), robot, NOW, no_control).code == "control"
+
+
+STAMPED: Final = {
+    **FREE,
+    "topic": "/stamped",
+    "type": "geometry_msgs/msg/PointStamped",
+    "message": {"header": {"stamp": "{now}"}},
+}
+
+
+def test_what_needs_a_time_is_locked_while_the_simulated_time_is_not_known() -> None:
+    """Not a stop, which is sent without it."""
+    stop = {**STAMPED, "id": "halt", "role": "stop"}
+    panel = panel_of(MESSAGE, FREE, {**STAMPED, "id": "goal"}, stop)
+    robot = robot_there(panel)
+
+    def locks() -> dict[str, str]:
+        verdicts = permissions(panel, robot, NOW, link_verdict(robot, NOW), {})
+        return {name: verdict.code for name, verdict in verdicts.items() if not verdict.permitted}
+
+    assert locks() == {}
+    simulated = robot.clock.begin_simulated()
+    assert locks() == {"goal": "clock_awaited_lock"}
+    simulated.put(INTERFACES.encode("rosgraph_msgs/msg/Clock", {"clock": {"sec": 1}}), 0.0)
+    assert locks() == {}

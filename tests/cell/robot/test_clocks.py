@@ -5,16 +5,8 @@ from itertools import product
 
 import pytest
 
-from app.cell.robot.clocks import (
-    COLUMN_S,
-    COLUMNS,
-    PAUSED_S,
-    Offsets,
-    RobotClock,
-    SimulatedTime,
-    begins_with_stamp,
-    first_stamp,
-)
+from app.cell.robot.clocks import COLUMN_S, COLUMNS, PAUSED_S, Offsets, RobotClock, SimulatedTime
+from app.ros.cdr.stamped import begins_with_stamp, first_stamp
 from app.ros.messages import load_interfaces
 from app.system.errors import LinkError
 from app.system.texts import say

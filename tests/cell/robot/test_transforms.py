@@ -101,6 +101,17 @@ def test_a_jump_back_of_the_robots_clock_begins_again() -> None:
     assert located(late).pose.x == 1.0
 
 
+def test_a_simulated_time_that_begins_again_makes_older_stamps_count() -> None:
+    tree = tree_with(transform("map", "base_link", 3.0, x=3.0), at=100.0)
+    tree.record(transforms_of(transform("map", "base_link", 1.0, x=1.0)), 101.0, is_static=False)
+    assert (located(tree).pose.x, located(tree).at) == (3.0, 100.0)  # not newer
+    tree.restart()
+    tree.record(transforms_of(transform("map", "base_link", 1.0, x=1.0)), 102.0, is_static=False)
+    assert (located(tree).pose.x, located(tree).at) == (1.0, 102.0)
+    tree.record(transforms_of(transform("map", "base_link", 0.5, x=0.5)), 103.0, is_static=False)
+    assert located(tree).pose.x == 1.0
+
+
 def test_what_is_missing_is_named() -> None:
     assert code(TransformTree()) == "transform_unknown"
     assert code(tree_with(transform("map", "odom"))) == "transform_unknown"
