@@ -65,6 +65,7 @@ PROMISES: Final[Mapping[str, str]] = {
     "control": "one browser at a time is in control; each press reaches the robot on its screen",
     "numbers": "a number is sent as it is shown, or refused, in each language",
     "values": "values, units and types are shown as the robot has them; sizes are checked",
+    "places": "a goal on a map is refused with its reason, or sent exactly as its card shows it, once",
     "dialects": "topics, services, actions and parameters over the bridge and on rmw_zenoh",
     "reconnect": "a page that was cut off gets the whole state; a slow one costs no queue",
     "fingers": "touch, several fingers, gloves, keyboard and readers",

@@ -36,6 +36,7 @@ from app.panel.widgets.parameter import (
     listed_parameter,
 )
 from app.panel.widgets.parts import parts_of
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.recipe_load import RecipeLoad, loads_of
 from app.panel.widgets.robot_options import ListingService
@@ -317,6 +318,11 @@ class Panel(PanelKeys):
         """Topic → type of the layers of maps that are shapes, not grids."""
         layers = (layer for view in self.map_views.values() for layer in view.layers)
         return {layer.topic: layer.type for layer in layers if layer.type != GRID_TYPE}
+
+    @cached_property
+    def place_inputs(self) -> tuple[PlaceInput, ...]:
+        """The inputs whose value is a place."""
+        return tuple(w for w in self.widgets() if isinstance(w, PlaceInput))
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""

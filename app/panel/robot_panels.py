@@ -7,6 +7,7 @@ from app.panel.model import Panel
 from app.panel.widgets.displays import Static
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, EntryWidget, Input
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.place import PlaceInput
 
 
 def widget_robots(panel: Panel) -> Mapping[str, str]:
@@ -52,10 +53,10 @@ def opened_page(panel: Panel, robot_id: str) -> Page:
 
 def is_shared(widget: BaseWidget) -> bool:
     """Whether it is of no robot: an input, whose value goes to any, or a text. A select whose options a
-    robot has is that robot's."""
+    robot has is that robot's, and so is a place on its map."""
     if isinstance(widget, SelectInput) and widget.options_from is not None:
         return False
-    return isinstance(widget, Input | Static)
+    return isinstance(widget, Input | Static) and not isinstance(widget, PlaceInput)
 
 
 def panel_of(panel: Panel, robot_id: str | None) -> Panel:
@@ -64,7 +65,8 @@ def panel_of(panel: Panel, robot_id: str | None) -> Panel:
     robots = widget_robots(panel)
     others = [c for c in panel.named_conditions if c.robot not in (None, robot_id)]
     recipes = recipe_robots(panel)
-    if robot_id is None or not (robots or others or recipes):
+    placed = [table for table in (*panel.places, *panel.zones) if table.robot not in (None, robot_id)]
+    if robot_id is None or not (robots or others or recipes or placed):
         return panel
 
     def own(widgets: Iterable[BaseWidget], place: str) -> tuple[BaseWidget, ...]:
@@ -98,6 +100,8 @@ def panel_of(panel: Panel, robot_id: str | None) -> Panel:
             if isinstance(widget, EntryWidget) and robots.get(widget.id) not in (None, robot_id)
         ),
         "interlocks": tuple(i for i in panel.interlocks if i.robot in (None, robot_id)),
+        "places": tuple(place for place in panel.places if place.robot in (None, robot_id)),
+        "zones": tuple(zone for zone in panel.zones if zone.robot in (None, robot_id)),
         "recipes": tuple(r for r in panel.recipes if robot_id in recipes.get(r.id, {robot_id})),
         "own_conditions": tuple(c for c in panel.own_conditions if c.robot in (None, robot_id)),
     }

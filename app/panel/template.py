@@ -15,6 +15,7 @@ from app.system.errors import FieldError
 NOW: Final = "now"  # reserved: the time of sending, of the type TIME
 TIME: Final = "builtin_interfaces/msg/Time"
 NS_PER_S: Final = 10**9
+WITH_PART: Final = 2  # names of a placeholder: the input and its part
 
 
 def add_now(values: Mapping[str, Any], now_ns: int | None = None) -> dict[str, Any]:
@@ -49,12 +50,25 @@ def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
         return template
     parts = _parse_text(template, where)
     if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
-        return inputs[parts[0][1]]
+        return _value(inputs, parts[0][1])
     if len(parts) == 1 and parts[0][0] == "-" and parts[0][1] is not None:
-        value = inputs[parts[0][1]]
+        value = _value(inputs, parts[0][1])
         if isinstance(value, int | float) and not isinstance(value, bool):
             return negated(value)
-    return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
+    return "".join(
+        text + ("" if name is None else _text(_value(inputs, name), where)) for text, name in parts
+    )
+
+
+def _value(inputs: Mapping[str, Any], name: str) -> Any:
+    """The value of an input, or of its part: `{goal.x}`."""
+    input_id, _, part = name.partition(".")
+    return inputs[name] if name in inputs or not part else inputs[input_id][part]
+
+
+def input_of(name: str) -> str:
+    """The id of the input of a placeholder's name: "goal" of "goal.x"."""
+    return name.partition(".")[0]
 
 
 def set_field(fields: Any, path: str, value: Any) -> Any:
@@ -100,7 +114,8 @@ def _text(value: Any, where: str) -> str:
 
 
 def placeholders(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """(place, input id) of each placeholder; FieldError for unmatched braces."""
+    """(place, name) of each placeholder, the id of an input or `id.part`; FieldError for unmatched
+    braces."""
     if isinstance(template, Mapping):
         for key, value in template.items():
             yield from placeholders(value, f"{where}.{key}".strip("."))
@@ -123,7 +138,7 @@ def needed_inputs(widget: Command, inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 def placeholder_ids(templates: Iterable[Any]) -> list[str]:
     """The ids of the inputs in templates, each once."""
-    every = (name for template in templates for _, name in placeholders(template))
+    every = (input_of(name) for template in templates for _, name in placeholders(template))
     return [name for name in dict.fromkeys(every) if name != NOW]
 
 
@@ -136,6 +151,12 @@ def _parse_text(text: str, where: str) -> tuple[tuple[str, str | None], ...]:
         why = "a brace has no partner; write {{ and }} for braces"
         raise FieldError(where, f'"{text}": {why}') from None
     for _, name, format_spec, conversion in parsed:
-        if name is not None and (not name.isidentifier() or format_spec or conversion):
+        if name is not None and (not _is_name(name) or format_spec or conversion):
             raise FieldError(where, f'"{text}": between braces stands the id of an input, alone')
     return tuple((literal, name) for literal, name, _, _ in parsed)
+
+
+def _is_name(name: str) -> bool:
+    """Whether it is an id, or an id and the name of a part."""
+    parts = name.split(".")
+    return len(parts) <= WITH_PART and all(part.isidentifier() for part in parts)

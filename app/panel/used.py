@@ -1,11 +1,16 @@
-"""What a panel uses: ROS names, and the options that a robot has."""
+"""What a panel uses: ROS names, and the options and places that a robot has."""
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from app.panel.demo import STORIES, Story, Use
 from app.panel.model import Panel
 from app.panel.template import input_ids
+from app.panel.widgets.families import Input
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.place import PlaceInput
+
+AnyInput = TypeVar("AnyInput", bound=Input)
 
 # The ROS names that a panel uses, by how it uses them.
 
@@ -44,16 +49,25 @@ def played_names(panel: Panel) -> Story | None:
     )
 
 
-# Which commands send a choice of options that the robot has.
+# Which commands send a choice of options that the robot has, or a place.
 
 
 def selects_by_command(panel: Panel) -> Mapping[str, tuple[SelectInput, ...]]:
     """The selects with `options_from` that a command's message has, by the command's id."""
-    selects = {select.id: select for select in panel.listed_selects}
-    if not selects:
+    return _by_command(panel, panel.listed_selects)
+
+
+def places_by_command(panel: Panel) -> Mapping[str, tuple[PlaceInput, ...]]:
+    """The places that a command's message has, by the command's id."""
+    return _by_command(panel, panel.place_inputs)
+
+
+def _by_command(panel: Panel, inputs: tuple[AnyInput, ...]) -> Mapping[str, tuple[AnyInput, ...]]:
+    known = {widget.id: widget for widget in inputs}
+    if not known:
         return {}
     used = {
-        command.id: tuple(selects[name] for name in input_ids(command) if name in selects)
+        command.id: tuple(known[name] for name in input_ids(command) if name in known)
         for command in panel.commands
     }
     return {command: choices for command, choices in used.items() if choices}

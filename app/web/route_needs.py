@@ -32,6 +32,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/widgets/{widget}/lock": ANYBODY,
     "/widgets/{widget}/map.png": ANYBODY,
     "/widgets/{widget}/map/{version}/{column}-{row}.png": ANYBODY,
+    "/widgets/{widget}/place": ANYBODY,
     "/widgets/{widget}/trend": ANYBODY,
     "/alarms": ANYBODY,
     "/help": ANYBODY,

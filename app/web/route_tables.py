@@ -24,7 +24,8 @@ FIRST: Final = ("pages", "events", "static", "health")
 # The others, by the first segment of their paths.
 LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "widgets": (
-        *("presses", "confirm", "holds", "parameters", "frames", "maps", "widget_data", "lock_help"),
+        *("presses", "confirm", "holds", "parameters", "frames", "maps", "places", "widget_data"),
+        "lock_help",
     ),
     "presses": ("presses",),
     "control": ("control",),
@@ -46,7 +47,7 @@ DESCRIPTION: Final = "openapi.json"  # it describes all
 ROBOT_ROUTES: Final = frozenset(
     {
         *("pages", "events", "presses", "confirm", "control", "holds", "parameters", "frames"),
-        *("maps", "widget_data", "lock_help", "recipes"),
+        *("maps", "places", "widget_data", "lock_help", "recipes"),
     }
 )
 PAGE: Final = ("widgets", "presses", "control", "display", "help")  # what a page itself requests

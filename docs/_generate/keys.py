@@ -93,7 +93,8 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
                 inner = list(value.values())
             for field in inner:
                 if isinstance(field, dict):
-                    part = SAME if SAME in field else of_kind(field.get("kind")) or key
+                    kind = of_kind(field.get("kind")) if key == WIDGET else None
+                    part = SAME if SAME in field else kind or key
                     walk(part, field) if part in tables else None
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))

@@ -131,11 +131,16 @@ def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, S
 
 def of_kind(kind: str | None) -> str | None:
     """The name of a widget's table: its kind, unless another table has that name."""
-    return f"{kind}_{WIDGET}" if kind in ("log", "conditions") else kind
+    return f"{kind}_{WIDGET}" if kind in ("log", "conditions", "place") else kind
 
 
 def kinds_of(tables: Mapping[str, Schema]) -> dict[str, Schema]:
-    return {name: table for name, table in tables.items() if "kind" in table["properties"]}
+    return {name: table for name, table in tables.items() if "const" in _kind(table)}
+
+
+def _kind(table: Schema) -> Schema:
+    kind: Schema = table["properties"].get("kind", {})
+    return kind
 
 
 def _refs(node: Any) -> Iterator[str]:
@@ -195,7 +200,8 @@ def models() -> dict[str, type[BaseModel]]:
         for key, field in model.model_fields.items():
             for inner in () if field.exclude else _models_in(field.annotation):
                 kind = inner.model_fields.get("kind")
-                name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
+                kinds = get_args(kind.annotation) if kind else ()
+                name = of_kind(kinds[0] if len(kinds) == 1 else None) or field.alias or key
                 if name not in known:
                     known[name] = inner
                     walk(inner)

@@ -238,6 +238,7 @@ export function lockWidget(root, lost, unknown) {
 /** @param {Iterable<HTMLElement>} widgets @param {HTMLElement} root @param {Receipt} receipt */
 export function showReceipt(widgets, root, { id, outcome, reason, brief }) {
   if (outcome === "succeeded") releaseEntry(root);
+  root.dispatchEvent(new CustomEvent("receipt", { bubbles: true, detail: { outcome } }));
   for (const widget of widgets) {
     const old = widget.querySelector(".receipt");
     if (old) showOutcome(old, "", "");

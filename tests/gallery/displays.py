@@ -120,6 +120,25 @@ MAPS: Final = (
         | {"layer_note": say("map_layer_note", layer=say("map_layer_scan"), note=NO_WAY)},
     ),
 )
+PLACE: Final[Table] = {"label": texts.PLACES.table, "map": "hall", "touch": True}
+OFFERED: Final[Table] = {
+    "radius": 0.3,
+    "places": [
+        {"id": "charger", "label": texts.CHARGER.shown, "icon": "zap"}
+        | {"distance": number("4.2", "m"), "reason": ""},
+        {"id": "gate", "label": texts.GATE.shown, "icon": "", "distance": ""}
+        | {"reason": say("place_in_zone", zone=texts.GATE.shown)},
+    ],
+}
+PLACES: Final = (
+    Example("places", "place", PLACE, {"state": "live", "note": ""} | OFFERED),
+    Example(
+        "locked",
+        "place",
+        PLACE,
+        {"state": "missing", "note": say("place_pose_old", age=say("age_seconds", number=6))} | OFFERED,
+    ),
+)
 LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}
 LOGS: Final = (
     Example("lines", "log", LOG, {"state": "live", "note": "", "count": "5"}),

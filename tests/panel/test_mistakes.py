@@ -250,7 +250,8 @@ def test_a_misspelt_key_or_table_is_one_fault(faults_of: FaultsOf, numbers: Sequ
     misspelt = {n: LINES[n - 1].replace(key_of(n), f"{key_of(n)}x", 1) for n in numbers}
     for number, fault in one_each(faults_of, misspelt).items():
         in_message = re.search(r"\.(message|release|request|goal)\.", fault.place)
-        hint = f'did you mean "{key_of(number).rpartition(".")[2]}"?'
+        name = key_of(number).rpartition(".")[2]
+        hint = f'did you mean "{name}"?' if len(name) > 1 else f'is it the "{name}" that is missing?'
         assert ("unknown field" if in_message else hint) in fault.message, str(fault)
 
 

@@ -12,6 +12,7 @@ from app.cell.commands.press import Press, PressHandle
 from app.cell.commands.recipe_loads import RecipeLoader
 from app.cell.commands.services import ServiceCalls
 from app.cell.commands.transport import Transport
+from app.cell.permission.goal_places import Goal, goal_of
 from app.cell.permission.interlocks import reported_value
 from app.cell.permission.robot_options import options_now
 from app.cell.robot.state import RobotState
@@ -23,6 +24,7 @@ from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import Confirm, Publish, PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import Action, Call
@@ -33,7 +35,7 @@ from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
 from app.system.clock import format_time
 from app.system.errors import InputError, NotFound, PressRefused
-from app.system.texts import ENGLISH, TextLike, number, say
+from app.system.texts import ENGLISH, TextLike, joined, number, say
 
 AnyCommand = TypeVar("AnyCommand", bound=Command)
 
@@ -114,6 +116,7 @@ class Dispatcher:
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, value: widget.sent_value(widget.check_value(value)),
             SelectInput: self._check_option,
+            PlaceInput: lambda widget, value: self._goal(widget, value).parts,
             Parameter: self._parameters.check_value,
             Step: self._check_step,
             Switch: lambda widget, value: widget.check_value(value),
@@ -131,6 +134,33 @@ class Dispatcher:
         if str(chosen) in options_now(widget, source, self._robot, self._monotonic()).texts:
             return chosen
         raise InputError(say("input_option_gone", label=widget.label, given=format_value(chosen)))
+
+    def _goal(self, widget: PlaceInput, value: Any) -> Goal:
+        """What a place sends; InputError for a value that chooses nothing, PressRefused with the reason
+        why nothing is sent to it now."""
+        goal = goal_of(widget, value, self._robot, self._monotonic())
+        if not isinstance(goal, Goal):
+            raise PressRefused(goal, "interlock")
+        return goal
+
+    def _with_goals(
+        self, press: Press[PressCommand], handle: PressHandle
+    ) -> tuple[TextLike, PressHandle]:
+        """The names of the places of a press, "" without one; and its handle, whose final check judges
+        the places again: no other pose is sent than the one that was checked first."""
+        widgets = self._robot.place_inputs.get(press.widget.id, ())
+        if not widgets:
+            return "", handle
+        goals = {widget.id: self._goal(widget, press.inputs[widget.id]) for widget in widgets}
+
+        def final_check() -> None:
+            handle.final_check()
+            for widget in widgets:
+                if self._goal(widget, press.inputs[widget.id]) != goals[widget.id]:
+                    raise PressRefused(say("place_map_changed"), "interlock")
+
+        names = joined([goal.name for goal in goals.values()], "between_names")
+        return names, replace(handle, final_check=final_check)
 
     def _check_step(self, widget: Step, value: Any) -> float:
         """The value of a press, which is one step from the one that the robot reports now: what the
@@ -170,18 +200,23 @@ class Dispatcher:
         return replace(press, inputs=defaults | {**press.inputs})
 
     async def send(self, press: Press[PressCommand], handle: PressHandle) -> Outcome:
-        """Sends a press and waits for its outcome.
+        """Sends a press and waits for its outcome, which names the places that were sent.
 
         Does not await before sending. FieldError or InputError for bad input, LinkError if it could not
-        be sent, PressRefused from the handle's `final_check`.
+        be sent, PressRefused from the handle's `final_check` or for a place.
         """
         values = self._checked_inputs(press)
         fields = self._filled(press.widget, values)
         dispatch = find_row(self.dispatches, press.widget)
-        return await dispatch.send(press.widget, PreparedPress(values, fields, handle))
+        names, checked = self._with_goals(press, handle)
+        answer = await dispatch.send(press.widget, PreparedPress(values, fields, checked))
+        return (
+            replace(answer, text=say("place_sent", place=names, said=answer.text)) if names else answer
+        )
 
     def refusal(self, press: Press[PressCommand]) -> TextLike:
-        """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
+        """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input,
+        PressRefused for a place."""
         widget, values = press.widget, self._checked_inputs(press)
         dispatch = find_row(self.dispatches, widget)
         return dispatch.refusal(widget, self._filled(widget, values))

@@ -320,6 +320,8 @@ class Presses:
             reason = self._dispatcher.refusal(press)
         except (FieldError, InputError) as error:
             return Refusal(error.text, "input")
+        except PressRefused as error:
+            return Refusal(error.reason, error.cause)
         return Refusal(reason, "interlock") if reason else None
 
     def _count_only(self, receipt: Receipt, origin: Origin) -> Receipt:

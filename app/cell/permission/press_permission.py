@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
+from app.cell.permission.goal_places import places_verdict
 from app.cell.permission.interlocks import (
     LINK_CODES,
     blocked_buttons,
@@ -143,6 +144,12 @@ CHECKS: Final = (
         alike=True,
     ),
     Check(
+        "places",
+        lambda request: places_verdict(request.widget.id, request.robot, request.now),
+        alone=False,
+        alike=True,
+    ),
+    Check(
         "alarms",
         lambda request: request.grounds.inhibited.get(request.widget.id),
         alone=False,
@@ -197,7 +204,7 @@ def permissions(
         return permission(PermissionRequest(widget, robot, now, link, own, grounds))
 
     verdicts: dict[str, Verdict] = {}
-    alike = all(check.alike for check in CHECKS) and not robot.selects
+    alike = all(check.alike for check in CHECKS) and not (robot.selects or robot.place_inputs)
     groups = panel.uniform_buttons.values() if alike else ()
     for buttons in groups:
         blocked = blocked_buttons(buttons, robot)

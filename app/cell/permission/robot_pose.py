@@ -19,11 +19,13 @@ from app.system.texts import TextLike, say
 @dataclass(frozen=True, slots=True)
 class ShownPose:
     """Where the robot is, or was: None if it was never seen. `note` says what is wrong, "" if it is
-    there now. `until` (monotonic seconds) is when time alone changes that."""
+    there now, and `age` how old the pose is, "" if not only that is wrong. `until` (monotonic seconds)
+    is when time alone changes that."""
 
     pose: Pose | None
     note: TextLike = ""
     until: float = math.inf
+    age: TextLike = ""
 
 
 def locate(widget: MapView, robot: RobotState, geometry: Geometry, now: float) -> ShownPose:
@@ -73,7 +75,8 @@ def _dated(pose: Pose, at: float, max_age_s: float, now: float) -> ShownPose:
 
 
 def _old(pose: Pose, at: float, now: float) -> ShownPose:
-    return ShownPose(pose, say("map_pose_old", age=format_age(now - at)), age_changes_at(at, now))
+    age = format_age(now - at)
+    return ShownPose(pose, say("map_pose_old", age=age), age_changes_at(at, now), age)
 
 
 def map_doubt(state: MapState, robot: RobotState) -> TextLike:

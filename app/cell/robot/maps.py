@@ -8,7 +8,7 @@ import hashlib
 import io
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from app.cell.robot.transforms import Pose, yaw_of
@@ -86,6 +86,7 @@ class Grid:
     geometry: Geometry
     cells: memoryview
     digest: str
+    floors: dict[tuple[float, float, float], Any] = field(default_factory=dict)  # see `floor_at`
 
     @property
     def version(self) -> str:

@@ -35,7 +35,7 @@ from app.cell.robot.traffic import RoundTrips, Traffic
 from app.cell.robot.transforms import TransformTree
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
-from app.panel.used import selects_by_command
+from app.panel.used import places_by_command, selects_by_command
 from app.panel.widgets.parameter import GET
 from app.panel.widgets.robot_options import ListingService
 from app.records.entry import CommandStatuses
@@ -148,6 +148,8 @@ class RobotState:
         self.maps = {self.key(topic): MapState() for topic in panel.maps}
         self.map_layers = {self.key(topic): LayerState() for topic in panel.map_shapes}
         self.transforms = TransformTree()
+        self.places, self.zones, self.map_views = panel.places, panel.zones, panel.map_views
+        self.place_inputs = places_by_command(panel)
         self.history = History(time.monotonic(), time.time())
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:

@@ -26,6 +26,7 @@ from app.cell.view.displays import (
 from app.cell.view.gauges import figure, gauge, joints
 from app.cell.view.map_values import map_view
 from app.cell.view.parameter_values import parameter
+from app.cell.view.place_values import place_input
 from app.cell.view.stop_brief import stop_brief
 from app.cell.view.table_values import table
 from app.cell.view.times import result_age
@@ -51,6 +52,7 @@ from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.sequence import Sequence as SequenceWidget
@@ -217,6 +219,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Gauge: gauge,
     Joints: joints,
     MapView: map_view,
+    PlaceInput: place_input,
     Table: table,
     AlarmListView: lambda widget, robot, now: alarm_list(widget, robot),
     AlarmLineView: lambda widget, robot, now: alarm_line(widget, robot),

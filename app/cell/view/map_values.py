@@ -8,6 +8,7 @@ from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.maps import Geometry
 from app.cell.robot.state import RobotState
 from app.cell.view.map_layer_values import grid_values, map_layer, no_layer
+from app.panel.places import Zone
 from app.panel.widgets.map_view import MapView
 from app.system.clock import format_time
 from app.system.texts import TextLike, number, say
@@ -19,8 +20,9 @@ ROTATED: Final = 1e-3  # radians: an origin that is turned by more is rotated
 def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` (live, old, waiting, unreadable), `note`, `grid` (the map's geometry and
     version; None without one), `pose` ([x, y, yaw] in metres and radians in the map's frame, None if
-    unknown), `about`, the time of the map and how precise the pose is, `detail`, `layer_0` and so on,
-    and `layer_note`, what is wrong with the first layer that is not drawn; and when they change."""
+    unknown), `zones`, `about`, the time of the map and how precise the pose is, `detail`, `layer_0` and
+    so on, and `layer_note`, what is wrong with the first layer that is not drawn; and when they
+    change."""
     state = robot.maps[robot.key(widget.topic)]
     if mismatch := topic_mismatch("MS", widget, robot):
         return _without_map(widget, "unreadable", mismatch.reason or ""), math.inf
@@ -41,6 +43,9 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
         "note": note,
         "grid": grid_values(geometry, state.grid.version, geometry.origin),
         "pose": None if shown.pose is None else [round(part, PLACES) for part in shown.pose],
+        "zones": [
+            _zone(zone) for zone in robot.zones if zone.map_version in (None, state.grid.version)
+        ],
         "about": _about(state.wall, ellipses if shown.pose is not None and not shown.note else []),
         "detail": _detail(geometry),
         "layer_note": next(filter(None, warnings), ""),
@@ -57,6 +62,11 @@ def _about(wall: float, ellipses: list[list[float]]) -> TextLike:
     return say("map_about_within", time=format_time(wall), within=within)
 
 
+def _zone(zone: Zone) -> dict[str, Any]:
+    """An area for the page: its corners in metres, and where a one-way zone leads, in radians."""
+    return {"label": zone.label, "kind": zone.kind, "points": zone.points, "yaw": zone.yaw}
+
+
 def _detail(geometry: Geometry) -> TextLike:
     """What the map's origin means for Nav2."""
     if abs(geometry.origin.yaw) <= ROTATED:
@@ -70,6 +80,7 @@ def _without_map(widget: MapView, state: str, note: TextLike) -> dict[str, Any]:
         "note": note,
         "grid": None,
         "pose": None,
+        "zones": [],
         "about": "",
         "detail": "",
         "layer_note": "",

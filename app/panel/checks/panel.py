@@ -12,6 +12,7 @@ from app.panel.checks.look import (
     label_faults,
     page_template_faults,
 )
+from app.panel.checks.places import place_faults
 from app.panel.checks.recipes import recipe_faults
 from app.panel.checks.robot_texts import robot_text_faults
 from app.panel.checks.robots import (
@@ -224,7 +225,11 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
         *alarm_faults(panel, interfaces, with_faults),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
-    missed |= {"input", "control"} if missed - {"interlock", "condition", "alarm", "recipe"} else set()
+    missed |= (
+        {"input", "control"}
+        if missed - {"interlock", "condition", "alarm", "recipe", "place", "zone"}
+        else set()
+    )
     faults = [fault for fault in faults if fault.cause.partition(" ")[0] not in missed]
     yield from faults
     yield from _topic_conflicts(panel, [fault.place for fault in faults])
@@ -234,6 +239,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _trend_faults(panel)
     yield from page_template_faults(panel)
     yield from _page_faults(panel)
+    yield from (fault for fault in place_faults(panel) if fault.cause.partition(" ")[0] not in missed)
     yield from grow_faults(panel)
     yield from label_faults(panel)
     yield from needs_faults(panel)
@@ -250,6 +256,8 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
     yield from duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
     yield from condition_id_faults(panel)
     yield from duplicate_ids("alarm", [alarm.id for alarm in panel.alarms])
+    yield from duplicate_ids("place", [place.id for place in panel.places])
+    yield from duplicate_ids("zone", [zone.id for zone in panel.zones])
     yield from _duplicate_widget_ids(panel)
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:

@@ -12,6 +12,7 @@ from app.panel.template import input_ids
 from app.panel.times import TIME_FORMATS
 from app.panel.widgets.families import CheckContext, Command
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.place import PlaceInput
 from app.ros.dialects.dialect import WITH_OWN_DOMAIN
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
@@ -76,12 +77,16 @@ def overview_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def choice_faults(panel: Panel) -> Iterator[Fault]:
-    """Faults of commands that send what is chosen from another robot's list."""
+    """Faults of commands that send what is chosen from another robot's list or on its map."""
     robots = widget_robots(panel)
     selects = {
         widget.id: robots[widget.id]
         for widget in panel.widgets()
-        if isinstance(widget, SelectInput) and widget.options_from and widget.id in robots
+        if widget.id in robots
+        and (
+            isinstance(widget, PlaceInput)
+            or (isinstance(widget, SelectInput) and widget.options_from is not None)
+        )
     }
     for p, page in enumerate(panel.pages):
         for place, widget, robot in page.robots() if selects else ():
@@ -131,6 +136,8 @@ def _named_robots(panel: Panel) -> Iterator[tuple[str, str | None]]:
     """(place, robot) of each table that may name one."""
     yield from ((f"interlock[{i}]", interlock.robot) for i, interlock in enumerate(panel.interlocks))
     yield from ((f"condition[{c}]", each.robot) for c, each in enumerate(panel.own_conditions))
+    yield from ((f"place[{p}]", place.robot) for p, place in enumerate(panel.places))
+    yield from ((f"zone[{z}]", zone.robot) for z, zone in enumerate(panel.zones))
     yield from ((f"alarm[{a}]", alarm.robot) for a, alarm in enumerate(panel.alarms))
     yield from ((f"frame.widget[{w}]", each.robot) for w, each in enumerate(panel.frame.widgets))
     for p, page in enumerate(panel.pages):

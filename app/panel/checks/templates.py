@@ -1,11 +1,11 @@
 """Checks templates by encoding them with example values of their inputs."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from app.panel.file.wording import list_names
-from app.panel.template import NOW, TIME, add_now, fill, placeholders, value_at
+from app.panel.file.wording import list_names, no_such
+from app.panel.template import NOW, TIME, add_now, fill, input_of, placeholders, value_at
 from app.panel.widgets.families import CheckContext, Input
 from app.ros.messages import Interfaces
 from app.system.errors import Fault, FieldError, InterfaceError
@@ -21,10 +21,11 @@ def template_faults(
     interfaces, inputs = checking.interfaces, checking.inputs
     try:
         names = list(placeholders(template))
-        faults = list(unknown_input_faults(place, names, inputs, checking.all_inputs))
-        if not {name for _, name in names} & set(checking.faulty):
+        faults = list(unknown_input_faults(place, names, checking))
+        used = [input_of(name) for _, name in names]
+        if not {*used} & {*checking.faulty}:
             faults += _misplaced_now_faults(place, template, type_name, names, interfaces)
-            known = {name: inputs[name] for _, name in names if name in inputs}
+            known = {name: inputs[name] for name in used if name in inputs}
             faults += [] if faults else _encoding_faults(place, template, type_name, known, interfaces)
         yield from faults
     except FieldError as error:
@@ -42,14 +43,37 @@ def example_values(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
 
 
 def unknown_input_faults(
-    place: str, names: list[tuple[str, str]], inputs: Collection[str], anywhere: Collection[str]
+    place: str, names: list[tuple[str, str]], checking: CheckContext
 ) -> Iterator[Fault]:
+    """Faults of names of inputs that are not on the page, and of parts that an input does not have."""
+    inputs = checking.inputs
     for where, name in names:
-        if name not in inputs and name != NOW:
+        input_id, _, part = name.partition(".")
+        if name == NOW:
+            continue
+        if input_id not in inputs:
             message = (
-                f"; there is {list_names(sorted(inputs))}" if name not in anywhere else ON_OTHER_PAGE
+                f"; there is {list_names(sorted(inputs))}"
+                if input_id not in checking.all_inputs
+                else ON_OTHER_PAGE
             )
-            yield Fault(f"{place}.{where}", f'no input "{name}"{message}', cause=f"input {name}")
+            message = f'no input "{input_id}"{message}'
+            yield Fault(f"{place}.{where}", message, cause=f"input {input_id}")
+        elif input_id not in checking.faulty and (fault := _part_fault(inputs[input_id], part)):
+            yield Fault(f"{place}.{where}", fault)
+
+
+def _part_fault(widget: Input, part: str) -> str:
+    """What is wrong with the name of a part of an input's value, "" for none."""
+    if part in widget.parts or not (part or widget.parts):
+        return ""
+    if not widget.parts:
+        return f'"{widget.id}" has no parts: write "{{{widget.id}}}"'
+    if not part:
+        return (
+            f'"{widget.id}" is a {widget.kind}: name a part, as in "{{{widget.id}.{widget.parts[0]}}}"'
+        )
+    return no_such(f'part of "{widget.id}"', part, widget.parts)
 
 
 def _misplaced_now_faults(
@@ -105,9 +129,10 @@ def _fault_message(
         return error.message
     if written not in (f"{{{names[0]}}}", f"-{{{names[0]}}}"):
         return error.message if _detail(error) else f'"{written}" makes text; the field is {field}'
-    input_widget = inputs[names[0]]
-    gives = input_widget.describe_value(values[input_widget.id], narrow=bool(_detail(error)))
-    return f'input "{input_widget.id}" gives {gives}; the field is {field}{_detail(error)}'
+    input_widget = inputs[input_of(names[0])]
+    value = fill(written, values) if input_widget.parts else values[input_widget.id]
+    gives = input_widget.describe_value(value, narrow=bool(_detail(error)))
+    return f'input "{names[0]}" gives {gives}; the field is {field}{_detail(error)}'
 
 
 def _detail(error: FieldError) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from app.panel.constants import resolve_names
 from app.panel.model import Panel
-from app.panel.template import NOW, placeholders
+from app.panel.template import NOW, input_of, placeholders
 from app.panel.widgets.families import Command, Input
 from app.panel.widgets.map_view import MapView
 from app.ros.messages import Interfaces, Type
@@ -99,7 +99,7 @@ def _item_lines(value: Any, comments: Comments, place: str) -> Iterator[str]:
 
 def _comment(value: Any, comments: Comments, place: str) -> str:
     try:
-        names = [name for _, name in placeholders(value)]
+        names = [input_of(name) for _, name in placeholders(value)]
     except FieldError:  # braces in a value that an input gave
         names = []
     about = [comments[key] for key in (place, *dict.fromkeys(names)) if key in comments]

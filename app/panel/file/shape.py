@@ -240,7 +240,9 @@ def _kind_as_type(written: object) -> str:
 
 # Stand-ins for faulty tables, so that the rest of a panel file can be checked.
 
-TABLES: Final = ("interlock", "condition", "page", "frame", "robot", "alarm")
+TABLES: Final = ("interlock", "condition", "page", "frame", "robot", "alarm", "place")
+
+NO_AREA: Final = {"kind": "label", "points": [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +250,7 @@ class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
     are kinds of causes that can't be checked: the existing "interlock"s, "input"s, "control"s or
     "alarm"s, the topics that the panel "listens" to, the "action"s of conditions and alarms, the
-    "group"s of alarms, or the "figure"s of robots."""
+    "group"s of alarms, the "figure"s of robots, the "map"s, or the "place"s on them."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -288,6 +290,11 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 stand_in = _stand_in(tables[name][i], f"{name}_{i}")
                 rest.tables[name][i] = stand_in | {"topic": f"/faulty_{name}_{i}"}
                 rest.undecidable.update(("listens", "action", *_unnamed("interlock", tables[name][i])))
+            case ("place" | "zone" as name, int(i), *_):
+                stand_in = _stand_in(tables[name][i], str(i)) | {"label": f"?{i}"}
+                where = {"x": 0.0, "y": 0.0} if name == "place" else NO_AREA
+                rest.tables[name][i] = stand_in | where
+                rest.undecidable.update(_unnamed("place", tables[name][i]))
             case ("alarm", int(i), *_):
                 stand_in = _stand_in(tables["alarm"][i], str(i))
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}
@@ -309,7 +316,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
                     rest.undecidable.update(("interlock", "listens", "page", "robot", "alarm"))
-                    rest.undecidable.add("group")
+                    rest.undecidable.update(("group", "place"))
     return rest
 
 
@@ -322,7 +329,7 @@ def _widget(rest: StandIns, tables: dict[str, Any], path: Path) -> None:
     stand_in = _stand_in(old, "_".join(str(step) for step in path if isinstance(step, int)))
     around[path[-1]] = stand_in | {"kind": "text"}
     rest.faulty.add(stand_in["id"])
-    rest.undecidable.update(("listens", "control", *_unnamed("input", old)))
+    rest.undecidable.update(("listens", "control", "map", *_unnamed("input", old)))
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:

@@ -242,9 +242,9 @@ NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
 HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
 FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
-    "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms",
+    "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms", "place",
     "diagnostics", "page", "group", "frame", "brand", "state", "detail", "widget", "qos", "confirm",
-    "options", "states",
+    "options", "states", "zone",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8

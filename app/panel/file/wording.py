@@ -19,7 +19,8 @@ _CLAIM: Final = 'is not the name of a claim: it must be like "preferred_username
 # The rule of a text, by its key: each key with a pattern has a row.
 PATTERNS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
-        ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition"), NO_ID
+        ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition", "places", "map"),
+        NO_ID,
     ),
     **dict.fromkeys(("alarms", "ack_command", "ack_input"), NO_ID),
     **dict.fromkeys(("logo", "src", "picture"), _PICTURE),
@@ -36,6 +37,8 @@ PATTERNS: Final[Mapping[str, str]] = {
     "parameter": "is not the name of a parameter: it has no spaces",
     "name": "is not a name that a message can have: it has control characters",
     "names": 'is not the name of a field: it has a-z, 0-9 and "_"',
+    "frame": "is not the name of a frame: it must be like map, without a slash before it",
+    "map_version": "is not the version of a map: it has 16 digits, of 0-9 and a-f",
     "base_frame": "is not the name of a frame: it must be like base_link, without a slash before it",
     "default": "has a NUL character, at which a ROS string ends",
 }
@@ -51,6 +54,10 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "page": "tables: write [[page]]",
     "group": "tables: write [[page.group]]",
     "widget": "tables: write [[page.widget]]",
+    "place": "tables: write [[place]]",
+    "places": 'ids of places: write ["dock"]',
+    "points": "points, like [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]",
+    "zone": "tables: write [[zone]]",
     "screens": 'sizes in CSS pixels: write ["1280x800"]',
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",

@@ -132,6 +132,8 @@ class EntryWidget(BaseWidget):
 class Input(EntryWidget):
     """A value that messages use by the input's id."""
 
+    parts: ClassVar[tuple[str, ...]] = ()  # names of what messages use of it, as in "{goal.x}"
+
     @property
     @abstractmethod
     def value_description(self) -> str:

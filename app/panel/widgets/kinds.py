@@ -30,6 +30,7 @@ from app.panel.widgets.joints import Joints
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import Publish, Step
 from app.panel.widgets.sequence import Sequence
 from app.panel.widgets.service_action import Action, Call
@@ -84,6 +85,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "table": WidgetKind(Table, tiles.TABLE, styles=("own",), script=True),
     "camera": WidgetKind(Camera, tiles.CAMERA, styles=("own",), script=True),
     "map": WidgetKind(MapView, tiles.MAP, styles=("own",), script=True),
+    "place": WidgetKind(PlaceInput, tiles.PLACE, styles=("entries", "own"), script=True),
     "log": WidgetKind(LogView, tiles.LOG, styles=("own",), script=True),
     "trend": WidgetKind(Trend, tiles.TREND, styles=("own",), script=True),
     "alarm_list": WidgetKind(

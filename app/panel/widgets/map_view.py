@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from app.panel.base import Rows, Seconds, Span, TopicName, TopicQos
+from app.panel.places import FrameName
 from app.panel.shared_keys import AgeKey, TopicKeys
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.map_layers import GRID_TYPE, MAX_LAYERS, Corners, MapLayer, updates_of
@@ -18,7 +19,6 @@ POSE_PATHS: Final = {
     "nav_msgs/msg/Odometry": "pose.pose",
 }
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
-FrameName = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^/\s][^\s]*$")]
 
 
 class PoseTopic(TopicKeys):

@@ -13,7 +13,7 @@ from app.panel.checks.types import number_faults, value_faults
 from app.panel.constants import mismatch_at
 from app.panel.numbers import to_float32
 from app.panel.shared_keys import FieldKey, NumberFormat, Unit, number_key_faults
-from app.panel.template import NOW, fill, placeholder_ids, placeholders
+from app.panel.template import NOW, fill, input_of, placeholder_ids, placeholders
 from app.panel.values import number_text
 from app.panel.widgets.displays import LampCommand
 from app.panel.widgets.families import (
@@ -124,12 +124,13 @@ def _equals_faults(
     except FieldError as error:
         yield Fault(f"{place}.{error.field}", error.message)
         return
-    faults = list(unknown_input_faults(place, names, checking.inputs, checking.all_inputs))
+    faults = list(unknown_input_faults(place, names, checking))
     faults += [Fault(f"{place}.{where}", NOW_RULE) for where, name in names if name == NOW]
     yield from faults
-    if faults or {name for _, name in names} & set(checking.faulty):
+    used = {input_of(name) for _, name in names}
+    if faults or used & {*checking.faulty}:
         return
-    for values in example_values({name: checking.inputs[name] for _, name in names}):
+    for values in example_values({name: checking.inputs[name] for name in used}):
         value = fill(confirm.equals, values)
         if fault := mismatch_at(value, type_name, confirm.field, checking.interfaces):
             yield Fault(f"{place}.equals", fault)

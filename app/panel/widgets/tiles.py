@@ -34,6 +34,7 @@ FIGURE_HEIGHTS: Final = (
     (0, 46.0, 20.0),
 )  # above, number, bar
 FIGURE_WIDTH: Final = 190.0
+PLACE_WIDTH: Final = 190.0
 MAP_WIDTH: Final = 320.0  # its four keys
 PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
 CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
@@ -234,6 +235,11 @@ CAMERA: Final = Tile(
 )
 MAP: Final = Tile(
     lambda widget, screen: 2 * screen.touch(KEY_MM), lambda widget, screen: MAP_WIDTH, grows=True
+)
+PLACE: Final = Tile(
+    lambda widget, screen: LABEL_HEIGHT + 2 * screen.touch(KEY_MM),
+    lambda widget, screen: PLACE_WIDTH,
+    grows=True,
 )
 PALLET: Final = Tile(_plan_height, lambda widget, screen: PLAN_WIDTH, grows=True)
 CONDITIONS: Final = Tile(_conditions_height, lambda widget, screen: CONDITIONS_WIDTH)

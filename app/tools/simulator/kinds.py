@@ -30,6 +30,7 @@ from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import Parameter, listed_parameter
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.sequence import Sequence
@@ -271,6 +272,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Table: None,
     LogView: None,
     MapView: None,
+    PlaceInput: None,
     AlarmView: None,
     Camera: _camera,
     Trend: _trend,

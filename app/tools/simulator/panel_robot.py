@@ -312,7 +312,7 @@ def _inside(limits: Range, guess: float) -> float:
 # them the value of the field that confirms it. Pure.
 
 CLOSE: Final = 1e-6  # a float32 comes back as the nearest one
-PLACEHOLDER: Final = re.compile(r"\{\{|\}\}|\{(\w+)\}")
+PLACEHOLDER: Final = re.compile(r"\{\{|\}\}|\{([\w.]+)\}")
 
 
 class Effect(NamedTuple):

@@ -37,6 +37,10 @@ export const viewOf = (root) => views.get(root);
 export const show = {
   grid: (root, grid) => views.get(root)?.showGrid(grid),
   pose: (root, pose) => views.get(root)?.showPose(pose),
+  zones: async (root, zones) => {
+    const view = views.get(root);
+    if (view && zones.length) (await import("./map-zones.js")).showZones(root, view, zones);
+  },
   ...Object.fromEntries(Array.from({ length: MOST_LAYERS }, (_, index) => [`layer_${index}`, showLayer(index)])),
 };
 

@@ -1,0 +1,91 @@
+"""The floor around a place, and the zones that it is in: pure, from a map's cells and polygons.
+
+Metres and radians in the map's frame.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Final, Literal
+
+from app.cell.robot.maps import COLOURS, FREE_COLOUR, OCCUPIED_COLOUR, Grid
+from app.panel.places import Zone
+
+Floor = Literal["outside", "occupied", "unknown", "free"]
+MAX_ROWS: Final = 4_000  # of cells that are looked at: a map's cells may be tiny
+MAX_KEPT: Final = 2_000  # floors of one map
+
+
+def floor_at(grid: Grid, x: float, y: float, radius: float) -> Floor:
+    """The floor within `radius` of a point: "outside" if the point is not on the map, else the worst of
+    its cells. What is beyond the map's edge is unknown. Kept with the map."""
+    asked = (x, y, radius)
+    known = grid.floors.get(asked)
+    if known is None:
+        if len(grid.floors) >= MAX_KEPT:
+            grid.floors.clear()
+        known = grid.floors[asked] = _floor(grid, x, y, radius)
+    return known
+
+
+def _floor(grid: Grid, x: float, y: float, radius: float) -> Floor:
+    width, height = grid.geometry.width, grid.geometry.height
+    column, row = _cell(grid, x, y)
+    reach = radius / grid.geometry.resolution
+    if not (0 <= column < width and 0 <= row < height):
+        return "outside"
+    if reach * 2 > MAX_ROWS:
+        return "unknown"
+    is_known = reach <= min(column, width - column, row, height - row)
+    for line in range(max(math.floor(row - reach), 0), min(math.floor(row + reach) + 1, height)):
+        # The nearest edge of this line of cells decides how wide the circle is there.
+        away = max(line - row, row - line - 1, 0.0)
+        half = math.sqrt(max(reach * reach - away * away, 0.0))
+        left, right = max(math.floor(column - half), 0), min(math.floor(column + half) + 1, width)
+        colours = bytes(grid.cells[line * width + left : line * width + right]).translate(COLOURS)
+        if OCCUPIED_COLOUR in colours:
+            return "occupied"
+        is_known = is_known and not colours.strip(bytes((FREE_COLOUR,)))
+    return "free" if is_known else "unknown"
+
+
+def _cell(grid: Grid, x: float, y: float) -> tuple[float, float]:
+    """(column, row) of a point, with parts of cells; the origin may be turned."""
+    origin, size = grid.geometry.origin, grid.geometry.resolution
+    dx, dy = x - origin.x, y - origin.y
+    cos, sin = math.cos(origin.yaw), math.sin(origin.yaw)
+    return (cos * dx + sin * dy) / size, (cos * dy - sin * dx) / size
+
+
+def keep_out_at(zones: Iterable[Zone], version: str, x: float, y: float, radius: float) -> Zone | None:
+    """The first keep-out zone of the map with this version that a circle touches."""
+    for zone in zones:
+        if zone.kind != "keep_out" or zone.map_version not in (None, version):
+            continue
+        if _contains(zone.points, x, y) or _distance(zone.points, x, y) < radius:
+            return zone
+    return None
+
+
+def _contains(points: Sequence[tuple[float, float]], x: float, y: float) -> bool:
+    """Whether a polygon has the point in it, by the number of edges to its right."""
+    inside = False
+    for (ax, ay), (bx, by) in zip(points, (*points[1:], points[0]), strict=True):
+        if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
+            inside = not inside
+    return inside
+
+
+def _distance(points: Sequence[tuple[float, float]], x: float, y: float) -> float:
+    """The distance to the nearest edge of a polygon."""
+    return min(
+        _to_edge(first, second, x, y)
+        for first, second in zip(points, (*points[1:], points[0]), strict=True)
+    )
+
+
+def _to_edge(first: tuple[float, float], second: tuple[float, float], x: float, y: float) -> float:
+    (ax, ay), (bx, by) = first, second
+    dx, dy = bx - ax, by - ay
+    length = dx * dx + dy * dy
+    part = 0.0 if not length else min(max(((x - ax) * dx + (y - ay) * dy) / length, 0.0), 1.0)
+    return math.hypot(ax + part * dx - x, ay + part * dy - y)

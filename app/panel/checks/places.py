@@ -1,0 +1,75 @@
+"""Checks of places, zones, and of inputs whose value is a place."""
+
+from collections.abc import Iterator
+
+from app.panel.file.wording import no_such
+from app.panel.model import Panel
+from app.panel.robot_panels import widget_robots
+from app.panel.template import input_ids
+from app.panel.widgets.families import BaseWidget, Command, PressCommand
+from app.panel.widgets.place import PlaceInput
+from app.system.errors import Fault
+from app.system.texts.text import alike
+
+
+def place_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of places and zones, and of maps, places and commands that do not belong together."""
+    for p, place in enumerate(panel.places):
+        first = next((n for n in range(p) if _is_same(panel, n, p)), None)
+        if first is not None:
+            message = f'"{place.label}" is already the label of place[{first}]'
+            yield Fault(f"place[{p}].label", message)
+    for z, zone in enumerate(panel.zones):
+        if zone.kind == "one_way" and zone.yaw is None:
+            yield Fault(f"zone[{z}].yaw", "is missing: where the zone leads, in radians")
+        elif zone.kind != "one_way" and zone.yaw is not None:
+            yield Fault(f"zone[{z}].yaw", f'is of a zone of the kind "one_way"; this is {zone.kind}')
+    for p, page in enumerate(panel.pages):
+        for place_of, widget in page.placed():
+            yield from _widget_faults(f"page[{p}].{place_of}", widget, panel)
+    for r, table in enumerate(panel.recipes):
+        chosen = {widget.id for widget in panel.place_inputs}
+        for f, name in enumerate(table.fields):
+            if name in chosen:
+                message = f'"{name}" is a place, of the moment: a recipe has other inputs'
+                yield Fault(f"recipe[{r}].fields[{f}]", message)
+
+
+def _is_same(panel: Panel, first: int, second: int) -> bool:
+    """Whether an operator could not tell two places apart, which one robot may have."""
+    above, below = panel.places[first], panel.places[second]
+    robots = {above.robot, below.robot}
+    shared = len(robots) == 1 or None in robots
+    return above.id != below.id and shared and alike(above.label, below.label)
+
+
+def _widget_faults(place: str, widget: BaseWidget, panel: Panel) -> Iterator[Fault]:
+    if isinstance(widget, PlaceInput):
+        yield from _input_faults(place, widget, panel)
+    elif isinstance(widget, Command) and not isinstance(widget, PressCommand):
+        chosen = {each.id for each in panel.place_inputs}
+        for name in input_ids(widget):
+            if name in chosen:
+                message = f'sends the place "{name}" again and again: only a press may send one'
+                yield Fault(place, message, cause=f"input {name}")
+
+
+def _input_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Fault]:
+    if widget.map not in panel.map_views:
+        message = no_such("map", widget.map, panel.map_views)
+        if not panel.map_views:
+            message = 'is the id of a map, and the panel has none: add a widget with kind = "map"'
+        yield Fault(f"{place}.map", message, cause=f"map {widget.map}")
+    robots = widget_robots(panel)
+    own, other = robots.get(str(widget.id)), robots.get(widget.map)
+    if widget.map in panel.map_views and own != other:
+        message = f'is the map of "{other}"' if other else "is the map of each robot"
+        message = f"{message}: an input and its map are of one robot"
+        yield Fault(f"{place}.map", message, cause=f"robot {widget.map}")
+    known = [str(each.id) for each in panel.places]
+    for n, name in enumerate(widget.places or ()):
+        if name not in known:
+            yield Fault(f"{place}.places[{n}]", no_such("place", name, known), cause=f"place {name}")
+    if not known and not widget.touch:
+        message = "has nothing to choose: write [[place]] tables, or touch = true"
+        yield Fault(f"{place}.touch", message, cause="place")

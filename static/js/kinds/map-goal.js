@@ -1,0 +1,207 @@
+// What is drawn on a map for goals: the places with their names, and what is chosen, a ring with an arrow. A finger that
+// presses and drags sets a pose with its direction.
+
+/** @typedef {import("./map.js").MapView} MapView */
+/** @typedef {{ x: number, y: number }} Point */
+/** @typedef {import("./place.js").Place} Place */
+
+const NEAR_PX = 26; // around a symbol that a finger meets
+const TURN_PX = 22; // a drag that is shorter does not turn
+const RING_PX = 17;
+const ARROW_PX = 46;
+const SVG = "http://www.w3.org/2000/svg";
+
+/** @param {string} tag @param {Record<string, string | number>} attributes @param {Element[]} children */
+function element(tag, attributes, ...children) {
+  const made = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  made.append(...children);
+  return made;
+}
+
+/** @param {HTMLElement} map @param {string} name */
+function layer(map, name) {
+  const made = element("g", { class: name });
+  map.querySelector("svg.map-marks")?.append(made);
+  return made;
+}
+
+export class Places {
+  /** @type {MapView} */
+  #view;
+  #layer;
+  /** @type {Place[]} */
+  #places = [];
+  #chosen = "";
+
+  // `choose` gets the id of a place whose symbol is touched.
+  /** @param {HTMLElement} map @param {MapView} view @param {(id: string) => void} choose */
+  constructor(map, view, choose) {
+    this.#view = view;
+    this.#layer = layer(map, "map-places");
+    view.onDraw(() => this.#draw());
+    view.onPointer((event) => {
+      const id = this.#met(event);
+      if (!id) return null;
+      follow(map, event, { end: () => choose(id) });
+      return () => follow(map, event, null);
+    });
+  }
+
+  /** @param {Place[]} places @param {string} chosen */
+  show(places, chosen) {
+    [this.#places, this.#chosen] = [places, chosen];
+    this.#layer.replaceChildren(
+      ...places.map(({ label }) => {
+        const text = element("text", { x: RING_PX - 2, dy: ".36em" });
+        text.textContent = label;
+        return element("g", {}, element("circle", { r: 9 }), text);
+      }),
+    );
+    this.#draw();
+  }
+
+  #draw() {
+    this.#places.forEach(({ id, pose, reason }, number) => {
+      const mark = this.#layer.children[number];
+      const { x, y } = this.#view.at(pose[0], pose[1]);
+      mark.setAttribute("transform", `translate(${x} ${y})`);
+      mark.toggleAttribute("data-locked", reason !== "");
+      mark.toggleAttribute("data-chosen", id === this.#chosen);
+      mark.toggleAttribute("hidden", !this.#view.version);
+    });
+  }
+
+  /** @param {PointerEvent} event */
+  #met(event) {
+    const point = this.#view.pointAt(event);
+    if (!point) return null;
+    const here = this.#view.at(point.x, point.y);
+    const met = this.#places
+      .filter(({ reason }) => !reason)
+      .map(({ id, pose }) => ({ id, away: distance(here, this.#view.at(pose[0], pose[1])) }))
+      .sort((one, other) => one.away - other.away)[0];
+    return met && met.away <= NEAR_PX ? met.id : null;
+  }
+}
+
+export class Goal {
+  /** @type {HTMLElement} */
+  #map;
+  /** @type {MapView} */
+  #view;
+  #mark;
+  /** @type {number[] | null} */
+  #pose = null; // what is chosen
+  /** @type {number[] | null} */
+  #touched = null; // what a finger sets just now
+  #radius = 0;
+
+  /** @param {HTMLElement} map @param {MapView} view */
+  constructor(map, view) {
+    this.#map = map;
+    this.#view = view;
+    this.#mark = layer(map, "map-goal");
+    this.#mark.append(element("circle", { r: RING_PX }), element("path", { d: `M0 0H${ARROW_PX}m-12-10 12 10-12 10` }));
+    view.onDraw(() => this.#draw());
+  }
+
+  // How much floor must be free, in metres.
+  /** @param {number} radius */
+  surround(radius) {
+    this.#radius = radius;
+  }
+
+  // `isFree`: it would be sent; else the server has a reason against it, or has not answered yet.
+  /** @param {number[] | null} pose @param {boolean} isFree */
+  show(pose, isFree) {
+    this.#pose = pose;
+    this.#mark.toggleAttribute("data-refused", !isFree);
+    this.#draw();
+  }
+
+  // A finger, or the main button of a mouse: `chosen` gets the value of the input, and the pose. The numbers are those
+  // that the server reads, whatever the language.
+  /** @param {(value: string, pose: number[]) => void} chosen */
+  onTouch(chosen) {
+    this.#map.dataset.goals = "";
+    this.#view.onPointer((event) => {
+      const start = event.button === 0 ? this.#view.pointAt(event) : null;
+      if (!start) return null;
+      const { version } = this.#view;
+      const direction = (/** @type {PointerEvent} */ moved) => this.#direction(start, moved);
+      this.#touch([start.x, start.y, direction(event)]);
+      follow(this.#map, event, {
+        move: (moved) => this.#touch([start.x, start.y, direction(moved)]),
+        end: (moved) => {
+          const [x, y, yaw] = [start.x, start.y, direction(moved)].map((part) => part.toFixed(2));
+          this.#touch(null);
+          chosen(`x=${x} y=${y} yaw=${yaw} map=${version}`, [Number(x), Number(y), Number(yaw)]);
+        },
+        cancel: () => this.#touch(null),
+      });
+      return () => {
+        follow(this.#map, event, null);
+        this.#touch(null);
+      };
+    });
+  }
+
+  // Where the finger was dragged; without a drag straight on from the robot, else to the east.
+  /** @param {Point} start @param {PointerEvent} event */
+  #direction(start, event) {
+    const end = this.#view.pointAt(event) ?? start;
+    const moved = distance(this.#view.at(start.x, start.y), this.#view.at(end.x, end.y));
+    if (moved >= TURN_PX) return Math.atan2(end.y - start.y, end.x - start.x);
+    const robot = this.#view.pose;
+    return robot ? Math.atan2(start.y - robot[1], start.x - robot[0]) : 0;
+  }
+
+  /** @param {number[] | null} pose */
+  #touch(pose) {
+    this.#touched = pose;
+    this.#draw();
+  }
+
+  #draw() {
+    const pose = this.#touched ?? this.#pose;
+    this.#mark.toggleAttribute("hidden", !pose || !this.#view.version);
+    this.#mark.toggleAttribute("data-touched", this.#touched !== null);
+    if (!pose) return;
+    const { x, y } = this.#view.at(pose[0], pose[1]);
+    const radius = this.#view.at(pose[0] + this.#radius, pose[1]).x - x;
+    this.#mark.children[0].setAttribute("r", String(Math.max(radius, RING_PX)));
+    this.#mark.setAttribute("transform", `translate(${x} ${y}) rotate(${(-pose[2] * 180) / Math.PI})`);
+  }
+}
+
+/** @param {Point} first @param {Point} second */
+const distance = (first, second) => Math.hypot(first.x - second.x, first.y - second.y);
+
+/** @typedef {{ move?: (event: PointerEvent) => void, end: (event: PointerEvent) => void, cancel?: () => void }} Calls */
+/** @type {WeakMap<HTMLElement, AbortController>} */
+const followed = new WeakMap();
+
+// The further events of a finger on a map, until it is lifted; null: no more of them.
+/** @param {HTMLElement} map @param {PointerEvent} first @param {Calls | null} calls */
+function follow(map, first, calls) {
+  followed.get(map)?.abort();
+  if (!calls) return;
+  const until = new AbortController();
+  followed.set(map, until);
+  const view = map.querySelector(".map-view");
+  /** @param {"pointermove" | "pointerup" | "pointercancel"} name @param {(event: PointerEvent) => void} call */
+  const on = (name, call) =>
+    view?.addEventListener(name, (event) => event.pointerId === first.pointerId && call(event), {
+      signal: until.signal,
+    });
+  on("pointermove", (event) => calls.move?.(event));
+  on("pointerup", (event) => {
+    until.abort();
+    calls.end(event);
+  });
+  on("pointercancel", () => {
+    until.abort();
+    calls.cancel?.();
+  });
+}

@@ -1,0 +1,58 @@
+// The zones of a map, under the robot: areas with their names. What may not be entered is hatched, a way has an arrow.
+
+/** @typedef {{ label: string, kind: string, points: number[][], yaw: number | null }} Zone */
+
+const SVG = "http://www.w3.org/2000/svg";
+const ARROW = "M-26 0H26m-14-12 14 12-14 12";
+
+/** @param {string} tag @param {Record<string, string>} attributes */
+function element(tag, attributes) {
+  const made = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  return made;
+}
+
+/** @type {WeakMap<HTMLElement, Zone[]>} */
+const shown = new WeakMap();
+
+/** @param {HTMLElement} root @param {import("./map.js").MapView} view @param {Zone[]} zones */
+export function showZones(root, view, zones) {
+  const isFirst = !shown.has(root);
+  shown.set(root, zones);
+  const marks = root.querySelector("svg.map-marks");
+  if (isFirst) {
+    const hatch = `hatch-${root.dataset.widget}`;
+    const pattern = element("pattern", { id: hatch, width: "12", height: "12", patternUnits: "userSpaceOnUse" });
+    pattern.setAttribute("patternTransform", "rotate(45)");
+    pattern.append(element("path", { d: "M6 0V12" }));
+    marks?.prepend(pattern, element("g", { class: "map-zones", fill: `url(#${hatch})` }));
+    view.onDraw(() => draw(root, view));
+  }
+  root.querySelector(".map-zones")?.replaceChildren(
+    ...zones.map(({ label, kind }) => {
+      const zone = element("g", { "data-zone": kind });
+      const name = element("text", { "text-anchor": "middle", dy: kind === "one_way" ? "-2em" : ".36em" });
+      name.textContent = label;
+      zone.append(element("polygon", {}), name);
+      if (kind === "one_way") zone.append(element("path", { d: ARROW }));
+      return zone;
+    }),
+  );
+  draw(root, view);
+}
+
+/** @param {HTMLElement} root @param {import("./map.js").MapView} view */
+function draw(root, view) {
+  (shown.get(root) ?? []).forEach(({ points, yaw }, number) => {
+    const zone = root.querySelector(".map-zones")?.children[number];
+    const [polygon, name, arrow] = zone?.children ?? [];
+    zone?.toggleAttribute("hidden", !view.version);
+    const corners = points.map(([x, y]) => view.at(x, y));
+    polygon?.setAttribute("points", corners.map(({ x, y }) => `${x},${y}`).join(" "));
+    const [xs, ys] = [corners.map(({ x }) => x), corners.map(({ y }) => y)];
+    const x = (Math.min(...xs) + Math.max(...xs)) / 2;
+    const y = (Math.min(...ys) + Math.max(...ys)) / 2;
+    name?.setAttribute("transform", `translate(${x} ${y})`);
+    arrow?.setAttribute("transform", `translate(${x} ${y}) rotate(${(-(yaw ?? 0) * 180) / Math.PI})`);
+  });
+}
