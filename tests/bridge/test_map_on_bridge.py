@@ -1,9 +1,9 @@
 """A map of real ROS 2 nodes through the real bridge: latched, also for a panel that starts later,
-with a pose or with transforms."""
+with a pose or with transforms, and with layers."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -107,3 +107,74 @@ def test_transforms_at_50_hz_place_the_robot_until_they_end(
             assert "base_link" in kiosk.widget("hall")["note"]
     finally:
         map_server.end()
+
+
+LAYERS: Final = """
+[[page.widget.layer]]
+shows = "scan"
+topic = "/scan"
+max_age_s = 5.0
+[[page.widget.layer]]
+shows = "path"
+topic = "/plan"
+[[page.widget.layer]]
+shows = "costmap"
+topic = "/costmap"
+"""
+SCAN: Final = "sensor_msgs/msg/LaserScan"
+PATH: Final = "nav_msgs/msg/Path"
+UPDATE: Final = "map_msgs/msg/OccupancyGridUpdate"
+BEAMS: Final = {"angle_increment": 1.0, "range_min": 0.1, "range_max": 9.0}
+
+
+def test_layers_are_placed_by_transforms_and_a_costmap_takes_its_updates(
+    own_cyclone_bridge: Bridge,
+    cyclone_robots: Callable[..., CycloneRobot],
+    own_client: Client,
+    tmp_path: Path,
+) -> None:
+    driven = cyclone_robots(own_cyclone_bridge.domain)
+    nav = RosNode(own_cyclone_bridge.domain, "nav")
+    try:
+        for topic in ("/map", "/costmap"):
+            nav.advertise(topic, GRID, durability="transient_local", depth=1)
+        nav.advertise("/scan", SCAN, reliability="best_effort")
+        nav.advertise("/plan", PATH)
+        publish_map(nav, [0, 100, -1, 0], 2, 2)
+        info = {"resolution": 0.5, "width": 2, "height": 2, "origin": {"orientation": UPRIGHT}}
+        costs = {"header": {"frame_id": "map"}, "info": info, "data": [0, 0, 0, 100]}
+        nav.publish("/costmap", costs)
+        driven.advertise(topic="/tf", type=TF)
+        driven.advertise(topic="/costmap_updates", type=UPDATE)
+        driven.transform(topic="/tf", parent="map", child="base_link", x=2.0, hz=50)
+        with live_server(own_cyclone_bridge, tmp_path, PANEL + LAYERS) as kiosk:
+
+            def layer(number: int) -> dict[str, Any]:
+                return dict(kiosk.widget("hall")[f"layer_{number}"])
+
+            def scanned() -> bool:
+                header = {"frame_id": "base_link"}
+                nav.publish("/scan", {"header": header, "ranges": [1.0, float("inf")], **BEAMS})
+                return bool(layer(0).get("points") == [300, 0])
+
+            def planned() -> bool:
+                poses = [{"pose": {"position": {"x": x, "y": 1.0, "z": 0.0}}} for x in (2.0, 3.5)]
+                nav.publish("/plan", {"header": {"frame_id": "map"}, "poses": poses})
+                return bool(layer(1).get("points") == [200, 100, 350, 100])
+
+            until(scanned, "the scan is where the robot is")
+            until(planned, "the path is on the map")
+            first = until(lambda: layer(2).get("grid"), "the latched costmap is read")
+
+            def updated() -> bool:
+                driven.update_map(topic="/costmap_updates", x=1, y=0, width=1, data=[99, 99])
+                return bool(layer(2)["grid"]["version"] != first["version"])
+
+            until(updated, "the update is applied")
+            assert kiosk.widget("hall")["layer_note"] == ""
+            path = f"/widgets/hall/map/{layer(2)['grid']['version']}/0-0.png"
+            assert kiosk.http.get(path).status_code == 200
+            driven.update_map(topic="/costmap_updates", x=2, y=0, width=1, data=[99])
+            until(lambda: layer(2)["state"] == "old", "an update outside of it is named")
+    finally:
+        nav.end()

@@ -25,6 +25,7 @@ from cyclone_types import (
     Gripper,
     Header,
     Jaw,
+    OccupancyGridUpdate,
     Quaternion,
     SetBool_Request,
     SetBool_Response,
@@ -49,6 +50,10 @@ TOPIC_TYPES: dict[str, tuple[type, str]] = {
     "tf2_msgs/msg/TFMessage": (
         TFMessage,
         "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+    ),
+    "map_msgs/msg/OccupancyGridUpdate": (
+        OccupancyGridUpdate,
+        "RIHS01_c4095b0be2e4363f8978a1570e0293ee093436f1e1c61d99b48502ac317025e8",
     ),
     "std_msgs/msg/Bool": (
         Bool,
@@ -143,6 +148,12 @@ class Commands:
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self._node.published[topic]
         publisher.write(publisher.data_type(**fields))
+
+    def update_map(self, topic: str, x: int, y: int, width: int, data: list[int]) -> None:
+        """Publishes new cells of a part of the map."""
+        header = Header(Time.at(time.time_ns()), "map")
+        update = OccupancyGridUpdate(header, x, y, width, len(data) // width, data)
+        self._node.published[topic].write(update)
 
     def transform(self, topic: str, parent: str, child: str, x: float, hz: float = 0.0) -> None:
         """Publishes where a frame is in another one: once, or so many times a second with the time of

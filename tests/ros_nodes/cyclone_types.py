@@ -123,6 +123,19 @@ class TFMessage(IdlStruct, typename=dds_name("tf2_msgs/msg/TFMessage")):
     transforms: sequence[TransformStamped]
 
 
+# Updates of maps.
+
+
+@dataclass
+class OccupancyGridUpdate(IdlStruct, typename=dds_name("map_msgs/msg/OccupancyGridUpdate")):
+    header: Header
+    x: int32
+    y: int32
+    width: uint32
+    height: uint32
+    data: sequence[int8]
+
+
 # ros_discovery_info: which readers and writers make up a node.
 
 
