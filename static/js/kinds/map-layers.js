@@ -185,7 +185,7 @@ class Layers {
     if (shape && shape.getAttribute("points") !== text) shape.setAttribute("points", text);
   }
 
-  // Where the robot is with 95 % of probability, around where it is drawn.
+  // Where the robot is with 95 % of probability, with its radius: else its sign would hide it.
   /** @param {number} perMetre */
   #drawWithin(perMetre) {
     const mark = find(this.#root, ".map-within");
@@ -194,8 +194,9 @@ class Layers {
     mark.toggleAttribute("hidden", !pose || !ellipse || !this.#view.version);
     if (!pose || !ellipse) return;
     const { x, y } = this.#view.at(pose[0], pose[1]);
-    mark.setAttribute("rx", String(ellipse[0] * perMetre));
-    mark.setAttribute("ry", String(ellipse[1] * perMetre));
+    const radius = Math.max(Number(this.#root.dataset.radius) * perMetre, LEAST_BODY_PX);
+    mark.setAttribute("rx", String(ellipse[0] * perMetre + radius));
+    mark.setAttribute("ry", String(ellipse[1] * perMetre + radius));
     mark.setAttribute("transform", `translate(${x} ${y}) rotate(${(-ellipse[2] * 180) / Math.PI})`);
   }
 
