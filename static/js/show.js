@@ -457,7 +457,13 @@ for (const tab of tabs) tab.addEventListener("click", () => showGroup(tab.datase
 
 // An address that names a widget shows its group.
 function showNamed() {
-  const group = document.getElementById(location.hash.slice(1))?.closest("[data-group]");
+  showGroupOf(document.getElementById(location.hash.slice(1)));
+}
+
+// The group of an element, where one is shown at a time.
+/** @param {Element | null} element */
+export function showGroupOf(element) {
+  const group = element?.closest("[data-group]");
   if (group instanceof HTMLElement && tabs.length) showGroup(group.dataset.group);
 }
 

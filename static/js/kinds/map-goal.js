@@ -66,6 +66,10 @@ export class Places {
       const mark = this.#layer.children[number];
       const { x, y } = this.#view.at(pose[0], pose[1]);
       mark.setAttribute("transform", `translate(${x} ${y})`);
+      const name = mark.querySelector("text");
+      const isLeft = name !== null && x + RING_PX + name.getComputedTextLength() > this.#view.width;
+      name?.setAttribute("text-anchor", isLeft ? "end" : "start");
+      name?.setAttribute("x", String((isLeft ? -1 : 1) * (RING_PX - 2)));
       mark.toggleAttribute("data-locked", reason !== "");
       mark.toggleAttribute("data-chosen", id === this.#chosen);
       mark.toggleAttribute("hidden", !this.#view.version);

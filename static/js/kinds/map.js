@@ -123,6 +123,11 @@ export class MapView {
     return this.#pose;
   }
 
+  // Of the view, in pixels.
+  get width() {
+    return this.#view.clientWidth;
+  }
+
   // Draws soon.
   draw() {
     this.#draw();

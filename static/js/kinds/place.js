@@ -1,6 +1,6 @@
 // An input for places on a map: a list of keys, symbols on the map and, with `data-touch`, a finger on the map. All of
 // them only choose. The card is the server's; a value is entered when its card is there, so a press sends what it shows.
-import { closest, copyOf, find, isGood, setText } from "../show.js";
+import { closest, copyOf, find, isGood, setText, showGroupOf } from "../show.js";
 import { viewOf } from "./map.js";
 import { Goal, Places } from "./map-goal.js";
 
@@ -106,6 +106,7 @@ class PlaceInput {
       (card) => {
         if (!card) return;
         this.#enter(card);
+        showGroupOf(this.#root); // what was touched on the map may be in another group
         this.#card.focus({ preventScroll: true });
       },
       () => {

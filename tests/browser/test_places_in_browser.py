@@ -1,0 +1,173 @@
+"""Places and goals as an operator uses them: the list, fingers on the map, the card, the press."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.browser.finger import Touch
+from tests.support.browser.pages import DRAWN, HIDE, place, widget
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+from tests.web.test_places import PANEL
+
+pytestmark = pytest.mark.promise("places")
+
+CHOSEN: Final = "(select) => select.value"
+
+
+@pytest.fixture(scope="module")
+def shuttle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with demo_server(tmp_path_factory.mktemp("shuttle"), PANEL) as server:
+        until(lambda: server.widget("hall")["state"] == "live", "the map is there")
+        yield server
+
+
+def opened(page: Page, server: Server) -> Page:
+    page.goto(server.url)
+    expect(widget(page, "hall")).not_to_have_attribute("data-version", "")
+    expect(page.locator(".map-places > g")).to_have_count(3)
+    expect(widget(page, "drive").locator("button[type=submit]")).to_be_enabled()
+    page.evaluate(DRAWN)
+    return page
+
+
+def chosen(page: Page) -> str:
+    return str(page.locator("#input-goal").evaluate(CHOSEN))
+
+
+def card(page: Page) -> Any:
+    return widget(page, "goal").locator(".place-card")
+
+
+def send(page: Page) -> None:
+    widget(page, "drive").locator("button[type=submit]").click()
+
+
+def receipt(page: Page) -> Any:
+    return widget(page, "drive").locator(".receipt")
+
+
+def touch_and_drag(page: Page, across: float = 0.5, down: float = 0.3) -> None:
+    """A finger on free floor that drags upwards: to the north."""
+    view = place(page.locator(".map-view"))
+    x, y = view["x"] + across * view["width"], view["y"] + down * view["height"]
+    touch = Touch(page)
+    touch.send("touchStart", (x, y))
+    touch.send("touchMove", (x, y - 30))
+    touch.send("touchMove", (x, y - 60))
+    touch.send("touchEnd")
+
+
+def test_a_place_of_the_list_is_chosen_shown_and_sent_once(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    goal = widget(page, "goal")
+    goal.locator('[data-place="dock"]').tap()
+    expect(card(page)).to_be_visible()
+    expect(card(page)).to_contain_text("x 2.00 m, y 1.50 m")
+    expect(goal.locator(".places")).to_be_hidden()
+    assert chosen(page) == "dock"
+    send(page)
+    expect(receipt(page)).to_contain_text("Dock: ")
+    expect(card(page)).to_be_hidden()  # it is sent: pressed again, nothing is chosen
+    assert chosen(page) == ""
+
+
+def test_nothing_chosen_is_nothing_sent(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    send(page)
+    expect(receipt(page)).to_have_attribute("data-outcome", "refused")
+
+
+def test_a_locked_place_says_why_and_is_not_chosen(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    pit = widget(page, "goal").locator('[data-place="pit"]')
+    expect(pit).to_have_attribute("aria-disabled", "true")
+    expect(pit).to_contain_text("Stairs")
+    pit.tap(force=True)
+    page.evaluate(DRAWN)
+    assert chosen(page) == ""
+
+
+def test_a_finger_sets_a_pose_with_its_direction(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    touch_and_drag(page)
+    expect(card(page)).to_contain_text("90°, to the north")
+    value = chosen(page)
+    version = widget(page, "hall").get_attribute("data-version")
+    assert value.endswith(f"yaw=1.57 map={version}")
+    expect(page.locator(".map-goal")).not_to_have_attribute("data-refused", "")
+    send(page)
+    x, y = (part.partition("=")[2] for part in value.split()[:2])
+    expect(receipt(page)).to_contain_text(f"x {x} m, y {y} m: ")
+    expect(card(page)).to_be_hidden()
+
+
+def test_a_touch_where_the_robot_may_not_go_is_chosen_and_refused(
+    shuttle: Server, touchscreen: Page
+) -> None:
+    page = opened(touchscreen, shuttle)
+    touch_and_drag(page, 0.5, 0.02)  # above the wall
+    expect(card(page).locator(".refusal")).to_contain_text("outside the map")
+    send(page)
+    expect(receipt(page)).to_have_attribute("data-outcome", "refused")
+    expect(card(page)).to_be_visible()
+    card(page).locator(".unchoose").tap()
+    expect(card(page)).to_be_hidden()
+
+
+def test_a_second_finger_ends_the_touch_and_moves_the_map(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    view = place(page.locator(".map-view"))
+    x, y = view["x"] + view["width"] / 2, view["y"] + view["height"] / 3
+    touch = Touch(page)
+    touch.send("touchStart", (x, y))
+    touch.send("touchStart", (x, y), (x + 60, y))
+    touch.send("touchMove", (x - 30, y), (x + 90, y))
+    touch.send("touchEnd")
+    page.evaluate(DRAWN)
+    assert chosen(page) == ""
+    expect(page.locator(".map-goal")).to_have_attribute("hidden", "")
+
+
+def test_a_tap_on_a_symbol_chooses_its_place(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    symbol = place(page.locator(".map-places > g").first.locator("circle"))
+    touch = Touch(page)
+    touch.send("touchStart", (symbol["x"] + symbol["width"] / 2, symbol["y"] + symbol["height"] / 2))
+    touch.send("touchEnd")
+    expect(card(page)).to_be_visible()
+    assert chosen(page) == "dock"
+
+
+def test_a_cut_between_touch_and_send_sends_nothing(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    touch_and_drag(page)
+    expect(card(page)).to_be_visible()
+    page.evaluate(HIDE)
+    expect(widget(page, "drive").locator("button[type=submit]")).to_be_disabled()
+    expect(widget(page, "goal")).to_have_attribute("data-state", "old")
+
+
+def test_without_an_answer_nothing_is_chosen(shuttle: Server, touchscreen: Page) -> None:
+    page = opened(touchscreen, shuttle)
+    page.route("**/widgets/goal/place*", lambda route: route.abort())
+    try:
+        widget(page, "goal").locator('[data-place="dock"]').tap()
+        expect(widget(page, "goal").locator(".no-answer")).not_to_be_empty()
+        assert chosen(page) == ""
+    finally:
+        page.unroute("**/widgets/goal/place*")
+
+
+def test_arrow_keys_go_through_the_list_and_enter_chooses(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    widget(page, "goal").locator('[data-place="pit"]').focus()
+    page.keyboard.press("ArrowDown")  # from the last to the first
+    page.keyboard.press("Enter")
+    expect(card(page)).to_be_focused()
+    assert chosen(page) == "dock"
+    card(page).locator(".unchoose").focus()
+    page.keyboard.press("Enter")
+    expect(widget(page, "goal").locator('[data-place="dock"]')).to_be_focused()
