@@ -25,6 +25,9 @@ PANELS: Final = {
     "welding-cell": ROOT / "docs/examples/welding-cell/panel.toml",
 }
 PICTURED: Final = ("lab-gripper", "mobile-robot", "welding-cell")  # of the guide to panel files
+# What is pressed before the picture of an example, and for how long it goes on then.
+PRESSED: Final = {"mobile-robot": ("[data-place=wrapper]", "[data-widget=send] button[type=submit]")}
+PRESSED_S: Final = 6.0
 SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
 ALL: Final = ROOT / "build/screenshots"
 IMAGES: Final = ROOT / "docs/images"
@@ -100,6 +103,11 @@ def take_for_guide(browser: Browser, url: str, name: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.goto(url)
     page.wait_for_timeout(1000 * SETTLED_S)
+    for selector in PRESSED.get(name, ()):
+        page.locator(selector).first.click()
+        page.wait_for_timeout(1000 * SETTLED_S)
+    if name in PRESSED:
+        page.wait_for_timeout(1000 * PRESSED_S)
     picture(page, f"{name}.png")
     page.close()
 

@@ -56,7 +56,8 @@ CUT: Final = """() => {
     while (box !== document.body && !cuts(box) && !isHidden(box)) box = box.parentElement;
     if (box === document.body || isHidden(box)) continue;
     const { left, right, bottom } = box.getBoundingClientRect();
-    const isCut = (rect) => rect.right > right + 1.5 || rect.left < left - 1.5 || rect.top > bottom - 4;
+    const end = element.closest(".places") ? Infinity : bottom - 4;  // a list of places scrolls
+    const isCut = (rect) => rect.right > right + 1.5 || rect.left < left - 1.5 || rect.top > end;
     const text = texts.currentNode;
     if (rects(text).some(isCut)) found.push(`${box.className}: ${text.data.trim()}`);
   }

@@ -35,6 +35,7 @@ FIGURE_HEIGHTS: Final = (
 )  # above, number, bar
 FIGURE_WIDTH: Final = 190.0
 PLACE_WIDTH: Final = 190.0
+PLACE_MM: Final = 14.0  # of a place in a list, which scrolls
 MAP_WIDTH: Final = 320.0  # its four keys
 PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
 CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
@@ -237,7 +238,7 @@ MAP: Final = Tile(
     lambda widget, screen: 2 * screen.touch(KEY_MM), lambda widget, screen: MAP_WIDTH, grows=True
 )
 PLACE: Final = Tile(
-    lambda widget, screen: LABEL_HEIGHT + 2 * screen.touch(KEY_MM),
+    lambda widget, screen: LABEL_HEIGHT + 2 * screen.touch(PLACE_MM),
     lambda widget, screen: PLACE_WIDTH,
     grows=True,
 )

@@ -8,7 +8,7 @@ from app.panel.widgets.map_layers import LAYERS, LayerName
 from app.panel.widgets.map_view import POSE_PATHS, TF_TYPE
 from app.ros.graph.model import Server, SurveyedTopic
 from app.ros.messages import Interfaces
-from app.tools.scaffold.parts import DraftWidget, label_of, words_of
+from app.tools.scaffold.parts import DraftWidget, id_of, label_of, words_of
 
 MAP_PAGE: Final = "map"
 GRID: Final = "nav_msgs/msg/OccupancyGrid"
@@ -28,7 +28,7 @@ MOST_ALIKE: Final[Mapping[LayerName, int]] = {"path": 2, "costmap": 2}
 ACTIONS: Final[Mapping[str, str]] = {
     f"{NAV2}{name}": comment
     for name, comment in {
-        "NavigateToPose": "Drives to a pose. Fill in the pose, in the frame of the map.",
+        "NavigateToPose": "Drives to what is chosen in the input goal.",
         "NavigateThroughPoses": "Drives through poses. Fill in the poses, in the frame of the map.",
         "FollowWaypoints": "Drives to poses, one after the other. Fill in the poses.",
         "DockRobot": "Drives to a dock. Give the name that it has in the file of docks.",
@@ -36,9 +36,13 @@ ACTIONS: Final[Mapping[str, str]] = {
     }.items()
 }
 OF_NAV2: Final = "an action between Nav2's own servers: send goals to its navigator"
+NAVIGATE: Final = f"{NAV2}NavigateToPose"
+GOAL: Final = "goal"  # the input for a goal
 GOALS: Final[Mapping[str, Mapping[str, Any]]] = {
     f"{NAV2}NavigateToPose": {
-        "goal": {"pose": {"header": {"frame_id": "map", "stamp": "{now}"}}},
+        "goal": {
+            "pose": {"header": {"frame_id": "{goal.frame}", "stamp": "{now}"}, "pose": "{goal.pose}"}
+        },
         "progress": "distance_remaining",
         "progress_falls": True,
         "feedback": "{distance_remaining:.1f} m left",
@@ -134,13 +138,35 @@ def is_of_map_page(entry: DraftWidget) -> bool:
 
 
 def on_map_page(entries: Iterable[DraftWidget]) -> Iterator[DraftWidget]:
-    """The entries; those that belong beside the map are on its page, if there is one."""
+    """The entries; those that belong beside the map are on its page, with an input for goals on it. A
+    robot without a map has no such input."""
     entries = list(entries)
-    if not any(entry.kind == "map" for entry in entries):
-        yield from entries
+    shown = next((entry for entry in entries if entry.kind == "map"), None)
+    if shown is None:
+        yield from map(_without_input, entries)
         return
     for entry in entries:
         yield replace(entry, place=(MAP_PAGE,)) if is_of_map_page(entry) else entry
+    nodes = (entry for entry in entries if entry.keys.get("type") == NAVIGATE)
+    for navigator in nodes:
+        yield replace(
+            navigator,
+            kind="place",
+            name=GOAL,
+            keys={"label": "Goal", "map": id_of(shown.name, ()), "touch": True},
+            comment="Places of [[place]] tables, or a pose that is touched on the map.",
+            place=(MAP_PAGE,),
+            is_input=True,
+        )
+        return
+
+
+def _without_input(entry: DraftWidget) -> DraftWidget:
+    if entry.keys.get("type") != NAVIGATE:
+        return entry
+    header = {"frame_id": "map", "stamp": "{now}"}
+    comment = "Drives to a pose. Fill in the pose, in the frame of the map."
+    return replace(entry, keys={**entry.keys, "goal": {"pose": {"header": header}}}, comment=comment)
 
 
 def nav2_goal(action: Server, interfaces: Interfaces) -> tuple[Mapping[str, Any], str] | None:

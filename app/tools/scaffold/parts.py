@@ -24,7 +24,7 @@ class DraftWidget:
 
     `place` are the parts of its namespace, or else of its node: its page. A control's `scope` is the
     namespace whose permission it needs, `nodes` are those that it acts on, and `interlock` is the id of
-    a candidate, "" for none.
+    a candidate, "" for none. `is_input`: a control that others take their values from.
     """
 
     kind: str
@@ -36,6 +36,7 @@ class DraftWidget:
     scope: str = ""
     nodes: tuple[str, ...] = ()
     interlock: str = ""
+    is_input: bool = False
 
 
 @dataclass(frozen=True, slots=True)

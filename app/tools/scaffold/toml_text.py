@@ -178,7 +178,9 @@ def _widget(entry: DraftWidget, own_id: str, live: bool, taken: set[str]) -> Ite
     body = ["[[page.widget]]", f"id = {value_text(own_id)}", f"kind = {value_text(entry.kind)}"]
     for key, value in entry.keys.items():
         body += _key(key, value)
-    if entry.interlock:
+    if entry.is_input:
+        pass  # its commands have the interlock
+    elif entry.interlock:
         body.append(f"interlock = {value_text(entry.interlock)}")
     elif entry.control:
         body.append('# interlock = "…": it needs one')

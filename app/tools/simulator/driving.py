@@ -782,7 +782,7 @@ TOPICS: Final[Mapping[str, RobotTopic]] = {
     "/amcl_pose": RobotTopic(
         lambda robot: (_rounded(robot.pose), round(robot.uncertainty, 2)), _located, least_s=0.5
     ),
-    "/scan": RobotTopic(_seen, _scan, least_s=SCAN_S, latched=False, repeat_s=SCAN_S),
+    "/scan": RobotTopic(_seen, _scan, least_s=SCAN_S, latched=False, repeat_s=0.5),
     "/odom": RobotTopic(
         lambda robot: (_rounded(robot.by_odometry), robot.speed, robot.turning),
         _odometry,

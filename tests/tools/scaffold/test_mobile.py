@@ -129,7 +129,15 @@ def test_goals_of_nav2_are_comments_with_what_to_fill_in() -> None:
         assert all(line.startswith("#") for line in text.splitlines() if f'"{name}"' in line)
     assert "# - /compute_path_to_pose (nav2_msgs/action/ComputePathToPose): an action between" in text
     live = widgets(text_of(controls=True))
-    assert live["navigate_to_pose"]["goal"]["pose"]["header"]["frame_id"] == "map"
+    goal = live["navigate_to_pose"]["goal"]["pose"]
+    assert goal["pose"] == "{goal.pose}"
+    assert live["goal"] == {
+        **{"id": "goal", "kind": "place", "label": "Goal"},
+        **{"map": "map", "touch": True},
+    }
+    alone = widgets(text_of(controls=True, topics=without("/map")))
+    assert "goal" not in alone
+    assert alone["navigate_to_pose"]["goal"]["pose"]["header"]["frame_id"] == "map"
     assert live["navigate_to_pose"]["progress"] == "distance_remaining"
     assert live["dock_robot"]["goal"] == {"dock_id": "dock"}
     assert {live[name]["interlock"] for name in ("navigate_to_pose", "cmd_vel")} == {"motors_ready"}

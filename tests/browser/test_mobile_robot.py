@@ -1,0 +1,78 @@
+"""The shipped panel of a mobile robot, as an operator uses it: choose a place, send, arrive; a way
+that is blocked; cancel."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.system.settings import panel_path
+from tests.support.browser.pages import widget
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
+
+pytestmark = pytest.mark.promise("demo")
+
+ARRIVES_MS: Final = 60_000
+
+
+@pytest.fixture(scope="module")
+def shuttle() -> Iterator[Server]:
+    with ready(Server(ROOT, KIOSK_PANEL=str(panel_path("mobile-robot")), KIOSK_MODE="demo")) as server:
+        yield server
+
+
+def opened(page: Page, server: Server) -> Page:
+    page.goto(f"{server.url}/pages/map")
+    expect(widget(page, "hall")).to_have_attribute("data-state", "live")
+    return page
+
+
+def put_box(page: Page, server: Server, position: str) -> None:
+    """Something in the robot's way, or nothing."""
+    page.goto(f"{server.url}/pages/status")
+    switch = widget(page, "obstacle").locator(f"[data-position={position}]")
+    switch.click()
+    expect(switch).to_have_attribute("aria-pressed", "true")
+
+
+def send(page: Page, place: str) -> None:
+    goal = widget(page, "goal")
+    goal.locator(f"[data-place={place}]").click()
+    expect(goal.locator(".place-card dd").first).to_be_visible()
+    widget(page, "send").locator("button[type=submit]").first.click()
+    expect(widget(page, "send")).to_have_attribute("data-busy", "")
+
+
+def state(page: Page, word: str) -> None:
+    expect(page.locator(".machine-state")).to_contain_text(word, timeout=ARRIVES_MS)
+
+
+def test_robot_drives_to_a_place_that_is_chosen_and_the_receipt_says_so(
+    shuttle: Server, page: Page
+) -> None:
+    opened(page, shuttle)
+    send(page, "charger")
+    state(page, "DRIVING")
+    expect(widget(page, "send")).to_contain_text("Succeeded at", timeout=ARRIVES_MS)
+    state(page, "WAITING")
+
+
+def test_blocked_way_is_an_alarm_and_the_goal_says_why_it_ends(shuttle: Server, page: Page) -> None:
+    put_box(page, shuttle, "on")
+    opened(page, shuttle)
+    send(page, "wrapper")
+    state(page, "BLOCKED")
+    expect(page.locator(".alarm-line")).to_contain_text("Way blocked")
+    expect(widget(page, "send")).to_contain_text("The way is blocked (105)", timeout=ARRIVES_MS)
+    put_box(page, shuttle, "off")
+
+
+def test_cancel_ends_the_goal_and_the_robot_stands(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    send(page, "palletizer_1")
+    state(page, "DRIVING")
+    widget(page, "send").locator(".cancel").click()
+    expect(widget(page, "send")).to_contain_text("Canceled at")
+    state(page, "WAITING")
